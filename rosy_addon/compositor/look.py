@@ -1,0 +1,133 @@
+"""Everything that can be chosen about a picture, as one settings object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from ..errors import RosyError
+
+
+def _number(default: float, low: float, high: float, text: str) -> Any:
+    return field(default=default, metadata={"low": low, "high": high, "text": text})
+
+
+def _choice(default: str, text: str, **options: str) -> Any:
+    return field(default=default, metadata={"options": options, "text": text})
+
+
+def _switch(default: bool, text: str) -> Any:
+    return field(default=default, metadata={"text": text})
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a field is drawn: what a preset holds, and what the panel shows.
+
+    Lengths are in pixels of the finished picture. Each field's metadata says its range or options
+    and what it does, in words a user meets; the panel's properties are made from it.
+    """
+
+    method: str = _choice(
+        "members",
+        "How the N directions become one picture",
+        members="The paper's decomposition into member vector fields",
+        brute="Follow the best of N directions at every step: slow, the yardstick",
+    )
+    weights: str = _choice(
+        "cosine",
+        "How the two sets of member images are blended, so that breaking points do not show",
+        cosine="Smoothly, by the squared cosine and sine of N t / 2",
+        binary="Each pixel from one set or the other",
+        none="The first set alone: shows the breaking points",
+    )
+    view_plane: bool = _switch(
+        True, "Rotate the field into the view plane before decomposing it (off: the paper's Figure 8)"
+    )
+    display: str = _choice(
+        "smooth",
+        "How the values of the faces become values of pixels",
+        smooth="Averaged at the corners and interpolated",
+        flat="Each face as it is",
+    )
+    length: int = _number(40, 1, 2000, "Steps of a streamline each way")
+    step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
+    grain: float = _number(1.5, 0.5, 64.0, "Size of a cell of the noise, in pixels")
+    noise: str = _choice(
+        "grey",
+        "Colour of the noise, and so of the streaks",
+        grey="One channel",
+        colour="Three channels, drawn separately: a plaid",
+    )
+    seed: int = _number(0, 0, 2**31 - 1, "Which noise")
+    gain: float = _number(2.0, 0.0, 16.0, "Contrast on top of the statistical correction")
+    guiding_angle: float = _number(
+        0.0, -3.1416, 3.1416, "Direction in the picture nearest to which the first member is chosen"
+    )
+    foreshorten: bool = _switch(
+        False, "Let streaks shorten where the surface turns away, instead of keeping their length"
+    )
+    cross_creases: bool = _switch(False, "Let streaks run across sharp creases")
+    crease_angle: float = _number(
+        0.7, 0.0, 3.1416, "Angle between neighbouring pixels' normals that is a sharp crease"
+    )
+    magnitude: str = _choice(
+        "none",
+        "What the magnitude of the field drives",
+        none="Nothing",
+        colour="The colour, through a colour map",
+        length="The length of the streaks",
+        both="Colour and length",
+    )
+    magnitude_range: float = _number(
+        0.0, 0.0, 1e9, "Magnitude at the top of the colour map and at full length; 0: the largest seen"
+    )
+    colour_map: str = _choice(
+        "viridis",
+        "Colours that stand for the magnitude, all of even perceptual steps",
+        viridis="Dark blue through green to yellow",
+        magma="Black through red to pale yellow",
+        grey="Black to white",
+    )
+    shading: float = _number(0.7, 0.0, 1.0, "Strength of the diffuse shading in the picture itself")
+    light: str = _choice(
+        "headlight",
+        "Where the light of that shading comes from",
+        headlight="The eye",
+        scene="The lights of the scene",
+    )
+    supersampling: int = _number(1, 1, 4, "Samples of a pixel along each side")
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            _check_setting(entry.name, getattr(self, entry.name), entry.default, entry.metadata)
+
+    def with_settings(self, settings: dict[str, Any]) -> Look:
+        """A look with some settings changed.
+
+        Raises
+        ------
+        RosyError
+            If there is no such setting, or its value is not allowed.
+        """
+        known = {entry.name for entry in fields(self)}
+        for name in settings:
+            if name not in known:
+                raise RosyError(f"a look has no setting '{name}'")
+        return replace(self, **settings)
+
+
+def _check_setting(name: str, value: Any, default: Any, rules: Any) -> None:
+    if "options" in rules:
+        if value not in rules["options"]:
+            wanted = ", ".join(rules["options"])
+            raise RosyError(f"setting '{name}' is {value!r}, not one of {wanted}")
+    elif "low" in rules:
+        whole = isinstance(default, int)
+        kind = int if whole else (int, float)
+        if isinstance(value, bool) or not isinstance(value, kind):
+            raise RosyError(f"setting '{name}' is {value!r}, not a {'whole ' * whole}number")
+        if not rules["low"] <= value <= rules["high"]:
+            raise RosyError(f"setting '{name}' is {value}, not from {rules['low']} to {rules['high']}")
+    elif not isinstance(value, bool):
+        raise RosyError(f"setting '{name}' is {value!r}, not true or false")

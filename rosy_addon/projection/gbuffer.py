@@ -1,0 +1,78 @@
+"""The G-buffer: what the camera sees of the RoSy surfaces, as one flat list of pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from .camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One thing in front of the camera: a surface, where it stands, and its field.
+
+    Attributes
+    ----------
+    surface : Surface
+        In object space. Instances share one.
+    matrix : (4, 4) float64 ndarray
+        Object to world space.
+    field : RosyField or None
+        On the faces of `surface`; None for what only hides others.
+    """
+
+    surface: Surface
+    matrix: np.ndarray
+    field: RosyField | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class GBuffer:
+    """The visible pixels of all RoSy surfaces, P of them, in ascending order of pixel index.
+
+    All vectors are in camera space.
+
+    Attributes
+    ----------
+    camera : Camera
+    names : tuple of str
+        Name a body, in the order of the bodies given.
+    degrees : tuple of int
+        Degree a body; 0 for one without a field.
+    pixel : (P,) int32 ndarray
+        Flat index into the frame, from the lower left, rows first.
+    body : (P,) int32 ndarray
+        Which body is seen.
+    face : (P,) int32 ndarray
+        Which of its faces (polygons).
+    barycentric : (P, 3) float32 ndarray
+        Perspective-correct, in the triangle that is seen.
+    triangle : (P,) int32 ndarray
+        Which triangle of the body's surface.
+    position : (P, 3) float32 ndarray
+        Blender units.
+    normal : (P, 3) float32 ndarray
+        Unit shading normal, turned toward the eye.
+    toward_eye : (P, 3) float32 ndarray
+        Unit direction to the eye; (0, 0, 1) throughout for an orthographic camera.
+    representation : (P,) complex64 ndarray
+        z = rho exp(i N t), with t the angle of a member rotated into the view plane (the plane
+        across `toward_eye`), in that plane's frame (`frames.view_frame`). Zero is undefined.
+    """
+
+    camera: Camera
+    names: tuple[str, ...]
+    degrees: tuple[int, ...]
+    pixel: np.ndarray
+    body: np.ndarray
+    face: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    toward_eye: np.ndarray
+    representation: np.ndarray

@@ -1,0 +1,148 @@
+"""Two plain generators, so that any mesh has a field at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from .corners import corner_angles, corner_rotations, smooth_faces
+from .frames import dot, unit
+from .representation import face_frames, from_representation
+from .rosy_field import RosyField, check_degree
+from .surface import Surface, build_surface, sum_over_faces
+
+#: What can be generated, in the words a user meets.
+KINDS = {
+    "curvature": "Along the principal directions of curvature (degree 2 and 4)",
+    "axis": "Along a direction, projected to the surface",
+}
+
+#: Rounds of averaging that take the jitter of the triangulation out of a curvature field.
+SMOOTHING = 2
+
+
+def generate(
+    surface: Surface,
+    kind: str,
+    degree: int,
+    *,
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+) -> RosyField:
+    """Make the field of one of `KINDS`.
+
+    Raises
+    ------
+    RosyError
+        If there is no such kind, or it does not make fields of this degree.
+    """
+    if kind == "axis":
+        return axis_field(surface, degree, axis)
+    if kind == "curvature":
+        return curvature_field(surface, degree)
+    raise RosyError(f"no generator is named '{kind}'; there are {', '.join(KINDS)}")
+
+
+def axis_field(
+    surface: Surface, degree: int, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+) -> RosyField:
+    """One member along a direction, projected to each face.
+
+    The magnitude is the length of the projection of the unit axis: 1 where the surface runs along
+    it, 0 where it stands across, which is where the field is singular.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+    axis : 3 floats
+        Object space, of any length but 0.
+
+    Raises
+    ------
+    RosyError
+        If the axis has no direction.
+    """
+    direction = np.asarray(axis, dtype=np.float64).reshape(-1)
+    length = np.linalg.norm(direction)
+    if direction.shape != (3,) or not np.isfinite(length) or length == 0:
+        raise RosyError(f"axis {tuple(axis)} is not a direction")
+    direction = direction / length
+    normal = surface.face_normal
+    vectors = direction - (normal @ direction)[:, None] * normal
+    vectors[~normal.any(axis=1)] = 0.0
+    return RosyField(degree, vectors)
+
+
+def curvature_field(surface: Surface, degree: int) -> RosyField:
+    """Members along the principal directions of curvature.
+
+    Degree 2 follows the direction in which the surface bends most toward its inside (the greater
+    signed curvature), degree 4 both principal directions.
+
+    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``: 0 at umbilics
+    and in planes, where there is no principal direction, 1 on cylinders and saddles. k0, a
+    curvature of a fiftieth over the mean radius of the mesh, keeps rounding errors in nearly flat
+    parts from passing for directions.
+
+    Raises
+    ------
+    RosyError
+        If the degree is neither 2 nor 4.
+
+    References
+    ----------
+    The second fundamental form of a face is fitted to the differences of its corner normals, as
+    by Rusinkiewicz, "Estimating Curvatures and Their Derivatives on Triangle Meshes", 3DPVT 2004,
+    here for polygons; representations are then averaged over the vertices.
+    """
+    degree = check_degree(degree)
+    if degree not in (2, 4):
+        raise RosyError(f"a curvature field has degree 2 or 4, not {degree}")
+    # Shading does not matter here: a mesh shown flat or with sharp edges bends all the same.
+    whole = build_surface(
+        surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name
+    )
+    x, y = face_frames(whole)
+    mean, deviator = _curvature_of_faces(whole, x, y)
+    amount = np.abs(deviator)
+    centre = whole.face_centre.mean(axis=0)
+    offset = whole.face_centre - centre
+    radius = np.sqrt(np.mean(dot(offset, offset)))
+    # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
+    confidence = amount / (np.maximum(np.abs(mean), amount) + 0.01 / max(radius, 1e-30))
+    phase = np.divide(deviator, amount, out=np.zeros_like(deviator), where=amount > 0)
+    z = confidence * phase ** (degree // 2)
+    turn = corner_rotations(whole.face_normal, x, whole.corner_face, whole.corner_normal)
+    weights = corner_angles(whole)
+    for _ in range(SMOOTHING):
+        z = smooth_faces(whole, z, turn, degree, weights)
+    return RosyField(degree, from_representation(z, x, y, degree))
+
+
+def _curvature_of_faces(
+    surface: Surface, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean curvature (F,) float, and deviator (F,) complex, of the form fitted to each face.
+
+    The symmetric form [[a, b], [b, c]] should take each edge (u, v) of the face to the difference
+    (p, q) of the normals at its ends; least squares over the edges. The deviator
+    (a - c) / 2 + i b has the modulus (k1 - k2) / 2 and twice the angle of the direction of k1.
+    """
+    face, ahead = surface.corner_face, surface.next_corner
+    points = surface.vertices[surface.corner_vertex]
+    edge = points[ahead] - points
+    bend = surface.corner_normal[ahead] - surface.corner_normal
+    u, v = dot(edge, x[face]), dot(edge, y[face])
+    p, q = dot(bend, x[face]), dot(bend, y[face])
+    uu, uv, vv, up, mixed, vq = sum_over_faces(
+        np.stack([u * u, u * v, v * v, u * p, v * p + u * q, v * q], axis=1), surface.face_start
+    ).T
+    size = uu + vv
+    size[size == 0] = 1.0
+    ridge = 1e-9 * size  # faces without area get no curvature instead of no solution
+    matrix = np.zeros((len(uu), 3, 3))
+    matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = uu + ridge, uu + vv + ridge, vv + ridge
+    matrix[:, 0, 1] = matrix[:, 1, 0] = matrix[:, 1, 2] = matrix[:, 2, 1] = uv
+    right = np.stack([up, mixed, vq], axis=1)[..., None]
+    a, b, c = np.linalg.solve(matrix, right)[..., 0].T
+    return (a + c) / 2, (a - c) / 2 + 1j * b

@@ -1,0 +1,87 @@
+"""The representation of an N-RoSy: the complex number z = rho exp(i N t).
+
+All N members share it, and averages of it are averages of RoSys (Palacios and Zhang 2007), which
+averages of members are not. Every average, interpolation and comparison goes through z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .frames import dot, unit
+from .rosy_field import RosyField
+from .surface import Surface
+
+
+def power(numbers: np.ndarray, degree: int) -> np.ndarray:
+    """`numbers` ** `degree` by repeated squaring: exact in the phase, and quick for arrays."""
+    result = None
+    while True:
+        if degree & 1:
+            result = numbers if result is None else result * numbers
+        degree >>= 1
+        if not degree:
+            return result
+        numbers = numbers * numbers
+
+
+def to_representation(
+    vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
+) -> np.ndarray:
+    """z of member vectors in the frames x, y.
+
+    Parameters
+    ----------
+    vectors : (..., 3) ndarray
+        A member each.
+    x, y : (..., 3) ndarray
+        Orthonormal tangents, counter-clockwise about the normal.
+    degree : int
+
+    Returns
+    -------
+    (...) complex ndarray
+        rho exp(i N t): the member's length, and N times its angle from x. Zero for a zero vector.
+    """
+    member = dot(vectors, x) + 1j * dot(vectors, y)
+    rho = np.abs(member)
+    phase = np.divide(member, rho, out=np.zeros_like(member), where=rho > 0)
+    return rho * power(phase, degree)
+
+
+def from_representation(
+    z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
+) -> np.ndarray:
+    """The member vector nearest to x that has the representation z; the inverse of the above.
+
+    Returns
+    -------
+    (..., 3) ndarray
+    """
+    rho, angle = np.abs(z)[..., None], (np.angle(z) / degree)[..., None]
+    return rho * (np.cos(angle) * x + np.sin(angle) * y)
+
+
+def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """(F, 3) unit tangents of each face: x along its first edge that has a length, y = normal x x.
+
+    For faces without area both are zero, so that a field's representation is zero there too.
+    """
+    normal = surface.face_normal
+    points = surface.vertices[surface.corner_vertex]
+    start, stop = surface.face_start[:-1], surface.face_start[1:]
+    edge = points[surface.next_corner] - points
+    edge -= dot(edge, normal[surface.corner_face])[:, None] * normal[surface.corner_face]
+    length = np.sqrt(dot(edge, edge))
+    corner = np.arange(len(length))
+    usable = np.where(length > 0, corner, stop[surface.corner_face] - 1)
+    first = np.minimum.reduceat(usable, start)
+    x = unit(edge[first])
+    x[~normal.any(axis=1)] = 0.0
+    return x, np.cross(normal, x)
+
+
+def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
+    """(F,) complex128: z of a field in `face_frames`."""
+    x, y = face_frames(surface)
+    return to_representation(field.vectors, x, y, field.degree)

@@ -50,7 +50,7 @@ class Look:
         smooth="Averaged at the corners and interpolated",
         flat="Each face as it is",
     )
-    length: int = _number(40, 1, 2000, "Steps of a streamline each way")
+    length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
     grain: float = _number(1.5, 0.5, 64.0, "Size of a cell of the noise, in pixels")
     noise: str = _choice(

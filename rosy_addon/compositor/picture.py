@@ -6,6 +6,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .images import Images
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """What the pixels of one degree were made of, before supersampling is averaged away.
+
+    Attributes
+    ----------
+    degree : int
+    pixel : (P,) int32 ndarray
+        Flat indices into the (supersampled) frame.
+    images : Images
+        The LIC of each member and their blend, around 0.5, before contrast correction.
+    tone : (P, K) float32 ndarray
+        The blend after contrast correction and gain: display values, not clipped.
+    """
+
+    degree: int
+    pixel: np.ndarray
+    images: Images
+    tone: np.ndarray
+
 
 @dataclass(frozen=True, eq=False)
 class Picture:
@@ -14,16 +37,10 @@ class Picture:
     Attributes
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear light, not premultiplied; alpha is 0 where no field is seen. At supersampling 1 all
-        covered pixels have alpha 1.
-    layers : dict of str to ndarray
-        What it was made of, over the P visible pixels *before* supersampling is averaged away:
-        ``pixel`` (P,) int32 indices into the (supersampled) frame; ``members`` (M, P, K) float32,
-        the LIC of each member field in display values around 0.5, before contrast correction, K
-        being 1 or 3 channels; ``tone`` (P, K) float32, the blend after correction and gain, not
-        clipped; ``samples`` (P,) float32, mean number of samples of a pixel's streamlines;
-        ``weight`` (P,) float32, the share of the first set of images; ``shading`` (P,) float32.
+        Linear light, not premultiplied. Alpha is the part of the pixel where a field is seen.
+    layers : tuple of Layers
+        One a degree that is seen, in ascending order.
     """
 
     rgba: np.ndarray
-    layers: dict[str, np.ndarray]
+    layers: tuple[Layers, ...]

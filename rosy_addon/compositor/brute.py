@@ -1,0 +1,67 @@
+"""The plain way: at each step follow the best of the N members. The paper's yardstick."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Work
+from .flow import Flow, image_count, nearest_member, rotations
+from .images import Images, Walker, member_images
+from .look import Look
+from .streamlines import Direction
+
+
+def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
+    """One image for each of the M members, streamlines matching members as they go.
+
+    There are no breaking points and no second set; the price is a look at all N members at every
+    step of every streamline.
+
+    Parameters
+    ----------
+    flow : Flow
+    look : Look
+    noise : (P, K) float32 ndarray
+    """
+    nearest = nearest_member(flow, look.guiding_angle)
+    turns = rotations(flow.degree)
+    fan = np.stack([nearest * turn for turn in turns], axis=1)
+    fan = np.append(fan, np.zeros((1, flow.degree)), axis=0).astype(np.complex64)
+    screen = [flow.on_screen(nearest * turn, look.foreshorten) for turn in turns]
+    screen = np.append(np.stack(screen, axis=1), np.zeros((1, flow.degree)), axis=0)
+    screen = screen.astype(np.complex64)
+    walkers = [_best_of(fan, screen, member) for member in range(image_count(flow.degree))]
+    return (yield from member_images(flow, look, noise, walkers))
+
+
+def _best_of(fan: np.ndarray, screen: np.ndarray, member: int) -> Walker:
+    """The walker that starts along one member and keeps to the best match.
+
+    Parameters
+    ----------
+    fan, screen : (P + 1, N) complex64 ndarray
+        All members, in the view plane (where they are matched) and on screen (where they lead).
+    member : int
+    """
+
+    def walk(block: slice) -> tuple[Direction, Direction]:
+        start = fan[block, member]
+        return _matching(fan, screen, start, 1), _matching(fan, screen, start, -1)
+
+    return walk
+
+
+def _matching(fan: np.ndarray, screen: np.ndarray, start: np.ndarray, sign: int) -> Direction:
+    """Directions of streamlines that remember the member they are on."""
+    degree = fan.shape[1]
+    heading = start
+
+    def follow(entry: np.ndarray) -> np.ndarray:
+        nonlocal heading
+        there = fan.take(entry, axis=0)
+        match = there.real * heading.real[:, None] + there.imag * heading.imag[:, None]
+        best = entry * degree + match.argmax(axis=1).astype(np.int32)
+        heading = fan.reshape(-1).take(best)
+        return np.float32(sign) * screen.reshape(-1).take(best)
+
+    return follow

@@ -1,0 +1,140 @@
+"""Visible pixels and their field -> the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..projection.gbuffer import GBuffer
+from ..progress import Work, drain, part
+from .brute import brute_images
+from .colour import map_colours, to_linear
+from .contrast import blend_gain, scale_contrast
+from .flow import Flow, planar_flow, surface_flow
+from .images import Images, relative_magnitude
+from .look import Look
+from .members import members_images
+from .noise import MEAN, image_noise
+from .picture import Layers, Picture
+from .shading import Light, diffuse
+
+#: The ways to compose, by their names in a look.
+METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
+    "members": members_images,
+    "brute": brute_images,
+}
+
+
+def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
+    """Draw the fields of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        Of `look.supersampling` times the size of the picture each way.
+    look : Look
+    lights : sequence of Light
+        For a look lit by the scene.
+
+    Returns
+    -------
+    Picture
+    """
+    camera = gbuffer.camera
+    finer = _scaled(look)
+    colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
+    degree_of = np.asarray(gbuffer.degrees)[gbuffer.body]
+    layers = []
+    degrees = np.unique(degree_of).tolist()
+    for count, degree in enumerate(degrees):
+        flow = surface_flow(gbuffer, degree, look.crease_angle, look.cross_creases)
+        start, stop = count / len(degrees), (count + 1) / len(degrees)
+        layer = yield from part(_layers(flow, finer), start, stop)
+        colour[degree_of == degree] = _ink(flow, layer.tone, look)
+        layers.append(layer)
+    colour *= diffuse(gbuffer, look, lights)
+    rgba = _frame(gbuffer.pixel, colour, camera.width, camera.height, look.supersampling)
+    return Picture(rgba, tuple(layers))
+
+
+def compose(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Picture:
+    """`composing`, run to its end."""
+    return drain(composing(gbuffer, look, lights))
+
+
+def compose_planar(
+    angles: np.ndarray,
+    degree: int,
+    look: Look,
+    magnitude: np.ndarray | float | None = None,
+    noise: np.ndarray | None = None,
+) -> Picture:
+    """Draw a field in the plane, without a mesh, a camera or light.
+
+    Parameters
+    ----------
+    angles : (H, W) ndarray
+        Angle of a member at each pixel, radians counter-clockwise from the direction of the rows;
+        rows from the bottom. NaN is undefined.
+    degree : int
+    look : Look
+        Its supersampling is 1 here: give finer angles instead.
+    magnitude : (H, W) ndarray or float, optional
+        rho, 1 if not given.
+    noise : (H, W) or (H, W, 3) ndarray, optional
+        Instead of the look's own.
+
+    Returns
+    -------
+    Picture
+    """
+    flow = planar_flow(angles, degree, magnitude)
+    if noise is not None:
+        noise = np.asarray(noise, dtype=np.float32).reshape(len(flow.pixel), -1)
+    layers = drain(_layers(flow, look, noise))
+    colour = _ink(flow, layers.tone, look)
+    return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
+
+
+def _scaled(look: Look) -> Look:
+    """The look with its lengths in the pixels of the supersampled frame."""
+    factor = look.supersampling
+    return replace(look, length=look.length * factor, grain=look.grain * factor)
+
+
+def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Layers]:
+    """LIC images of the members, blended, with the contrast of one of them times the gain."""
+    if noise is None:
+        channels = 3 if look.noise == "colour" else 1
+        noise = image_noise(flow.pixel, flow.width, look.grain, look.seed, channels)
+    images = yield from METHODS[look.method](flow, look, noise)
+    gain = look.gain * blend_gain(flow.degree, images.samples, look.step, look.grain)
+    tone = scale_contrast(images.blend, gain[:, None])
+    return Layers(flow.degree, flow.pixel, images, tone)
+
+
+def _ink(flow: Flow, tone: np.ndarray, look: Look) -> np.ndarray:
+    """(P, 3) or (P, 1) linear light of the tones, coloured by magnitude if the look says so."""
+    if look.magnitude not in ("colour", "both"):
+        return to_linear(tone)
+    hue = map_colours(relative_magnitude(flow, look), look.colour_map)
+    return to_linear(hue * (1 + 1.5 * (tone - MEAN)))
+
+
+def _frame(
+    pixel: np.ndarray, colour: np.ndarray, width: int, height: int, supersampling: int
+) -> np.ndarray:
+    """(H, W, 4) float32: colours put in their places, blocks of subpixels averaged."""
+    rgba = np.zeros((height * width, 4), dtype=np.float32)
+    rgba[pixel, :3] = colour
+    rgba[pixel, 3] = 1
+    s = supersampling
+    if s == 1:
+        return rgba.reshape(height, width, 4)
+    # Uncovered subpixels are black and of alpha 0: the sums are premultiplied.
+    rgba = rgba.reshape(height // s, s, width // s, s, 4).mean(axis=(1, 3))
+    alpha = rgba[..., 3:]
+    np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    return rgba

@@ -1,0 +1,185 @@
+"""What a compositor sees: pixels, the field on them, and where a streamline may go next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.rosy_field import check_degree
+from ..projection.gbuffer import GBuffer
+from ..projection.project import links, screen_axes
+
+#: Offsets of the 3 x 3 neighbours, in the order of the bits of `links`.
+OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A field of one degree on a flat list of P pixels, with no geometry left in it.
+
+    Attributes
+    ----------
+    degree : int
+    width, height : int
+        Of the frame, in pixels.
+    pixel : (P,) int32 ndarray
+        Flat indices, ascending, from the lower left.
+    representation : (P,) complex64 ndarray
+        z = rho exp(i N t), t an angle in the view plane; 0 where the field is undefined.
+    axes : (P, 2) complex64 ndarray or None
+        On screen, in pixels as x + i y, the axes of the view plane's frame at each pixel as they
+        lie on the surface. None in the plane, where they are 1 and i.
+    neighbours : (P + 1, 9) int32 ndarray
+        Which entry of this list a streamline is on after a step to each of `OFFSETS`, P if it ends
+        there. Row P, the state of those that have ended, leads to P alone.
+    """
+
+    degree: int
+    width: int
+    height: int
+    pixel: np.ndarray
+    representation: np.ndarray
+    axes: np.ndarray | None
+    neighbours: np.ndarray
+
+    def on_screen(self, member: np.ndarray, foreshorten: bool = False) -> np.ndarray:
+        """Directions in the view plane as they run on screen.
+
+        Parameters
+        ----------
+        member : (P,) complex ndarray
+            Unit vectors in the view plane's frame.
+        foreshorten : bool
+            Keep the length that they have on screen, instead of length 1.
+
+        Returns
+        -------
+        (P,) complex64 ndarray
+            Pixels.
+        """
+        if self.axes is None:
+            return member.astype(np.complex64)
+        direction = self.axes[:, 0] * member.real + self.axes[:, 1] * member.imag
+        return direction.astype(np.complex64) if foreshorten else phase(direction)
+
+
+def phase(numbers: np.ndarray) -> np.ndarray:
+    """complex64 numbers scaled to modulus 1; 0 stays 0."""
+    size = np.abs(numbers)
+    result = np.zeros(numbers.shape, dtype=np.complex64)
+    return np.divide(numbers, size, out=result, where=size > 0, casting="same_kind")
+
+
+def surface_flow(
+    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
+) -> Flow:
+    """The pixels of a G-buffer that show fields of one degree.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    degree : int
+    crease_angle : float
+        Radians; streamlines end where normals of neighbouring pixels differ by more.
+    cross_creases : bool
+        Let them cross all the same.
+    """
+    joined = links(gbuffer, crease_angle, cross_creases)
+    axes = screen_axes(gbuffer)
+    chosen = np.asarray(gbuffer.degrees)[gbuffer.body] == degree
+    if chosen.all():
+        chosen = slice(None)
+    z = gbuffer.representation[chosen]
+    pixel, camera = gbuffer.pixel[chosen], gbuffer.camera
+    return Flow(
+        degree=degree,
+        width=camera.width,
+        height=camera.height,
+        pixel=pixel,
+        representation=z,
+        axes=axes[chosen],
+        neighbours=_neighbours(pixel, camera.width, camera.height, joined[chosen], z != 0),
+    )
+
+
+def planar_flow(
+    angles: np.ndarray, degree: int, magnitude: np.ndarray | float | None = None
+) -> Flow:
+    """A field in the plane, given by the angle of a member at each pixel.
+
+    Parameters
+    ----------
+    angles : (H, W) ndarray
+        Radians, counter-clockwise from the direction of the rows, which are counted from the
+        bottom. NaN is undefined.
+    degree : int
+    magnitude : (H, W) ndarray or float, optional
+        rho, 1 if not given.
+    """
+    degree = check_degree(degree)
+    angles = np.asarray(angles, dtype=np.float64)
+    height, width = angles.shape
+    rho = np.broadcast_to(1.0 if magnitude is None else magnitude, angles.shape)
+    defined = np.isfinite(angles) & (rho > 0)
+    z = np.where(defined, rho * np.exp(1j * degree * np.where(defined, angles, 0.0)), 0.0)
+    pixel = np.arange(height * width, dtype=np.int32)
+    z = z.ravel().astype(np.complex64)
+    everywhere = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
+    return Flow(
+        degree=degree,
+        width=width,
+        height=height,
+        pixel=pixel,
+        representation=z,
+        axes=None,
+        neighbours=_neighbours(pixel, width, height, everywhere, z != 0),
+    )
+
+
+def _neighbours(
+    pixel: np.ndarray, width: int, height: int, joined: np.ndarray, defined: np.ndarray
+) -> np.ndarray:
+    """(P + 1, 9) table of `Flow.neighbours` from the bits of `links`."""
+    count = len(pixel)
+    # A frame with a border of one pixel, so that no step needs a test for the edge of the picture.
+    entry = np.full((height + 2) * (width + 2), count, dtype=np.int32)
+    bordered = (pixel // width + 1) * (width + 2) + pixel % width + 1
+    entry[bordered] = np.where(defined, np.arange(count, dtype=np.int32), count)
+    table = np.full((count + 1, 9), count, dtype=np.int32)
+    for bit, (dx, dy) in enumerate(OFFSETS):
+        there = entry[bordered + dy * (width + 2) + dx]
+        table[:count, bit] = np.where(joined >> bit & 1, there, count)
+    return table
+
+
+def blend_weights(flow: Flow, guiding_angle: float) -> np.ndarray:
+    """(P,) float32: cos^2 (N (t - phi) / 2), the share of the first set of member images.
+
+    Equal to 0 at the breaking points of that set and to 1 at those of the other.
+    """
+    turned = phase(flow.representation) * np.exp(-1j * flow.degree * guiding_angle)
+    return (0.5 + 0.5 * turned.real).astype(np.float32)
+
+
+def nearest_member(flow: Flow, guiding_angle: float) -> np.ndarray:
+    """(P,) complex64: the member nearest to a guiding angle, in the view plane (equations 3, 4).
+
+    Of two equally near ones it is the one on the counter-clockwise side, as in the paper.
+    """
+    turned = flow.representation * np.exp(-1j * flow.degree * guiding_angle)
+    member = np.exp(1j * (np.angle(turned) / flow.degree + guiding_angle))
+    member[flow.representation == 0] = 0
+    return member.astype(np.complex64)
+
+
+def rotations(degree: int) -> np.ndarray:
+    """(N,) complex128 roots of unity: the turns from one member to the others."""
+    return np.exp(2j * np.pi * np.arange(degree) / degree)
+
+
+def image_count(degree: int) -> int:
+    """M, the images that show all N directions: N, or N / 2 where opposite members share one."""
+    return degree if degree % 2 else degree // 2
+
+

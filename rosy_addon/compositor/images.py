@@ -1,0 +1,99 @@
+"""One LIC image a member, and their blend."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..progress import Progress, Work
+from .contrast import even_out
+from .flow import Flow
+from .look import Look
+from .streamlines import Direction, blocks, gather
+
+#: For a block of pixels, the directions forward and backward along the streamlines of one member.
+Walker = Callable[[slice], tuple[Direction, Direction]]
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """The LIC of each member of a field, before contrast correction.
+
+    Attributes
+    ----------
+    members : (M, P, K) float32 ndarray
+        K is 1 for grey noise, 3 for coloured.
+    blend : (P, K) float32 ndarray
+        Their mean.
+    samples : (P,) float32 ndarray
+        Samples on a pixel's streamlines, mean over its members.
+    weight : (P,) float32 ndarray
+        Share of `members` in `blend`, the rest being that of another set.
+    """
+
+    members: np.ndarray
+    blend: np.ndarray
+    samples: np.ndarray
+    weight: np.ndarray
+
+    def blended(self, other: Images, weight: np.ndarray) -> Images:
+        """These images where `weight` is 1, the `other` ones where it is 0."""
+        return replace(
+            self,
+            blend=other.blend + weight[:, None] * (self.blend - other.blend),
+            samples=other.samples + weight * (self.samples - other.samples),
+            weight=weight,
+        )
+
+
+def member_images(
+    flow: Flow, look: Look, noise: np.ndarray, walkers: Sequence[Walker]
+) -> Work[Images]:
+    """Walk the streamlines of each member through every pixel and average the noise along them.
+
+    Parameters
+    ----------
+    flow : Flow
+    look : Look
+        Its `length`, `step` and `magnitude` count.
+    noise : (P, K) float32 ndarray
+    walkers : sequence of functions
+        One a member.
+    """
+    count, channels = noise.shape
+    full = 2 * look.length + 1
+    limit = _limits(flow, look)
+    ended = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
+    members = np.empty((len(walkers), count, channels), dtype=np.float32)
+    samples = np.zeros(count, dtype=np.float32)
+    for member, walker in enumerate(walkers):
+        for block in blocks(count):
+            total = noise[block].copy()
+            found = np.ones(len(total), dtype=np.float32)
+            for follow in walker(block):
+                steps = None if limit is None else limit[block]
+                half, more = gather(flow, block, follow, ended, look.length, look.step, steps)
+                total += half
+                found += more
+            members[member, block] = even_out(total / found[:, None], found, full)
+            samples[block] += found
+            fraction = (member + block.stop / count) / len(walkers)
+            yield Progress(fraction, "Following streamlines")
+    samples /= len(walkers)
+    return Images(members, members.mean(axis=0), samples, np.ones(count, dtype=np.float32))
+
+
+def _limits(flow: Flow, look: Look) -> np.ndarray | None:
+    """(P,) steps each way where the magnitude drives the length; None where it does not."""
+    if look.magnitude not in ("length", "both"):
+        return None
+    return np.rint(look.length * relative_magnitude(flow, look)).astype(np.int32)
+
+
+def relative_magnitude(flow: Flow, look: Look) -> np.ndarray:
+    """(P,) float32: rho from 0 to 1, as a part of `Look.magnitude_range`."""
+    rho = np.abs(flow.representation)
+    top = look.magnitude_range or float(rho.max(initial=0.0)) or 1.0
+    return np.minimum(rho / np.float32(top), 1)

@@ -1,0 +1,72 @@
+"""Diffuse light on the visible pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.frames import dot, unit
+from ..projection.gbuffer import GBuffer
+from .look import Look
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A light as seen from the camera.
+
+    Attributes
+    ----------
+    kind : {"sun", "point"}
+    vector : (3,) ndarray
+        Camera space: for a sun the unit direction to it, for a point its position.
+    colour : (3,) ndarray
+        Linear.
+    strength : float
+        For a sun, what a white surface facing it sends out (1 is white). For a point, the same at
+        a distance of one Blender unit.
+    """
+
+    kind: str
+    vector: np.ndarray
+    colour: np.ndarray
+    strength: float
+
+
+def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.ndarray:
+    """What Lambert's law leaves of each pixel's colour.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    look : Look
+        Its `light` and `shading`, the strength: 0 leaves all pixels at 1.
+    lights : sequence of Light
+        For the light "scene". They cast no shadows.
+
+    Returns
+    -------
+    (P, 3) float32 ndarray
+        Linear factors.
+    """
+    if look.shading == 0:
+        return np.ones((len(gbuffer.pixel), 3), dtype=np.float32)
+    if look.light == "headlight":
+        facing = np.maximum(dot(gbuffer.normal, gbuffer.toward_eye), 0)
+        light = np.repeat(facing[:, None], 3, axis=1)
+    else:
+        light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
+        for source in lights:
+            light += _lambert(gbuffer, source)[:, None] * source.colour
+    return (1 - look.shading + look.shading * light).astype(np.float32)
+
+
+def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
+    """(P,) what one light gives, without its colour."""
+    vector = np.asarray(light.vector, dtype=np.float32)
+    if light.kind == "sun":
+        return light.strength * np.maximum(gbuffer.normal @ vector, 0)
+    way = vector - gbuffer.position
+    squared = np.maximum(dot(way, way), 1e-12)
+    return light.strength * np.maximum(dot(gbuffer.normal, unit(way)), 0) / squared

@@ -1,0 +1,91 @@
+"""Streamlines of all pixels at once, and the noise gathered along them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from .flow import Flow
+
+#: Streamlines walked together: their state, some 40 bytes each, stays in a core's cache.
+BLOCK = 16384
+
+#: (entries, first, steps so far) -> directions; see `gather`.
+Direction = Callable[[np.ndarray], np.ndarray]
+
+
+def blocks(count: int) -> Iterator[slice]:
+    """Slices that cut `count` pixels into runs of about `BLOCK`."""
+    for start in range(0, count, BLOCK):
+        yield slice(start, min(start + BLOCK, count))
+
+
+def gather(
+    flow: Flow,
+    block: slice,
+    follow: Direction,
+    noise: np.ndarray,
+    length: int,
+    step: float,
+    limit: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sum the noise along one half of each streamline that starts in a block.
+
+    Positions are an entry of the flow and an offset from that pixel's centre. Each step is of
+    Adams and Bashforth's second order, v = 3/2 d - 1/2 d_before: one look-up of the direction, as
+    for Euler's, without its drift out of curves.
+
+    Parameters
+    ----------
+    flow : Flow
+    block : slice
+        Of the flow's pixels.
+    follow : function
+        Takes the (B,) int32 entries that the streamlines are on, P for those that have ended, and
+        returns their (B,) complex64 directions on screen, 0 for P. It is called once a step, in
+        order, and may keep what it needs of the streamline between calls.
+    noise : (P + 1, K) float32 ndarray
+        0 in row P.
+    length : int
+        Steps.
+    step : float
+        Pixels, at most 1.
+    limit : (B,) ndarray or None
+        Steps after which each of them ends; None for `length`.
+
+    Returns
+    -------
+    total : (B, K) float32 ndarray
+        Sum of the noise after each step, without the start.
+    samples : (B,) float32 ndarray
+        How many of them, before the streamline ended.
+    """
+    end = len(flow.pixel)
+    neighbours = flow.neighbours.reshape(-1)
+    entry = np.arange(block.start, block.stop, dtype=np.int32)
+    offset = np.zeros(len(entry), dtype=np.complex64)
+    parts = offset.view(np.float32).reshape(-1, 2)
+    total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
+    samples = np.zeros(len(entry), dtype=np.float32)
+    before = None
+    for count in range(1, length + 1):
+        ahead = follow(entry)
+        if before is None:
+            offset += np.float32(step) * ahead
+        else:
+            offset += np.float32(1.5 * step) * ahead - np.float32(0.5 * step) * before
+        before = ahead
+        # No further than a neighbour, however sharply the direction turned.
+        whole = np.clip(np.rint(parts), -1, 1)
+        parts -= whole
+        move = whole[:, 0] + 3 * whole[:, 1]
+        entry = neighbours.take(entry * 9 + (move.astype(np.int32) + 4))
+        if limit is not None:
+            entry[limit < count] = end
+        alive = entry != end
+        if not alive.any():
+            break
+        total += noise.take(entry, axis=0)
+        samples += alive
+    return total, samples

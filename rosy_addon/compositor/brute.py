@@ -8,7 +8,7 @@ from ..progress import Work
 from .flow import Flow, image_count, nearest_member, rotations
 from .images import Images, Walker, member_images
 from .look import Look
-from .streamlines import Direction
+from .streamlines import Direction, direction_table, interpolate
 
 
 def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
@@ -24,12 +24,12 @@ def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     noise : (P, K) float32 ndarray
     """
     nearest = nearest_member(flow, look.guiding_angle)
-    turns = rotations(flow.degree)
-    fan = np.stack([nearest * turn for turn in turns], axis=1)
-    fan = np.append(fan, np.zeros((1, flow.degree)), axis=0).astype(np.complex64)
-    screen = [flow.on_screen(nearest * turn, look.foreshorten) for turn in turns]
-    screen = np.append(np.stack(screen, axis=1), np.zeros((1, flow.degree)), axis=0)
-    screen = screen.astype(np.complex64)
+    fan = np.zeros((len(flow.pixel) + 1, flow.degree), dtype=np.complex64)
+    screen = np.zeros((len(flow.pixel) + 1, flow.degree, 2), dtype=np.complex64)
+    for member, turn in enumerate(rotations(flow.degree)):
+        fan[:-1, member] = nearest * turn
+        directions = flow.on_screen(nearest * turn, look.foreshorten)
+        screen[:, member] = direction_table(flow, directions)
     walkers = [_best_of(fan, screen, member) for member in range(image_count(flow.degree))]
     return (yield from member_images(flow, look, noise, walkers))
 
@@ -39,8 +39,10 @@ def _best_of(fan: np.ndarray, screen: np.ndarray, member: int) -> Walker:
 
     Parameters
     ----------
-    fan, screen : (P + 1, N) complex64 ndarray
-        All members, in the view plane (where they are matched) and on screen (where they lead).
+    fan : (P + 1, N) complex64 ndarray
+        All members in the view plane, where they are matched.
+    screen : (P + 1, N, 2) complex64 ndarray
+        The same on screen, where they lead: a `direction_table` of each.
     member : int
     """
 
@@ -54,14 +56,15 @@ def _best_of(fan: np.ndarray, screen: np.ndarray, member: int) -> Walker:
 def _matching(fan: np.ndarray, screen: np.ndarray, start: np.ndarray, sign: int) -> Direction:
     """Directions of streamlines that remember the member they are on."""
     degree = fan.shape[1]
+    members, tables = fan.reshape(-1), screen.reshape(-1, 2)
     heading = start
 
-    def follow(entry: np.ndarray) -> np.ndarray:
+    def follow(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
         nonlocal heading
         there = fan.take(entry, axis=0)
         match = there.real * heading.real[:, None] + there.imag * heading.imag[:, None]
         best = entry * degree + match.argmax(axis=1).astype(np.int32)
-        heading = fan.reshape(-1).take(best)
-        return np.float32(sign) * screen.reshape(-1).take(best)
+        heading = members.take(best)
+        return np.float32(sign) * interpolate(tables.take(best, axis=0), offset)
 
     return follow

@@ -12,6 +12,7 @@ from ..progress import Work, part
 from .flow import Flow, blend_weights, image_count, nearest_member, rotations
 from .images import Images, Walker, member_images
 from .look import Look
+from .streamlines import direction_table, interpolate
 
 
 def members_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
@@ -51,17 +52,25 @@ def _weights(flow: Flow, look: Look) -> np.ndarray:
 
 def _walkers(flow: Flow, look: Look, angle: float) -> list[Walker]:
     """Walkers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
-    if not look.view_plane:
-        return [_along(field) for field in _projected_fields(flow, angle)]
-    nearest = nearest_member(flow, angle)
-    turns = rotations(flow.degree)[: image_count(flow.degree)]
-    return [_along(flow.on_screen(nearest * turn, look.foreshorten)) for turn in turns]
+    if look.view_plane:
+        nearest = nearest_member(flow, angle)
+        turns = rotations(flow.degree)[: image_count(flow.degree)]
+        fields = [flow.on_screen(nearest * turn, look.foreshorten) for turn in turns]
+    else:
+        fields = _projected_fields(flow, angle)
+    return [_along(direction_table(flow, field)) for field in fields]
 
 
-def _along(field: np.ndarray) -> Walker:
-    """The walker along a vector field on screen, (P,) complex64."""
-    directions = np.append(field, np.complex64(0))
-    return lambda block: (directions.take, (-directions).take)
+def _along(table: np.ndarray) -> Walker:
+    """The walker along one vector field on screen."""
+
+    def forward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        return interpolate(table.take(entry, axis=0), offset)
+
+    def backward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        return -forward(entry, offset)
+
+    return lambda block: (forward, backward)
 
 
 def _projected_fields(flow: Flow, angle: float) -> list[np.ndarray]:

@@ -11,14 +11,36 @@ from .flow import Flow
 #: Streamlines walked together: their state, some 40 bytes each, stays in a core's cache.
 BLOCK = 16384
 
-#: (entries, first, steps so far) -> directions; see `gather`.
-Direction = Callable[[np.ndarray], np.ndarray]
+#: (entries, offsets) -> directions; see `gather`.
+Direction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def blocks(count: int) -> Iterator[slice]:
     """Slices that cut `count` pixels into runs of about `BLOCK`."""
     for start in range(0, count, BLOCK):
         yield slice(start, min(start + BLOCK, count))
+
+
+def direction_table(flow: Flow, directions: np.ndarray) -> np.ndarray:
+    """(P + 1, 2) complex64: directions on screen and how they turn, 0 in row P; for `interpolate`."""
+    table = np.zeros((len(directions) + 1, 2), dtype=np.complex64)
+    table[:-1, 0] = directions
+    table[:-1, 1] = flow.turning(directions)
+    return table
+
+
+def interpolate(rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """(B,) complex64 directions at some offset from the centres of pixels, to first order.
+
+    Parameters
+    ----------
+    rows : (B, 2) complex64 ndarray
+        Of `direction_table`.
+    offset : (B,) complex64 ndarray
+        Pixels.
+    """
+    turn = (rows[:, 1].conj() * offset).real
+    return rows[:, 0] * (1 + 1j * turn)
 
 
 def gather(
@@ -43,8 +65,9 @@ def gather(
         Of the flow's pixels.
     follow : function
         Takes the (B,) int32 entries that the streamlines are on, P for those that have ended, and
-        returns their (B,) complex64 directions on screen, 0 for P. It is called once a step, in
-        order, and may keep what it needs of the streamline between calls.
+        their (B,) complex64 offsets from the centres of those pixels, and returns their (B,)
+        complex64 directions on screen, 0 for P. It is called once a step, in order, and may keep
+        what it needs of the streamlines between calls.
     noise : (P + 1, K) float32 ndarray
         0 in row P.
     length : int
@@ -70,7 +93,7 @@ def gather(
     samples = np.zeros(len(entry), dtype=np.float32)
     before = None
     for count in range(1, length + 1):
-        ahead = follow(entry)
+        ahead = follow(entry, offset)
         if before is None:
             offset += np.float32(step) * ahead
         else:

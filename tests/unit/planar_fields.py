@@ -1,0 +1,23 @@
+"""Planar fields with known singularities, for tests of the compositor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def pixel_centres(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """(size, size) x and y of pixel centres, rows from the bottom."""
+    y, x = np.mgrid[0:size, 0:size] + 0.5
+    return x, y
+
+
+def pair_angle(x: np.ndarray, y: np.ndarray, size: int, degree: int) -> np.ndarray:
+    """Angle of a degree-N field with singularities of index 1/N and -1/N."""
+    plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
+    minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
+    return (plus - minus) / degree + 0.3
+
+
+def swirl_angle(x: np.ndarray, y: np.ndarray, size: int) -> np.ndarray:
+    """A vector field that turns smoothly everywhere, without a zero."""
+    return 0.5 + np.sin(2 * np.pi * x / size) + np.cos(2 * np.pi * y / size)

@@ -52,7 +52,8 @@ def singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.nd
     # from b to a.
     turning = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner = surface.corner_vertex
-    turning += 2 * np.pi - np.bincount(corner, _signed_corner_angles(surface, x, y), count)
+    lacking = 2 * np.pi - np.bincount(corner, _signed_corner_angles(surface, x, y), count)
+    turning = turning + lacking
     index = np.rint(turning * field.degree / (2 * np.pi)).astype(np.int32)
 
     whole = np.zeros(count, dtype=bool)

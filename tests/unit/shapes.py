@@ -1,0 +1,91 @@
+"""Meshes in closed form, for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosy_addon.field.surface import Surface, build_surface
+
+
+def grid_of_quads(
+    columns: int, rows: int, wrap_columns: bool, wrap_rows: bool
+) -> tuple[np.ndarray, int]:
+    """(F, 4) vertex indices of a lattice of quads, and how many vertices it has."""
+    nu = columns if wrap_columns else columns + 1
+    nv = rows if wrap_rows else rows + 1
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
+    corner = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+    return np.stack([(a % nu) * nv + b % nv for a, b in corner], axis=1), nu * nv
+
+
+def from_quads(vertices: np.ndarray, quads: np.ndarray, **more) -> Surface:
+    """A surface of quads."""
+    return build_surface(vertices, quads.ravel(), np.arange(0, quads.size + 1, 4), **more)
+
+
+def from_triangles(vertices: np.ndarray, triangles: np.ndarray, **more) -> Surface:
+    """A surface of triangles."""
+    return build_surface(vertices, triangles.ravel(), np.arange(0, triangles.size + 1, 3), **more)
+
+
+def torus(columns: int = 96, rows: int = 48, major: float = 1.0, minor: float = 0.4) -> Surface:
+    """A torus about z; quads, the first edge of each along the large circle."""
+    quads, count = grid_of_quads(columns, rows, True, True)
+    u, v = np.divmod(np.arange(count), rows)
+    u, v = u * 2 * np.pi / columns, v * 2 * np.pi / rows
+    ring = major + minor * np.cos(v)
+    vertices = np.stack([ring * np.cos(u), ring * np.sin(u), minor * np.sin(v)], axis=1)
+    return from_quads(vertices, quads, name="torus")
+
+
+def plane(columns: int = 4, rows: int = 4, size: float = 2.0) -> Surface:
+    """A square in z = 0 around the origin, facing up."""
+    quads, count = grid_of_quads(columns, rows, False, False)
+    u, v = np.divmod(np.arange(count), rows + 1)
+    x, y = (u / columns - 0.5) * size, (v / rows - 0.5) * size
+    return from_quads(np.stack([x, y, 0 * x], axis=1), quads, name="plane")
+
+
+def cylinder(
+    columns: int = 96, rows: int = 24, radius: float = 1.0, height: float = 2.0
+) -> Surface:
+    """An open tube about z, facing out."""
+    quads, count = grid_of_quads(columns, rows, True, False)
+    u, v = np.divmod(np.arange(count), rows + 1)
+    angle = u * 2 * np.pi / columns
+    vertices = [radius * np.cos(angle), radius * np.sin(angle), (v / rows - 0.5) * height]
+    return from_quads(np.stack(vertices, axis=1), quads, name="cylinder")
+
+
+def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
+    """A sphere of 20 * 4^n triangles."""
+    golden = (1 + np.sqrt(5)) / 2
+    ends = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)]
+    vertices = np.array([np.roll(p, shift) for shift in range(3) for p in ends], dtype=float)
+    distance = np.linalg.norm(vertices[:, None] - vertices[None], axis=2)
+    near = np.isclose(distance, 2.0)
+    triangles = np.array(
+        [
+            (a, b, c)
+            for a in range(12)
+            for b in range(a + 1, 12)
+            for c in range(b + 1, 12)
+            if near[a, b] and near[b, c] and near[a, c]
+        ]
+    )
+    inward = np.einsum(
+        "fi,fi->f",
+        np.cross(*(vertices[triangles[:, k]] - vertices[triangles[:, 0]] for k in (1, 2))),
+        vertices[triangles[:, 0]],
+    )
+    triangles[inward < 0] = triangles[inward < 0][:, ::-1]
+    for _ in range(subdivisions):
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        edges, middle = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        ab, bc, ca = middle.reshape(3, -1) + len(vertices)
+        vertices = np.concatenate([vertices, vertices[edges].mean(axis=1)])
+        a, b, c = triangles.T
+        quarters = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
+    vertices *= radius / np.linalg.norm(vertices, axis=1, keepdims=True)
+    return from_triangles(vertices, triangles, name="sphere")

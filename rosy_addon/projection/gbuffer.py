@@ -62,6 +62,12 @@ class GBuffer:
     representation : (P,) complex64 ndarray
         z = rho exp(i N t), with t the angle of a member rotated into the view plane (the plane
         across `toward_eye`), in that plane's frame (`frames.view_frame`). Zero is undefined.
+    plane_normal : (P, 3) float32 ndarray
+        Unit normal of the triangle that is seen, as it is without shading, turned toward the eye.
+        `normal` if not given.
+    front : (P,) bool ndarray
+        Whether the side of the triangle is seen on which its corners run counter-clockwise. True
+        throughout if not given.
     """
 
     camera: Camera
@@ -76,3 +82,11 @@ class GBuffer:
     normal: np.ndarray
     toward_eye: np.ndarray
     representation: np.ndarray
+    plane_normal: np.ndarray | None = None
+    front: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.plane_normal is None:
+            object.__setattr__(self, "plane_normal", self.normal)
+        if self.front is None:
+            object.__setattr__(self, "front", np.ones(len(self.pixel), dtype=bool))

@@ -1,0 +1,392 @@
+"""Which triangle each pixel sees: a scanline rasteriser over flat arrays.
+
+Edges are cut with the lines through the centres of pixels, each edge from its lower to its upper
+end, so that two triangles that share an edge compute the same crossing, bit for bit. A pixel
+belongs to a span if its centre is at or right of the left crossing and left of the right one, a
+row to a triangle if its line is at or above the lowest vertex and below the highest. Neighbouring
+triangles therefore leave no pixel between them out and share none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+#: Triangles, spans and fragments that are worked on at once: bounds memory, and fits the caches.
+BLOCK = 1 << 14
+
+#: Pixels of the frame whose depth is kept at once.
+BAND = 1 << 24
+
+
+class Fragments(NamedTuple):
+    """What the P covered pixels see, in ascending order of pixel.
+
+    Attributes
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat index, ``row * width + column`` from the lower left.
+    triangle : (P,) int32 ndarray
+    barycentric : (P, 3) float64 ndarray
+        Perspective-correct weights of the triangle's vertices at the pixel's centre; not below 0,
+        sum 1.
+    depth : (P,) float64 ndarray
+        z / w, from -1 at the near to 1 at the far plane.
+    """
+
+    pixel: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    depth: np.ndarray
+
+
+class _Screen(NamedTuple):
+    """Vertices on screen: pixels, z / w, and the first pixel centres at or beyond them."""
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    column: np.ndarray
+    row: np.ndarray
+
+
+class _Pieces(NamedTuple):
+    """Triangles in front of the near plane, or what is left of them: vertices, and whose."""
+
+    corners: tuple[np.ndarray, np.ndarray, np.ndarray]
+    triangle: np.ndarray
+
+
+class _Spans(NamedTuple):
+    """Runs of covered pixels: the first and their number, depth at the first and its step."""
+
+    start: np.ndarray
+    count: np.ndarray
+    depth: np.ndarray
+    slope: np.ndarray
+    triangle: np.ndarray
+
+
+def rasterise(
+    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
+) -> Fragments:
+    """Find the nearest triangle at the centre of every pixel.
+
+    Both sides of a triangle are drawn. Of triangles at exactly the same depth the one with the
+    smaller index is seen.
+
+    Parameters
+    ----------
+    clip_vertices : (V, 4) float64 ndarray
+        Clip space, OpenGL's convention.
+    triangles : (T, 3) ndarray of int
+        Vertex indices. Triangles must share vertex indices, or hold equal coordinates, along
+        common edges for their coverage to be without cracks.
+    width, height : int
+        Pixels.
+
+    Returns
+    -------
+    Fragments
+    """
+    clip_vertices = np.ascontiguousarray(clip_vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
+    vertices, pieces = _before_near_plane(clip_vertices, triangles)
+    screen = _on_screen(vertices, width, height)
+    pixel, triangle, depth = [], [], []
+    rows = max(1, BAND // width)
+    for low in range(0, height, rows):
+        high = min(low + rows, height)
+        found = _visible_in_rows(screen, pieces, width, low, high)
+        for values, kept in zip(found, (pixel, triangle, depth), strict=True):
+            kept.append(values)
+    pixel, triangle = np.concatenate(pixel), np.concatenate(triangle)
+    barycentric = _barycentrics(clip_vertices, triangles, pixel, triangle, width, height)
+    return Fragments(pixel, triangle, barycentric, np.concatenate(depth))
+
+
+def _before_near_plane(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, _Pieces]:
+    """Cut triangles that cross the near plane, drop those behind it; more vertices may come out."""
+    inside = vertices[:, 2] + vertices[:, 3] >= 0
+    a, b, c = np.ascontiguousarray(triangles.T)
+    if inside.all():
+        return vertices, _Pieces((a, b, c), np.arange(len(triangles), dtype=np.int32))
+    count = inside[a].astype(np.int8) + inside[b] + inside[c]
+    whole = np.flatnonzero(count == 3).astype(np.int32)
+    cut = np.flatnonzero((count == 1) | (count == 2)).astype(np.int32)
+    added, new_corners, new_triangle = _cut_triangles(vertices, triangles, inside, cut)
+    triangle = np.concatenate([whole, new_triangle])
+    order = np.argsort(triangle, kind="stable")
+    corners = np.concatenate([triangles[whole], new_corners])[order]
+    return (
+        np.concatenate([vertices, added]),
+        _Pieces(tuple(np.ascontiguousarray(corners.T)), triangle[order]),
+    )
+
+
+def _cut_triangles(
+    vertices: np.ndarray, triangles: np.ndarray, inside: np.ndarray, cut: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The parts of crossing triangles inside the near plane, as triangles.
+
+    Each crossing triangle has one vertex alone on its side, and two edges from there to the other
+    side. With that vertex inside a triangle remains, else a quadrangle.
+
+    Returns
+    -------
+    added : (2 K, 4) crossing points; corners : (K', 3) int32; triangle : (K',) int32
+    """
+    corners = triangles[cut]
+    sides = inside[corners]
+    keep_one = sides.sum(axis=1) == 1
+    alone = np.argmax(sides == keep_one[:, None], axis=1)
+    turned = (alone[:, None] + np.arange(3)) % 3
+    apex, left, right = np.take_along_axis(corners, turned, axis=1).T
+    added = np.concatenate([_crossings(vertices, apex, left), _crossings(vertices, apex, right)])
+    on_left = np.arange(len(cut), dtype=np.int32) + len(vertices)
+    on_right = on_left + len(cut)
+    tip, base = keep_one, ~keep_one
+    new_corners = np.concatenate(
+        [
+            np.stack([apex, on_left, on_right], axis=1)[tip],
+            np.stack([on_left, left, right], axis=1)[base],
+            np.stack([on_left, right, on_right], axis=1)[base],
+        ]
+    )
+    return added, new_corners.astype(np.int32), np.concatenate([cut[tip], cut[base], cut[base]])
+
+
+def _crossings(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(K, 4) where edges meet the near plane, the same whichever way round an edge is given."""
+    low, high = vertices[np.minimum(first, second)], vertices[np.maximum(first, second)]
+    beyond_low, beyond_high = low[:, 2] + low[:, 3], high[:, 2] + high[:, 3]
+    t = (beyond_low / (beyond_low - beyond_high))[:, None]
+    return low + t * (high - low)
+
+
+def _on_screen(vertices: np.ndarray, width: int, height: int) -> _Screen:
+    x, y, z, w = vertices.T
+    usable = w > 0
+    if usable.all():
+        inverse = 1.0 / w
+    else:
+        inverse = np.divide(1.0, w, out=np.zeros(len(w)), where=usable)
+    x = (x * inverse + 1.0) * (0.5 * width)
+    y = (y * inverse + 1.0) * (0.5 * height)
+    column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int32)
+    row = np.clip(np.ceil(y - 0.5), 0, height).astype(np.int32)
+    return _Screen(x, y, z * inverse, column, row)
+
+
+def _visible_in_rows(
+    screen: _Screen, pieces: _Pieces, width: int, low: int, high: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixels, triangles and depths that are seen in the rows from `low` up to before `high`."""
+    screen = screen._replace(row=np.clip(screen.row, low, high))
+    nearest = np.full((high - low) * width, np.nextafter(1.0, 2.0))  # just beyond the far plane
+    owner = np.full((high - low) * width, -1, dtype=np.int32)
+    for start in range(0, len(pieces.triangle), BLOCK):
+        block = slice(start, start + BLOCK)
+        corners = tuple(corner[block] for corner in pieces.corners)
+        for spans in _spans(screen, corners, pieces.triangle[block], width):
+            spans = spans._replace(start=spans.start - np.int32(low * width))
+            for part in _blocks(spans.count):
+                _draw(_Spans(*(values[part] for values in spans)), nearest, owner)
+    pixel = np.flatnonzero(owner >= 0)
+    return (pixel + low * width).astype(np.int32), owner[pixel], nearest[pixel]
+
+
+def _spans(
+    screen: _Screen, corners: tuple[np.ndarray, ...], triangle: np.ndarray, width: int
+) -> Iterator[_Spans]:
+    """The spans of a block of triangles, in the order of the triangles."""
+    a, b, c = corners
+    for centres in (screen.row, screen.column):
+        at = centres[a], centres[b], centres[c]
+        # Corners with the same first pixel centre have none between them.
+        holds = np.flatnonzero((at[0] != at[1]) | (at[1] != at[2]))
+        if len(holds) < len(a):
+            a, b, c, triangle = a[holds], b[holds], c[holds], triangle[holds]
+    gradient = _depth_gradient(screen, a, b, c)
+    a, b, c = _by_height(screen.y, a, b, c)
+    bottom, middle, top = screen.row[a], screen.row[b], screen.row[c]
+    long_edge, lower_edge, upper_edge = (_edge(screen, *ends) for ends in ((a, c), (a, b), (b, c)))
+    edges = long_edge, np.concatenate([lower_edge, upper_edge], axis=1)
+    for part in _blocks(top - bottom):
+        first, last = bottom[part], top[part]
+        piece = np.repeat(np.arange(part.start, part.stop, dtype=np.int32), last - first)
+        row = _counted(first, last - first)
+        piece, row, first, last = _covered(row, piece, middle, edges, width)
+        spans = _with_depth(row, piece, first, last, gradient, width)
+        yield spans._replace(triangle=triangle[piece])
+
+
+def _covered(
+    row: np.ndarray,
+    piece: np.ndarray,
+    middle: np.ndarray,
+    edges: tuple[np.ndarray, np.ndarray],
+    width: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of rows of triangles those that hold a pixel: triangle, row, first column, and end."""
+    long_edge, short_edges = edges
+    line = row + 0.5
+    one = _crossing(long_edge, piece, line)
+    other = _crossing(short_edges, piece + len(middle) * (row >= middle[piece]), line)
+    first = np.ceil(np.minimum(one, other) - 0.5)
+    last = np.ceil(np.maximum(one, other) - 0.5)
+    np.maximum(first, 0, out=first)
+    np.minimum(last, width, out=last)
+    kept = np.flatnonzero(first < last)
+    return piece[kept], row[kept], first[kept], last[kept]
+
+
+def _crossing(edges: np.ndarray, edge: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """x where edges cross horizontal lines."""
+    x, y, slope = edges
+    return x[edge] + (line - y[edge]) * slope[edge]
+
+
+def _with_depth(
+    row: np.ndarray,
+    piece: np.ndarray,
+    first: np.ndarray,
+    last: np.ndarray,
+    gradient: np.ndarray,
+    width: int,
+) -> _Spans:
+    """Spans, their triangles still counted within the block."""
+    along, upward, base, nearest, farthest = gradient.take(piece, axis=1)
+    base += upward * (row + 0.5)
+    # A sliver's gradient may be all rounding: no depth outside the triangle's own comes of it.
+    start = np.minimum(np.maximum(base + along * (first + 0.5), nearest), farthest)
+    end = np.minimum(np.maximum(base + along * (last - 0.5), nearest), farthest)
+    steps = last - first
+    return _Spans(
+        start=row * np.int32(width) + first.astype(np.int32),
+        count=steps.astype(np.int32),
+        depth=start,
+        slope=(end - start) / np.maximum(steps - 1, 1),
+        triangle=piece,
+    )
+
+
+def _draw(spans: _Spans, nearest: np.ndarray, owner: np.ndarray) -> None:
+    """Put the pixels of spans into the depth buffer.
+
+    Of several depths written to one pixel an arbitrary one stays. Whoever is nearer than what
+    stayed writes again, until nobody is: a few rounds, since each leaves only the losers that are
+    in front of the winner.
+    """
+    span = np.repeat(np.arange(len(spans.count), dtype=np.int32), spans.count)
+    pixel = _counted(spans.start, spans.count)
+    depth = spans.depth[span] + spans.slope[span] * (pixel - spans.start[span])
+    closer = np.flatnonzero(depth < nearest[pixel])
+    span, pixel, depth = span[closer], pixel[closer], depth[closer]
+    where, what = pixel, depth
+    while len(where):
+        nearest[where] = what
+        closer = np.flatnonzero(what < nearest[where])
+        where, what = where[closer], what[closer]
+    # Backwards, so that of equal depths the first triangle is written last and stays.
+    won = np.flatnonzero(depth == nearest[pixel])[::-1]
+    owner[pixel[won]] = spans.triangle[span[won]]
+
+
+def _blocks(count: np.ndarray) -> Iterator[slice]:
+    """Slices that hold up to `BLOCK` of what `count` counts, or one entry that has more."""
+    total = np.cumsum(count, dtype=np.int64)
+    start = done = 0
+    while start < len(count):
+        stop = max(int(np.searchsorted(total, done + BLOCK, side="right")), start + 1)
+        yield slice(start, stop)
+        start, done = stop, int(total[stop - 1])
+
+
+def _counted(first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """first[0], first[0] + 1, ... `count[0]` of them, then those of first[1] and so on, int32."""
+    stop = np.cumsum(count)
+    total = int(stop[-1]) if len(stop) else 0
+    shift = (first - (stop - count)).astype(np.int32)
+    return np.arange(total, dtype=np.int32) + np.repeat(shift, count)
+
+
+def _by_height(
+    y: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners from the lowest to the highest."""
+
+    def ordered(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        swap = y[one] > y[other]
+        return np.where(swap, other, one), np.where(swap, one, other)
+
+    a, b = ordered(a, b)
+    b, c = ordered(b, c)
+    a, b = ordered(a, b)
+    return a, b, c
+
+
+def _edge(screen: _Screen, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(3, K) x and y of the lower end, and how far x goes for each unit up."""
+    x, y = screen.x[low], screen.y[low]
+    rise = screen.y[high] - y
+    slope = np.divide(screen.x[high] - x, rise, out=np.zeros_like(rise), where=rise > 0)
+    return np.stack([x, y, slope])
+
+
+def _depth_gradient(screen: _Screen, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """(5, K) depth = along x + upward y + base, and the least and largest depth of a triangle.
+
+    z / w of a plane is affine on screen, under perspective too.
+    """
+    x, y, depth = screen.x[a], screen.y[a], screen.depth[a]
+    xb, yb, xc, yc = screen.x[b] - x, screen.y[b] - y, screen.x[c] - x, screen.y[c] - y
+    depth_b, depth_c = screen.depth[b], screen.depth[c]
+    area = xb * yc - xc * yb
+    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0)
+    along = ((depth_b - depth) * yc - (depth_c - depth) * yb) * inverse
+    upward = ((depth_c - depth) * xb - (depth_b - depth) * xc) * inverse
+    nearest = np.minimum(np.minimum(depth, depth_b), depth_c)
+    farthest = np.maximum(np.maximum(depth, depth_b), depth_c)
+    return np.stack([along, upward, depth - along * x - upward * y, nearest, farthest])
+
+
+def _barycentrics(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    pixel: np.ndarray,
+    triangle: np.ndarray,
+    width: int,
+    height: int,
+) -> np.ndarray:
+    """(P, 3) perspective-correct weights of whole triangles at the centres of pixels.
+
+    Homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
+    Coordinates", 1997), which hold for triangles that reach behind the eye as well. Taken relative
+    to the pixel, so that small triangles lose no digits.
+    """
+    x = (vertices[:, 0] + vertices[:, 3]) * (0.5 * width)
+    y = (vertices[:, 1] + vertices[:, 3]) * (0.5 * height)
+    w = np.ascontiguousarray(vertices[:, 3])
+    weights = np.empty((len(pixel), 3))
+    for start in range(0, len(pixel), BLOCK):
+        part = slice(start, start + BLOCK)
+        row, column = np.divmod(pixel[part], width)
+        column, row = column + 0.5, row + 0.5
+        offsets = []
+        for corner in triangles[triangle[part]].T:
+            depth = w[corner]
+            offsets.append((x[corner] - column * depth, y[corner] - row * depth))
+        (ax, ay), (bx, by), (cx, cy) = offsets
+        one, two, three = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+        sign = np.sign(one + two + three)
+        one, two, three = (np.maximum(edge * sign, 0.0) for edge in (one, two, three))
+        total = one + two + three
+        lost = total == 0
+        total[lost] = 1.0
+        for corner, edge in enumerate((one, two, three)):
+            weights[part, corner] = edge / total
+        weights[part][lost] = 1 / 3
+    return weights

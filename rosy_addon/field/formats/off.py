@@ -1,0 +1,70 @@
+"""Object File Format, .off, with the colours, normals and texture coordinates of its variants left out."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RosyError
+from .polygons import Polygons, starts_of
+from .rows import Rows, read_rows, shown
+
+_KEYWORD = re.compile(rb"(ST)?C?N?OFF$", re.IGNORECASE)
+
+
+def read_off(path: Path) -> Polygons:
+    """Read an .off file: text, counts on the line of the keyword or after it, comments anywhere."""
+    rows = _after_keyword(read_rows(path))
+    if not len(rows):
+        raise RosyError(f"{path}: ends before the counts of vertices and faces")
+    counts = rows[:1].ints("count of vertices, faces or edges")
+    if len(counts) < 2 or counts.min() < 0:
+        raise rows.error(0, "the counts of vertices, faces and edges are wanted")
+    vertex_count, face_count = counts[:2].tolist()
+    body = rows[1:]
+    if len(body) < vertex_count + face_count:
+        raise RosyError(
+            f"{path}: says {vertex_count} vertices and {face_count} faces, but ends after "
+            f"{len(body)} rows of them"
+        )
+    vertices = body[:vertex_count].points("vertex")
+    return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))
+
+
+def _after_keyword(rows: Rows) -> Rows:
+    """The rows from the counts on. The keyword may be missing, and the counts may follow it."""
+    if not len(rows) or rows.words[0][0].isdigit():
+        return rows
+    keyword, *rest = rows.words[0]
+    if not _KEYWORD.match(keyword):
+        raise rows.error(0, f"found {shown(keyword)}, wanted OFF")
+    if rest and rest[0].upper() == b"BINARY":
+        raise rows.error(0, "binary .off files are not read")
+    return Rows(rows.path, [rest, *rows.words[1:]], rows.line) if rest else rows[1:]
+
+
+def _faces(rows: Rows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    sizes = Rows(rows.path, [words[:1] for words in rows.words], rows.line).ints(
+        "corners of a face"
+    )
+    for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
+        if not 3 <= size < len(words):
+            found = f"{size} corners" if size < 3 else f"{len(words) - 1} of its {size} corners"
+            raise rows.error(row, f"face {row} has {found}, at least 3 and all are wanted")
+    corners = Rows(
+        rows.path,
+        [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
+        rows.line,
+    )
+    corner_vertex = corners.ints("vertex of a face")
+    wrong = (corner_vertex < 0) | (corner_vertex >= vertex_count)
+    if wrong.any():
+        corner = int(np.argmax(wrong))
+        raise rows.error(
+            corners.row_of_word(corner),
+            f"a face refers to vertex {corner_vertex[corner]}, there are {vertex_count}, "
+            "counted from 0",
+        )
+    return corner_vertex, starts_of(sizes)

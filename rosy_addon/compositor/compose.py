@@ -101,16 +101,21 @@ def compose_planar(
 def _scaled(look: Look) -> Look:
     """The look with its lengths in the pixels of the supersampled frame."""
     factor = look.supersampling
-    return replace(look, length=look.length * factor, grain=look.grain * factor)
+    return replace(
+        look,
+        length=look.length * factor,
+        grain=look.grain * factor,
+        high_pass=look.high_pass * factor,
+    )
 
 
 def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Layers]:
     """LIC images of the members, blended, with the contrast of one of them times the gain."""
     if noise is None:
         channels = 3 if look.noise == "colour" else 1
-        noise = image_noise(flow.pixel, flow.width, look.grain, look.seed, channels)
+        noise = image_noise(flow.pixel, flow.width, look.grain, look.seed, channels, look.high_pass)
     images = yield from METHODS[look.method](flow, look, noise)
-    gain = look.gain * blend_gain(flow.degree, images.samples, look.step, look.grain)
+    gain = look.gain * blend_gain(flow.degree, images.samples, look)
     tone = scale_contrast(images.blend, gain[:, None])
     return Layers(flow.degree, flow.pixel, images, tone)
 

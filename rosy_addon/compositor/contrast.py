@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .flow import image_count
-from .noise import MEAN, correlation_length
+from .look import Look
+from .noise import MEAN, streak_statistics
 
 
 def even_out(mean: np.ndarray, samples: np.ndarray, full: int) -> np.ndarray:
@@ -26,15 +27,14 @@ def even_out(mean: np.ndarray, samples: np.ndarray, full: int) -> np.ndarray:
     return MEAN + (mean - MEAN) * np.sqrt(samples / np.float32(full))[:, None]
 
 
-def blend_gain(degree: int, samples: np.ndarray, step: float, grain: float) -> np.ndarray:
+def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:
     """The factor that gives the mean of M member images the spread of one: about sqrt(M).
 
     Equation 6 of the paper takes the M values at a pixel for independent. They are not quite: all
-    M streamlines cross there, and share the noise around the crossing. Two straight ones of
-    length l at an angle a, over noise with cells of side g and the correlation length c (see
-    `noise.correlation_length`) are correlated by g^2 / (l c sin a). With the M lines at multiples
-    of pi / M the variance of the mean is (1 + r) / M of that of one, r being the sum below; at
-    N = 7 and the usual length sqrt(M) alone is a tenth too much.
+    M streamlines cross there and share the noise around the crossing, so that the variance of
+    the mean is (1 + r) / M of that of one, r being the sum of the correlations of one of them with
+    the others (`noise.streak_statistics`). At N = 7 and the usual length sqrt(M) alone is a
+    tenth too much. Correlations grow as streamlines get shorter.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def blend_gain(degree: int, samples: np.ndarray, step: float, grain: float) -> n
         N.
     samples : (P,) float32 ndarray
         Of a streamline, mean over the M of a pixel.
-    step, grain : float
-        Pixels.
+    look : Look
+        Its `length`, `step`, `grain` and `high_pass` count.
 
     Returns
     -------
@@ -51,22 +51,16 @@ def blend_gain(degree: int, samples: np.ndarray, step: float, grain: float) -> n
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
     images = image_count(degree)
-    crossings = np.sum(1 / np.sin(np.pi * np.arange(1, images) / images))
-    shared = grain**2 * crossings / (correlation_length(grain) * step * samples)
-    return np.sqrt(images / (1 + np.minimum(shared, images - 1))).astype(np.float32)
+    full = 2 * look.length + 1
+    _, crossing = streak_statistics(full * look.step, look.grain, look.high_pass, images)
+    shared = np.clip(crossing * full / samples, 0, images - 1)
+    return np.sqrt(images / (1 + shared)).astype(np.float32)
 
 
-def expected_deviation(length: int, step: float, grain: float) -> float:
-    """Standard deviation of one member image with whole streamlines, from theory.
-
-    Parameters
-    ----------
-    length : int
-        Steps each way.
-    step, grain : float
-        Pixels.
-    """
-    return 0.5 * float(np.sqrt(correlation_length(grain) / ((2 * length + 1) * step)))
+def expected_deviation(look: Look) -> float:
+    """Standard deviation of one member image with whole streamlines, from theory."""
+    length = (2 * look.length + 1) * look.step
+    return streak_statistics(length, look.grain, look.high_pass, 1)[0]
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:

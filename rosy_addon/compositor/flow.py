@@ -8,7 +8,7 @@ import numpy as np
 
 from ..field.rosy_field import check_degree
 from ..projection.gbuffer import GBuffer
-from ..projection.project import links, screen_axes
+from ..projection.steps import links, screen_axes
 
 #: Offsets of the 3 x 3 neighbours, in the order of the bits of `links`.
 OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -95,9 +95,7 @@ def phase(numbers: np.ndarray) -> np.ndarray:
     return np.divide(numbers, size, out=result, where=size > 0, casting="same_kind")
 
 
-def surface_flow(
-    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
-) -> Flow:
+def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool) -> Flow:
     """The pixels of a G-buffer that show fields of one degree.
 
     Parameters
@@ -205,5 +203,3 @@ def rotations(degree: int) -> np.ndarray:
 def image_count(degree: int) -> int:
     """M, the images that show all N directions: N, or N / 2 where opposite members share one."""
     return degree if degree % 2 else degree // 2
-
-

@@ -42,7 +42,8 @@ class Look:
         none="The first set alone: shows the breaking points",
     )
     view_plane: bool = _switch(
-        True, "Rotate the field into the view plane before decomposing it (off: the paper's Figure 8)"
+        True,
+        "Rotate the field into the view plane before decomposing it (off: the paper's Figure 8)",
     )
     display: str = _choice(
         "smooth",
@@ -52,7 +53,14 @@ class Look:
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
-    grain: float = _number(1.5, 0.5, 64.0, "Size of a cell of the noise, in pixels")
+    grain: float = _number(1.5, 0.5, 256.0, "Size of a cell of the noise, in pixels")
+    high_pass: float = _number(
+        16.0,
+        0.0,
+        1024.0,
+        "Take variations broader than this, in pixels, out of the noise, so that crossing streaks "
+        "do not gather into clouds; 0 keeps them, as the paper does",
+    )
     noise: str = _choice(
         "grey",
         "Colour of the noise, and so of the streaks",
@@ -80,7 +88,10 @@ class Look:
         both="Colour and length",
     )
     magnitude_range: float = _number(
-        0.0, 0.0, 1e9, "Magnitude at the top of the colour map and at full length; 0: the largest seen"
+        0.0,
+        0.0,
+        1e9,
+        "Magnitude at the top of the colour map and at full length; 0: the largest seen",
     )
     colour_map: str = _choice(
         "viridis",
@@ -128,6 +139,8 @@ def _check_setting(name: str, value: Any, default: Any, rules: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, kind):
             raise RosyError(f"setting '{name}' is {value!r}, not a {'whole ' * whole}number")
         if not rules["low"] <= value <= rules["high"]:
-            raise RosyError(f"setting '{name}' is {value}, not from {rules['low']} to {rules['high']}")
+            raise RosyError(
+                f"setting '{name}' is {value}, not from {rules['low']} to {rules['high']}"
+            )
     elif not isinstance(value, bool):
         raise RosyError(f"setting '{name}' is {value!r}, not true or false")

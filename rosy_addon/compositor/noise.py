@@ -12,6 +12,9 @@ MEAN, DEVIATION = 0.5, 0.5
 #: The lattice of noise cells stands askew to the pixels, so that no row of pixels beats with it.
 TURN = 0.5
 
+#: Deviation of the blur that is taken out of the noise, as a part of `Look.high_pass`.
+BLUR = 0.5
+
 #: Points along each side of a pixel at which the cells are averaged.
 TAPS = 3
 
@@ -47,14 +50,14 @@ def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int) -> np.ndarr
 
 
 def image_noise(
-    pixel: np.ndarray, width: int, grain: float, seed: int, channels: int
+    pixel: np.ndarray, width: int, grain: float, seed: int, channels: int, high_pass: float = 0.0
 ) -> np.ndarray:
     """Noise anchored to the picture: square cells of one bit, averaged over each pixel.
 
     Parameters
     ----------
     pixel : (P,) int32 ndarray
-        Flat pixel indices.
+        Flat pixel indices, ascending.
     width : int
         Of the frame.
     grain : float
@@ -62,46 +65,111 @@ def image_noise(
     seed : int
     channels : int
         1 or 3, independent of each other.
+    high_pass : float
+        Pixels; variations broader than about this are taken out. 0 leaves the noise white, and
+        then it is nowhere below 0 or above 1.
 
     Returns
     -------
     (P, channels) float32 ndarray
-        From 0 to 1, with mean `MEAN`.
+        With mean `MEAN`.
     """
-    cos, sin = np.cos(TURN) / grain, np.sin(TURN) / grain
-    column, row = (pixel % width).astype(np.float32), (pixel // width).astype(np.float32)
-    noise = np.zeros((len(pixel), channels), dtype=np.float32)
-    taps = (np.arange(TAPS, dtype=np.float32) + 0.5) / TAPS
-    for ty in taps:
-        for tx in taps:
-            px, py = column + tx, row + ty
-            # Away from the origin, where the truncation of floats would mirror the lattice.
-            cell_x = np.floor(cos * px - sin * py).astype(np.int32)
-            cell_y = np.floor(sin * px + cos * py).astype(np.int32)
-            for channel in range(channels):
-                noise[:, channel] += hash_bits(cell_x, cell_y, seed, channel)
-    noise /= TAPS * TAPS
+    row, column = pixel // width, pixel % width
+    margin = int(np.ceil(3 * BLUR * high_pass))
+    left, right = int(column.min()) - margin, int(column.max()) + margin + 1
+    bottom, top = int(row[0]) - margin, int(row[-1]) + margin + 1
+    noise = np.empty((len(pixel), channels), dtype=np.float32)
+    for channel in range(channels):
+        cells = _cells(left, right, bottom, top, grain, seed, channel)
+        if high_pass:
+            cells += MEAN - _blurred(cells, BLUR * high_pass)
+        noise[:, channel] = cells[row - bottom, column - left]
     return noise
 
 
-@lru_cache(maxsize=64)
-def correlation_length(grain: float) -> float:
-    """Length over which the noise along a straight streamline stays alike, in pixels.
+def _cells(
+    left: int, right: int, bottom: int, top: int, grain: float, seed: int, channel: int
+) -> np.ndarray:
+    """(top - bottom, right - left) float32: the lattice of bits averaged over pixels."""
+    cos, sin = np.cos(TURN) / grain, np.sin(TURN) / grain
+    column = np.arange(left, right, dtype=np.float64)
+    row = np.arange(bottom, top, dtype=np.float64)[:, None]
+    taps = (np.arange(TAPS) + 0.5) / TAPS
+    total = np.zeros((top - bottom, right - left), dtype=np.float32)
+    for y in taps:
+        for x in taps:
+            px, py = column + x, row + y
+            cell_x = np.floor(cos * px - sin * py).astype(np.int32)
+            cell_y = np.floor(sin * px + cos * py).astype(np.int32)
+            total += hash_bits(cell_x, cell_y, seed, channel)
+    return total / np.float32(TAPS * TAPS)
 
-    The integral of the autocovariance of `image_noise` along a line, over the variance of a bit,
-    averaged over the directions of the line. The mean of the noise over a length l of streamline
-    then has the variance ``DEVIATION**2 * correlation_length / l``.
+
+def _blurred(image: np.ndarray, deviation: float) -> np.ndarray:
+    """Nearly a Gaussian blur, of the given deviation in pixels: three means over squares."""
+    # A mean over w pixels has the variance (w^2 - 1) / 12.
+    reach = max(int(np.rint((np.sqrt(4 * deviation**2 + 1) - 1) / 2)), 1)
+    for axis in (0, 1, 0, 1, 0, 1):
+        image = _mean_along(image, reach, axis)
+    return image
+
+
+def _mean_along(image: np.ndarray, reach: int, axis: int) -> np.ndarray:
+    """Mean over 2 * reach + 1 pixels along an axis, the outermost ones repeated."""
+    pads = [(0, 0), (0, 0)]
+    pads[axis] = (reach + 1, reach)
+    total = np.cumsum(np.pad(image, pads, mode="edge"), axis=axis, dtype=np.float64)
+    size, window = image.shape[axis], 2 * reach + 1
+    after = total.take(range(window, window + size), axis=axis)
+    before = total.take(range(size), axis=axis)
+    return ((after - before) / window).astype(np.float32)
+
+
+@lru_cache(maxsize=64)
+def streak_statistics(
+    length: float, grain: float, high_pass: float, images: int
+) -> tuple[float, float]:
+    """How much the noise averaged along straight streamlines varies, in closed form.
+
+    Parameters
+    ----------
+    length : float
+        Of the streamlines, pixels.
+    grain, high_pass : float
+        Of the noise, pixels.
+    images : int
+        M streamlines through a pixel, at multiples of pi / M.
+
+    Returns
+    -------
+    deviation : float
+        Standard deviation of one such mean.
+    crossing : float
+        Sum of the correlations of one of the M means with each of the others: they share the
+        noise around the pixel where they cross.
 
     Notes
     -----
-    By the projection-slice theorem the integral along a line is that of the power spectrum along
-    the perpendicular through the origin; the spectrum of cells of side g averaged over pixels is
-    g^2 sinc^2(g kx') sinc^2(g ky') sinc^2(kx) sinc^2(ky), primes for the turned lattice.
+    With S(k) the power spectrum of the noise, the covariance of the means along two lines of
+    length l through a point, in the directions u and v, is the integral of
+    S(k) sinc(l k.u) sinc(l k.v). S is that of a lattice of bits with cells of side g, averaged
+    over pixels, with a Gaussian taken out:
+    g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
+    It is averaged over all directions here, and the integral taken in polar coordinates.
     """
-    angle = (np.arange(180) + 0.5) * np.pi / 180
-    k = (np.arange(4000) + 0.5) * (8 / min(grain, 1.0) / 4000)
-    kx, ky = np.outer(np.cos(angle), k), np.outer(np.sin(angle), k)
-    cx = np.cos(TURN) * kx - np.sin(TURN) * ky
-    cy = np.sin(TURN) * kx + np.cos(TURN) * ky
-    spectrum = (np.sinc(grain * cx) * np.sinc(grain * cy) * np.sinc(kx) * np.sinc(ky)) ** 2
-    return float(2 * grain**2 * spectrum.mean(axis=0).sum() * (k[1] - k[0]))
+    k, dk = np.linspace(0, 4 / (1 + grain), 700, retstep=True)
+    angle = np.arange(1440) * np.pi / 1440
+    kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
+    cx, cy = np.cos(TURN) * kx - np.sin(TURN) * ky, np.sin(TURN) * kx + np.cos(TURN) * ky
+    amplitude = np.sinc(grain * cx) * np.sinc(grain * cy) * np.sinc(kx) * np.sinc(ky)
+    power = (grain * DEVIATION * amplitude) ** 2
+    kept = 1 - np.exp(-2 * (np.pi * BLUR * high_pass * k) ** 2) if high_pass else 1.0
+    weight = power.mean(axis=1) * kept**2 * k * dk * (2 * np.pi / len(angle))
+    one = np.sinc(length * kx)
+    variance = weight @ np.sum(one * one, axis=1)
+    crossing = 0.0
+    for other in range(1, images):
+        turn = np.pi * other / images
+        along = np.cos(turn) * kx + np.sin(turn) * ky
+        crossing += weight @ np.sum(one * np.sinc(length * along), axis=1)
+    return float(np.sqrt(variance)), float(crossing / variance)

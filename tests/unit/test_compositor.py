@@ -14,7 +14,12 @@ from rosy_addon.compositor.noise import image_noise
 from rosy_addon.errors import RosyError
 
 SIZE = 256
-PLAIN = Look(gain=1.0)
+PLAIN = Look(gain=1.0, high_pass=0.0)  # the paper's noise, and the contrast of one member
+
+
+def plain(**settings):
+    """The plain look with some settings changed."""
+    return PLAIN.with_settings(settings)
 
 
 def tone(angles, degree, look=PLAIN, **more):
@@ -92,7 +97,7 @@ def test_one_direction_resembles_another_library():
 def test_the_decomposition_agrees_with_brute_force(degree):
     angles = pair_angle(*pixel_centres(SIZE), SIZE, degree)
     members = tone(angles, degree)
-    brute = tone(angles, degree, Look(gain=1.0, method="brute"))
+    brute = tone(angles, degree, plain(method="brute"))
     assert correlation(members, brute) > 0.98
 
 
@@ -102,17 +107,18 @@ def test_any_member_stands_for_the_field(degree, method):
     size = 64
     angles = pair_angle(*pixel_centres(size), size, degree)
     turns = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
-    look = Look(gain=1.0, method=method, length=10)
+    look = plain(method=method, length=10)
     # A float that rounds to the other side of a pixel's border moves one sample of twenty-one.
     difference = np.abs(tone(angles, degree, look) - tone(angles + turns, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
 
 
+@pytest.mark.parametrize("high_pass", [0.0, 16.0])
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6, 7])
-def test_contrast_after_correction_is_that_of_one_member(degree):
+def test_contrast_after_correction_is_that_of_one_member(degree, high_pass):
     size = 512
     angles = np.full((size, size), 0.2)
-    layers = compose_planar(angles, degree, PLAIN).layers[0]
+    layers = compose_planar(angles, degree, plain(high_pass=high_pass)).layers[0]
     inner = whole(np.arange(size * size).reshape(size, size)).ravel()
     one = np.mean([member[inner].std() for member in layers.images.members])
     assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
@@ -121,20 +127,21 @@ def test_contrast_after_correction_is_that_of_one_member(degree):
 
 def test_independence_alone_would_overstate_the_contrast_of_seven():
     # Equation 6 takes the images for independent; the correction for their crossing is a tenth.
-    gain = blend_gain(7, np.array([81.0]), 1.0, 1.5)[0]
+    gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
 
+@pytest.mark.parametrize("high_pass", [0.0, 8.0, 24.0])
 @pytest.mark.parametrize("grain", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("length", [20, 80])
-def test_deviation_of_one_member_is_as_theory_says(grain, length):
+def test_deviation_of_one_member_is_as_theory_says(grain, length, high_pass):
     size = 512
+    look = plain(grain=grain, length=length, high_pass=high_pass)
     spread = []
     for angle in (0.1, 0.9, 1.7, 2.6):
-        look = Look(gain=1.0, grain=grain, length=length)
         image = tone(np.full((size, size), angle), 1, look)
         spread.append(whole(image, length + 5).std())
-    assert np.mean(spread) == pytest.approx(expected_deviation(length, 1.0, grain), rel=0.05)
+    assert np.mean(spread) == pytest.approx(expected_deviation(look), rel=0.05)
 
 
 def along_field_autocorrelation(image, angles, chosen, lag):
@@ -155,7 +162,7 @@ def test_breaking_points_do_not_show(degree, weights):
     spread, alike = np.zeros(2), np.zeros(2)
     # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
     for guide in np.arange(guides) * 2 * np.pi / degree / guides:
-        image = tone(angles, degree, Look(gain=1.0, weights=weights, guiding_angle=guide))
+        image = tone(angles, degree, plain(weights=weights, guiding_angle=guide))
         turn = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
         inner = np.zeros_like(x, dtype=bool)
         inner[50:-50, 50:-50] = True
@@ -168,9 +175,9 @@ def test_breaking_points_do_not_show(degree, weights):
 
 def test_one_set_alone_shows_the_breaking_points():
     angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
-    brute = tone(angles, 4, Look(gain=1.0, method="brute"))
+    brute = tone(angles, 4, plain(method="brute"))
     both = tone(angles, 4, Look(gain=1.0))
-    one = tone(angles, 4, Look(gain=1.0, weights="none"))
+    one = tone(angles, 4, plain(weights="none"))
     assert correlation(one, brute) < correlation(both, brute) - 0.01
 
 
@@ -203,7 +210,7 @@ def test_magnitude_drives_the_length_of_streaks():
     size = 256
     angles = np.zeros((size, size))
     rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
-    look = Look(gain=1.0, magnitude="length", magnitude_range=1.0)
+    look = plain(magnitude="length", magnitude_range=1.0)
     image = tone(angles, 1, look, magnitude=rho)
 
     def along(rows, lag):
@@ -216,7 +223,7 @@ def test_magnitude_drives_the_length_of_streaks():
 
 def test_colour_noise_is_three_pictures():
     angles = pair_angle(*pixel_centres(128), 128, 4)
-    picture = compose_planar(angles, 4, Look(gain=1.0, noise="colour"))
+    picture = compose_planar(angles, 4, plain(noise="colour"))
     channels = picture.layers[0].tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
@@ -241,7 +248,9 @@ def orientation_spectrum(image, bins=360):
     ring = (np.hypot(kx, ky) > 0.05) & (np.hypot(kx, ky) < 0.35)
     direction = (np.arctan2(ky, kx) + np.pi / 2) % np.pi
     bin_of = (direction[ring] / np.pi * bins).astype(int) % bins
-    spectrum = np.bincount(bin_of, power[ring], bins) / np.maximum(np.bincount(bin_of, None, bins), 1)
+    spectrum = np.bincount(bin_of, power[ring], bins) / np.maximum(
+        np.bincount(bin_of, None, bins), 1
+    )
     kernel = np.array([1, 2, 3, 2, 1]) / 9
     return np.convolve(np.tile(spectrum, 3), kernel, "same")[bins : 2 * bins]
 
@@ -272,7 +281,14 @@ def test_impossible_degrees_are_refused(degree):
 
 @pytest.mark.parametrize(
     "settings",
-    [{"length": 0}, {"step": 2.0}, {"method": "magic"}, {"gain": "much"}, {"view_plane": 1}, {"x": 1}],
+    [
+        {"length": 0},
+        {"step": 2.0},
+        {"method": "magic"},
+        {"gain": "much"},
+        {"view_plane": 1},
+        {"x": 1},
+    ],
 )
 def test_impossible_settings_are_refused(settings):
     with pytest.raises(RosyError, match="setting"):

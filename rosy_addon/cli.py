@@ -1,0 +1,324 @@
+"""The command line, the same in Blender and in plain Python.
+
+``render``, ``field`` and ``info`` need numpy alone; ``bake`` needs a Blender, or its Python module.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .compositor.compose import compose
+from .compositor.look import Look
+from .compositor.png import write_png
+from .compositor.presets import load_preset, preset_names
+from .errors import RosyError
+from .field.fieldfile import read_field, write_field
+from .field.generate import KINDS, generate
+from .field.meshfile import read_mesh
+from .field.rosy_field import RosyField, check_degree
+from .field.singularities import euler_characteristic, singularities
+from .field.surface import Surface
+from .files import check_writable
+from .projection.camera import Camera, check_size, orbit_camera
+from .projection.gbuffer import Body
+from .projection.project import project
+
+#: Exit statuses: done, something the user can put right, stopped by Ctrl-C.
+DONE, WRONG, STOPPED = 0, 2, 130
+
+#: Looking down a little from the front left, as portraits are taken.
+DEFAULT_VIEW = (-25.0, 20.0)
+DEFAULT_SIZE = (1024, 1024)
+
+#: What points up in files of each kind, as Blender's importers take it.
+UP = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
+
+#: File to world space for each: a quarter turn about x stands what points along y upright.
+UPRIGHT = {
+    "y": np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]),
+    "z": np.eye(4),
+}
+
+
+def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command rosy") -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Without the name of the program; the process's own if not given.
+    prog : str
+        How the user started it, for the help.
+
+    Returns
+    -------
+    int
+        Exit status: 0 only when what was asked for was written.
+    """
+    arguments = sys.argv[1:] if argv is None else argv
+    try:
+        options = _parser(prog).parse_args(_with_signed_values(arguments))
+        options.verb(options)
+    except RosyError as error:
+        print(f"rosy: {error}", file=sys.stderr)
+        return WRONG
+    except KeyboardInterrupt:
+        print("rosy: stopped", file=sys.stderr)
+        return STOPPED
+    except SystemExit as end:  # argparse: 0 after its help, 2 for a wrong command line
+        return DONE if end.code is None else int(end.code)
+    return DONE
+
+
+def render(options: argparse.Namespace) -> None:
+    """Draw the field of a mesh file."""
+    check_writable(options.output)
+    look = _look(options)
+    surface, field = _mesh_and_field(options)
+    matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
+    camera = _camera(options, surface.vertices @ matrix[:3, :3].T, look.supersampling)
+    body = Body(surface, matrix, field)
+    picture = compose(project([body], camera, look.display), look)
+    write_png(options.output, picture.rgba)
+
+
+def field(options: argparse.Namespace) -> None:
+    """Make a field file, or write one in the other format."""
+    check_writable(options.output)
+    surface, made = _mesh_and_field(options)
+    write_field(options.output, made, surface)
+
+
+def info(options: argparse.Namespace) -> None:
+    """Say what a mesh and its field are."""
+    surface, found = _mesh_and_field(options)
+    vertex, index = singularities(surface, found)
+    magnitude = found.magnitude
+    facts = {
+        "degree": found.degree,
+        "vertices": len(surface.vertices),
+        "faces": surface.face_count,
+        "euler_characteristic": euler_characteristic(surface),
+        "magnitude": [float(magnitude.min()), float(magnitude.max())],
+        "undefined_faces": int(np.count_nonzero(magnitude == 0)),
+        "singularities": np.stack([vertex, index], axis=1).tolist(),
+    }
+    print(json.dumps(facts) if options.json else _in_words(facts))
+
+
+def bake(options: argparse.Namespace) -> None:
+    """Draw the fields of a Blender file as its cameras see them."""
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        raise RosyError(
+            "bake needs Blender: start it as `blender -b SCENE.blend --command rosy bake`, "
+            "or install its Python module, bpy"
+        ) from None
+    raise RosyError("bake is not there yet")
+
+
+def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
+    if options.degree is not None:
+        check_degree(options.degree)
+    if options.field is not None and options.generate is not None:
+        raise RosyError(f"give a field file, {options.field}, or --generate, not both")
+    surface = read_mesh(options.mesh)
+    if options.field is not None:
+        undefined = "zero" if options.undefined else "error"
+        return surface, read_field(options.field, surface, options.degree, undefined)
+    degree = 4 if options.degree is None else options.degree
+    kind = options.generate or ("curvature" if degree in (2, 4) else "axis")
+    return surface, generate(surface, kind, degree, axis=options.axis)
+
+
+def _look(options: argparse.Namespace) -> Look:
+    look = load_preset(options.preset).look if options.preset else Look()
+    return look.with_settings(dict(_setting(text) for text in options.set))
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """A name and a value of NAME=VALUE, the value of the kind that the setting has."""
+    name, equals, value = text.partition("=")
+    defaults = {entry.name: entry.default for entry in fields(Look)}
+    if not equals:
+        raise RosyError(f"--set {text}: NAME=VALUE is wanted")
+    if name not in defaults:
+        raise RosyError(f"--set {text}: a look has no setting '{name}', only {', '.join(defaults)}")
+    default = defaults[name]
+    if isinstance(default, str):
+        return name, value
+    if isinstance(default, bool):
+        switch = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+        return name, switch.get(value.lower(), value)
+    try:
+        return name, type(default)(value)
+    except ValueError:
+        wanted = "a whole number" if isinstance(default, int) else "a number"
+        raise RosyError(f"--set {text}: {wanted} is wanted") from None
+
+
+def _camera(options: argparse.Namespace, points: np.ndarray, supersampling: int) -> Camera:
+    width, height = check_size(*options.size)
+    return orbit_camera(
+        points,
+        *options.view,
+        width * supersampling,
+        height * supersampling,
+        perspective=not options.ortho,
+    )
+
+
+def _in_words(facts: dict[str, Any]) -> str:
+    places = [
+        f"  vertex {vertex}: {index:+d}/{facts['degree']}"
+        for vertex, index in facts["singularities"]
+    ]
+    low, high = facts["magnitude"]
+    return "\n".join(
+        [
+            f"degree {facts['degree']}",
+            f"{facts['faces']} faces, {facts['vertices']} vertices, "
+            f"Euler characteristic {facts['euler_characteristic']}",
+            f"magnitude {low:.4g} to {high:.4g}, undefined on {facts['undefined_faces']} faces",
+            f"{len(places)} singularities",
+            *places,
+        ]
+    )
+
+
+def _parser(prog: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
+    )
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    for add in (_add_bake, _add_render, _add_field, _add_info):
+        add(verbs)
+    return parser
+
+
+def _add_bake(verbs: Any) -> None:
+    verb = _verb(verbs, "bake", bake)
+    verb.add_argument("scene", nargs="?", metavar="SCENE.blend", help="the open file if not given")
+    verb.add_argument(
+        "--object", nargs="+", metavar="NAME", help="all that have a field if not given"
+    )
+    cameras = verb.add_mutually_exclusive_group()
+    cameras.add_argument("--camera", metavar="NAME", help="the scene's own if not given")
+    cameras.add_argument("--all-cameras", action="store_true")
+    _add_look(verb)
+    verb.add_argument("--size", type=_size, metavar="WxH", help="the scene's own if not given")
+    verb.add_argument(
+        "--out", type=Path, metavar="DIR", help="write the pictures there as .png files"
+    )
+    verb.add_argument("--save", action="store_true", help="save the Blender file")
+
+
+def _add_render(verbs: Any) -> None:
+    verb = _verb(verbs, "render", render)
+    _add_mesh(verb)
+    verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
+    verb.add_argument(
+        "--view",
+        type=_numbers(2, "AZ,EL"),
+        default=DEFAULT_VIEW,
+        metavar="AZ,EL",
+        help="degrees: 0,0 looks from the front, 90,0 from the right, 0,90 from above",
+    )
+    verb.add_argument(
+        "--up",
+        choices=list(UPRIGHT),
+        help="the file's upward axis; y for .obj and .off if not given",
+    )
+    verb.add_argument("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH")
+    verb.add_argument("--ortho", action="store_true", help="without perspective")
+    _add_look(verb)
+
+
+def _add_field(verbs: Any) -> None:
+    verb = _verb(verbs, "field", field)
+    _add_mesh(verb)
+    verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.rosy|OUT.rawfield")
+
+
+def _add_info(verbs: Any) -> None:
+    verb = _verb(verbs, "info", info)
+    _add_mesh(verb)
+    verb.add_argument("--json", action="store_true", help="as one object")
+
+
+def _verb(verbs: Any, name: str, function: Callable) -> argparse.ArgumentParser:
+    text = function.__doc__.splitlines()[0]
+    verb = verbs.add_parser(name, help=text, description=text)
+    verb.set_defaults(verb=function)
+    return verb
+
+
+def _add_mesh(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("mesh", type=Path, metavar="MESH", help=".obj, .off, .ply or .stl")
+    verb.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=".rosy or .rawfield")
+    verb.add_argument(
+        "--degree", type=int, metavar="N", help="1 to 12; 4, or the file's, if not given"
+    )
+    verb.add_argument(
+        "--generate",
+        choices=list(KINDS),
+        help="make a field instead of reading one; curvature for degree 2 and 4, else axis, if not given",
+    )
+    verb.add_argument("--axis", type=_numbers(3, "X,Y,Z"), default=(0.0, 0.0, 1.0), metavar="X,Y,Z")
+    verb.add_argument(
+        "--undefined", action="store_true", help="take NaN and infinite vectors for undefined"
+    )
+
+
+def _add_look(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--preset", metavar="NAME", help=f"{', '.join(preset_names())}, or a .json file of your own"
+    )
+    verb.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"one setting of the look, after the preset: {', '.join(f.name for f in fields(Look))}",
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def _numbers(count: int, form: str) -> Callable[[str], tuple[float, ...]]:
+    def convert(text: str) -> tuple[float, ...]:
+        try:
+            values = tuple(map(float, text.split(",")))
+        except ValueError:
+            values = ()
+        if len(values) != count:
+            raise argparse.ArgumentTypeError(f"{text!r} is not {form}")
+        return values
+
+    return convert
+
+
+def _with_signed_values(arguments: Sequence[str]) -> list[str]:
+    """`--view -30,20` as `--view=-30,20`: argparse takes the first for an option without a value."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] in ("--view", "--axis") and re.match(r"-[\d.]", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined

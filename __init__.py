@@ -1,0 +1,30 @@
+"""RoSy as Blender sees it: what to register when the extension is switched on, and nothing else."""
+
+_cli = None
+
+
+def register() -> None:
+    """Add RoSy's classes, properties and command to Blender."""
+    global _cli
+    import bpy
+
+    from . import operators
+    from .rosy_addon import cli, ui
+
+    ui.register()
+    operators.register()
+    _cli = bpy.utils.register_cli_command("rosy", cli.main)
+
+
+def unregister() -> None:
+    """Take away everything `register` added."""
+    global _cli
+    import bpy
+
+    from . import operators
+    from .rosy_addon import ui
+
+    bpy.utils.unregister_cli_command(_cli)
+    _cli = None
+    operators.unregister()
+    ui.unregister()

@@ -1,0 +1,24 @@
+"""What the user can do, one verb a file."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import bake, field_export, field_generate, field_import, preset_apply, remove, ticking
+
+MODULES = (field_generate, field_import, field_export, bake, remove, preset_apply)
+
+
+def register() -> None:
+    """Add the operators to Blender."""
+    for module in MODULES:
+        for cls in module.CLASSES:
+            bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them away again, ending work under way."""
+    ticking.stop_running()
+    for module in reversed(MODULES):
+        for cls in reversed(module.CLASSES):
+            bpy.utils.unregister_class(cls)

@@ -1,0 +1,65 @@
+"""Write the field of the active mesh to a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.field.fieldfile import write_field
+from ..rosy_addon.scene.attributes import has_field, read_mesh_field
+from ..rosy_addon.scene.meshes import mesh_surface
+from .meshes import can_change_fields, selected_meshes
+
+
+class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
+    """Write the field of the active mesh to a file, one row a face"""
+
+    bl_idname = "rosy.field_export"
+    bl_label = "Export Field"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".rosy"
+    filter_glob: bpy.props.StringProperty(default="*.rosy;*.rawfield", options={"HIDDEN"})
+    file_format: bpy.props.EnumProperty(
+        name="Format",
+        items=[
+            (".rosy", "RoSy", "One member vector a face"),
+            (".rawfield", "Raw Field", "All member vectors of a face in a row"),
+        ],
+        default=".rosy",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not can_change_fields(cls, context):
+            return False
+        if not has_field(selected_meshes(context)[0]):
+            cls.poll_message_set("The active mesh has no field: make or import one first")
+            return False
+        return True
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Keep the name's ending in step with the format, in the file browser."""
+        name = str(Path(self.filepath).with_suffix(self.file_format))
+        changed = name != self.filepath
+        self.filepath = name
+        return changed
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        thing = selected_meshes(context)[0]
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            surface = mesh_surface(thing.data)
+            field = read_mesh_field(thing.data, surface=surface)
+            write_field(path, field, surface)
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Wrote {path}")
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_field_export,)

@@ -1,0 +1,76 @@
+"""Read a field file into the active mesh."""
+
+from __future__ import annotations
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.field.fieldfile import read_field
+from ..rosy_addon.scene.attributes import write_mesh_field
+from ..rosy_addon.scene.meshes import mesh_surface
+from .meshes import can_change_fields, selected_meshes
+
+
+class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
+    """Read a field of the active mesh from a file, one row a face (or a vertex)"""
+
+    bl_idname = "rosy.field_import"
+    bl_label = "Import Field"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".rosy"
+    filter_glob: bpy.props.StringProperty(default="*.rosy;*.rawfield", options={"HIDDEN"})
+    undefined: bpy.props.EnumProperty(
+        name="Not Finite",
+        description="What to do about vectors with NaN or infinite components",
+        items=[
+            ("error", "Refuse", "Say where the first one is and read nothing"),
+            ("zero", "Leave Out", "Take the field for undefined on those faces"),
+        ],
+        default="error",
+    )
+    attribute: bpy.props.StringProperty(
+        name="Attribute",
+        description="Name of the mesh attribute that holds the field; one that is there is replaced",
+        default="rosy",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return can_change_fields(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        # A file dropped on the view comes with its path.
+        return self.invoke_popup(context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        mesh = selected_meshes(context)[0].data
+        try:
+            path = bpy.path.abspath(self.filepath)
+            field = read_field(path, mesh_surface(mesh), undefined=self.undefined)
+            write_mesh_field(mesh, field, self.attribute)
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report(
+            {"INFO"},
+            f"Read a field of degree {field.degree} on {len(field.vectors):,} faces of '{mesh.name}'",
+        )
+        return {"FINISHED"}
+
+
+class ROSY_FH_field(bpy.types.FileHandler):
+    """Field files can be dropped on the 3D view."""
+
+    bl_idname = "ROSY_FH_field"
+    bl_label = "RoSy field"
+    bl_import_operator = "rosy.field_import"
+    bl_file_extensions = ".rosy;.rawfield"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+CLASSES = (ROSY_OT_field_import, ROSY_FH_field)

@@ -1,0 +1,37 @@
+"""Which meshes an operator is about, and why it cannot be used where there is none."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon.ui import status
+
+
+def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected mesh objects, the active one first; the active one alone if none is selected."""
+    active = context.view_layer.objects.active
+    selected = [thing for thing in context.selected_objects if thing.type == "MESH"]
+    if not selected and active is not None and active.type == "MESH":
+        return [active]
+    return sorted(selected, key=lambda thing: thing != active)
+
+
+def can_change_fields(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether there is a mesh to give a field to; says why if not."""
+    if not is_idle(operator):
+        return False
+    if not selected_meshes(context):
+        operator.poll_message_set("Select a mesh object first")
+        return False
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Leave this mode first: press Tab or choose Object Mode")
+        return False
+    return True
+
+
+def is_idle(operator: type[bpy.types.Operator]) -> bool:
+    """Whether no work is under way; says so if there is."""
+    if status.now is not None:
+        operator.poll_message_set("RoSy is at work: wait, or press ESC to cancel")
+        return False
+    return True

@@ -1,0 +1,37 @@
+"""Take away what was baked."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.scene.apply import bakes, remove
+from .meshes import is_idle
+
+
+class ROSY_OT_remove(bpy.types.Operator):
+    """Take away the pictures and all that RoSy put on objects to show them; fields stay"""
+
+    bl_idname = "rosy.remove"
+    bl_label = "Remove Pictures"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not is_idle(cls):
+            return False
+        if not bakes(context.scene):
+            cls.poll_message_set("Nothing is baked in this scene")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            remove(context.scene)
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_remove,)

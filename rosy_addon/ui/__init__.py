@@ -1,0 +1,25 @@
+"""What the user sees: properties, the sidebar, preferences."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import panels, preferences, properties
+
+MODULES = (preferences, panels)
+
+
+def register() -> None:
+    """Add properties, panels and preferences to Blender."""
+    properties.register()
+    for module in MODULES:
+        for cls in module.CLASSES:
+            bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them away again."""
+    for module in reversed(MODULES):
+        for cls in reversed(module.CLASSES):
+            bpy.utils.unregister_class(cls)
+    properties.unregister()

@@ -1,0 +1,210 @@
+"""The tab in the sidebar of the 3D view: from no field, to a field, to its picture."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import bpy
+
+from ..compositor.look import Look
+from ..compositor.presets import load_preset, preset_names
+from ..scene.apply import bakes
+from ..scene.attributes import has_field
+from ..scene.bodies import rosy_objects
+from . import status
+
+#: Settings of a look, in the groups in which a user looks for them.
+GROUPS = {
+    "Streaks": ("length", "step", "grain", "gain", "foreshorten", "cross_creases", "crease_angle"),
+    "Colour": ("noise", "magnitude", "magnitude_range", "colour_map"),
+    "Light": ("shading", "light"),
+    "Quality": ("supersampling", "display", "method", "seed"),
+}
+
+#: The rest, which few will need: also whatever a look is given later and no group has taken up.
+OTHERS = tuple(
+    entry.name
+    for entry in fields(Look)
+    if not any(entry.name in names for names in GROUPS.values())
+)
+
+#: View transforms that show a picture's values as they were drawn.
+FAITHFUL_TRANSFORMS = {"Standard", "Raw"}
+
+
+class _Sidebar:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "RoSy"
+
+
+class VIEW3D_PT_rosy(_Sidebar, bpy.types.Panel):
+    """The way in: make a field, bake it, look at it."""
+
+    bl_label = "RoSy"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        drawn = rosy_objects(context.view_layer)
+        _draw_field(layout, context)
+        layout.separator()
+        _draw_picture(layout, context, drawn)
+
+
+def _draw_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    thing = context.view_layer.objects.active
+    layout.label(text="1.  Field", icon="FORCE_VORTEX")
+    if thing is None or thing.type != "MESH":
+        layout.label(text="Select a mesh to draw on")
+    elif has_field(thing):
+        _draw_field_there(layout, thing)
+    else:
+        _draw_field_missing(layout, context, thing)
+
+
+def _draw_field_there(layout: bpy.types.UILayout, thing: bpy.types.Object) -> None:
+    mesh = thing.data
+    box = layout.box().column(align=True)
+    box.label(text=thing.name, icon="OUTLINER_OB_MESH")
+    box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
+    box.label(text=f"Attribute '{mesh.rosy.attribute}'")
+    row = layout.row(align=True)
+    row.operator_context = "INVOKE_DEFAULT"
+    row.operator("rosy.field_import", text="Import", icon="IMPORT")
+    row.operator("rosy.field_export", text="Export", icon="EXPORT")
+
+
+def _draw_field_missing(
+    layout: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object
+) -> None:
+    layout.label(text=f"{thing.name} has no field yet")
+    _draw_generator(layout, context)
+    layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
+
+
+def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The settings that the next run of the generator will have, and its button."""
+    settings = context.window_manager.operator_properties_last("rosy.field_generate")
+    column = layout.column()
+    column.prop(settings, "kind")
+    column.prop(settings, "degree")
+    if settings.kind == "axis":
+        column.prop(settings, "axis")
+    row = layout.row()
+    row.scale_y = 1.5
+    row.operator("rosy.field_generate", icon="FORCE_VORTEX")
+    if settings.kind == "curvature" and settings.degree not in (2, 4):
+        row.enabled = False
+        layout.label(text="Curvature: degree 2 or 4 only", icon="ERROR")
+
+
+def _draw_picture(
+    layout: bpy.types.UILayout, context: bpy.types.Context, drawn: list[bpy.types.Object]
+) -> None:
+    """What is baked, and the button that bakes."""
+    layout.label(text="2.  Picture", icon="RENDER_STILL")
+    settings = context.scene.rosy
+    made = bakes(context.scene)
+    for bake in made:
+        _draw_bake(layout, bake)
+    if not made and len(drawn) > 1:
+        layout.label(text=f"{len(drawn)} objects with a field are drawn")
+    if status.now is not None:
+        _draw_progress(layout)
+        return
+    layout.prop(settings, "camera")
+    row = layout.row()
+    row.scale_y = 1.5
+    button = row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
+    button.camera = settings.camera
+    if made:
+        layout.operator("rosy.remove", text="Remove Pictures", icon="TRASH")
+        _draw_how_to_see(layout, context)
+    if drawn:
+        _draw_view_transform(layout, context.scene)
+
+
+def _draw_bake(layout: bpy.types.UILayout, bake) -> None:
+    box = layout.box().column(align=True)
+    box.label(text=f"Drawn from {bake.camera}", icon="CAMERA_DATA")
+    box.label(text=f"{bake.width} x {bake.height} pixels")
+    if bake.stale:
+        box.label(text=f"Out of date: {bake.stale}", icon="ERROR")
+    else:
+        box.label(text="Up to date", icon="CHECKMARK")
+
+
+def _draw_progress(layout: bpy.types.UILayout) -> None:
+    layout.progress(factor=status.now.fraction, text=status.now.label)
+    layout.label(text="Press ESC to cancel")
+
+
+def _draw_how_to_see(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """A way to the picture from a view that does not show materials."""
+    if context.space_data.shading.type in {"WIREFRAME", "SOLID"}:
+        column = layout.column(align=True)
+        column.label(text="This view shows no materials", icon="INFO")
+        button = column.operator("wm.context_set_enum", text="Show the Picture Here")
+        button.data_path, button.value = "space_data.shading.type", "MATERIAL"
+
+
+def _draw_view_transform(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Say so where colour management would change the picture's tones."""
+    transform = scene.view_settings.view_transform
+    if transform not in FAITHFUL_TRANSFORMS:
+        column = layout.column(align=True)
+        column.label(text=f"{transform} greys the lines", icon="ERROR")
+        button = column.operator("wm.context_set_enum", text="View Transform: Standard")
+        button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
+
+
+class VIEW3D_PT_rosy_look(_Sidebar, bpy.types.Panel):
+    """How fields are drawn."""
+
+    bl_label = "Look"
+    bl_parent_id = "VIEW3D_PT_rosy"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.menu("VIEW3D_MT_rosy_presets", icon="PRESET")
+
+
+class VIEW3D_MT_rosy_presets(bpy.types.Menu):
+    """Looks that come with RoSy."""
+
+    bl_label = "Presets"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for name in preset_names():
+            self.layout.operator("rosy.preset_apply", text=load_preset(name).name).preset = name
+
+
+def _group_panel(group: str) -> type[bpy.types.Panel]:
+    """A panel inside Look for one of `GROUPS`."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in GROUPS[group]:
+            column.prop(context.scene.rosy.look, name)
+
+    name = f"VIEW3D_PT_rosy_look_{group.lower()}"
+    members = {
+        "__doc__": f"{group} of a look.",
+        "bl_label": group,
+        "bl_parent_id": "VIEW3D_PT_rosy_look",
+        "draw": draw,
+    }
+    return type(name, (_Sidebar, bpy.types.Panel), members)
+
+
+CLASSES = (
+    VIEW3D_MT_rosy_presets,
+    VIEW3D_PT_rosy,
+    VIEW3D_PT_rosy_look,
+    *map(_group_panel, GROUPS),
+)

@@ -1,0 +1,91 @@
+"""Tests of the built extension, inside a full Blender. Elsewhere nothing here is collected."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+
+import pytest
+
+#: Set by run.py, which has installed the zip into an otherwise empty Blender.
+if "ROSY_BLENDER_LANE" not in os.environ or importlib.util.find_spec("bpy") is None:
+    collect_ignore_glob = ["test_*.py"]
+else:
+    import bpy
+
+EXTENSION = "bl_ext.user_default.rosy"
+
+
+@pytest.fixture
+def scene():
+    """An empty scene with a camera that looks at the origin from (0, -6, 2)."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 160, 120
+    scene.render.resolution_percentage = 100
+    scene.view_settings.view_transform = "Standard"
+    add_camera("Camera", (0.0, -6.0, 2.0), (math.radians(71.57), 0.0, 0.0))
+    scene.camera = bpy.data.objects["Camera"]
+    return scene
+
+
+def add_camera(name, location, rotation):
+    """A camera object in the current scene."""
+    camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+    camera.location, camera.rotation_euler = location, rotation
+    bpy.context.scene.collection.objects.link(camera)
+    return camera
+
+
+@pytest.fixture
+def suzanne(scene):
+    """Suzanne with a subdivision modifier, active and selected."""
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.context.object
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 1
+    return monkey
+
+
+@pytest.fixture
+def with_field(suzanne):
+    """Suzanne with a field of degree 4."""
+    assert bpy.ops.rosy.field_generate(kind="curvature", degree=4) == {"FINISHED"}
+    return suzanne
+
+
+@pytest.fixture
+def baked(with_field):
+    """Suzanne with a field, baked from the scene's camera."""
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
+    return with_field
+
+
+def contents():
+    """Names of everything in the file, kind by kind, and what hangs on each object."""
+    names = {}
+    for prop in bpy.data.bl_rna.properties:
+        if prop.type == "COLLECTION":
+            names[prop.identifier] = sorted(
+                thing.name for thing in getattr(bpy.data, prop.identifier)
+            )
+    for thing in bpy.data.objects:
+        names["object " + thing.name] = [
+            [modifier.name for modifier in thing.modifiers],
+            [slot.name for slot in thing.material_slots],
+            sorted(thing.keys()),
+        ]
+    for mesh in bpy.data.meshes:
+        names["mesh " + mesh.name] = [
+            sorted(attribute.name for attribute in mesh.attributes),
+            [material and material.name for material in mesh.materials],
+        ]
+    return names
+
+
+def error_of(operator, *arguments, **settings):
+    """The text of the error that an operator reports."""
+    with pytest.raises(RuntimeError) as caught:
+        operator(*arguments, **settings)
+    return str(caught.value).strip()

@@ -1,0 +1,129 @@
+"""The main job in Blender: bake, render what was baked, undo, remove."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from conftest import add_camera, contents, error_of
+
+
+def baked_images():
+    return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+
+
+def pixels(image):
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)
+
+
+def render(scene, engine, folder):
+    """What the scene looks like, (H, W, 4) as on screen."""
+    scene.render.engine = engine
+    if engine == "CYCLES":
+        scene.cycles.samples, scene.cycles.use_denoising = 16, False
+        scene.cycles.device = "CPU"
+    scene.render.film_transparent = True
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.color_mode = "RGBA"
+    scene.render.filepath = str(folder / f"{engine}.png")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    return pixels(image)
+
+
+def test_bake_makes_a_picture(baked, scene):
+    (image,) = baked_images()
+    assert tuple(image.size) == (160, 120)
+    picture = pixels(image)
+    covered = picture[..., 3] > 0.5
+    assert 0.05 < covered.mean() < 0.9
+    assert picture[covered][:, 0].std() > 0.1
+
+
+def test_cycles_shows_the_picture(with_field, scene, tmp_path):
+    scene.rosy.look.shading = 0.0
+    bpy.ops.rosy.bake()
+    (image,) = baked_images()
+    picture = pixels(image)
+    seen = render(scene, "CYCLES", tmp_path)
+    inside = (picture[..., 3] > 0.99) & (seen[..., 3] > 0.99)
+    assert inside.mean() > 0.05
+    difference = np.abs(seen - picture)[..., :3][inside]
+    assert difference.mean() < 0.02
+
+
+@pytest.mark.parametrize("what", ["another picture", "no picture"])
+def test_undo(with_field, scene, what):
+    """Undo brings back what was there before the bake, pixels included; redo the bake."""
+    if what == "another picture":
+        scene.rosy.look.seed = 1
+        bpy.ops.rosy.bake()
+    before = contents()
+    first = [pixels(image) for image in baked_images()]
+    bpy.ops.ed.undo_push(message="before")
+    bpy.context.scene.rosy.look.seed = 2
+    bpy.ops.rosy.bake()
+    after = contents()
+    second = [pixels(image) for image in baked_images()]
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert contents() == before
+    assert len(baked_images()) == len(first)
+    for image, picture in zip(baked_images(), first, strict=True):
+        np.testing.assert_array_equal(pixels(image), picture)
+    bpy.ops.ed.redo()
+    assert contents() == after
+    for image, picture in zip(baked_images(), second, strict=True):
+        np.testing.assert_array_equal(pixels(image), picture)
+
+
+def test_remove_takes_everything_away(with_field):
+    before = contents()
+    bpy.ops.rosy.bake()
+    assert contents() != before
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert contents() == before
+
+
+def test_all_cameras(with_field, scene):
+    add_camera("Behind", (0.0, 6.0, 0.0), (np.pi / 2, 0.0, np.pi))
+    assert bpy.ops.rosy.bake(camera="ALL") == {"FINISHED"}
+    assert len(baked_images()) == 2
+
+
+def test_bake_refuses(with_field, scene):
+    before = contents()
+    camera = scene.camera
+    scene.camera = None
+    assert "camera" in error_of(bpy.ops.rosy.bake)
+    scene.camera = camera
+    camera.data.type = "PANO"
+    assert "Camera" in error_of(bpy.ops.rosy.bake)
+    camera.data.type = "PERSP"
+    camera.location.y = 1e6
+    assert error_of(bpy.ops.rosy.bake)
+    assert contents() == before
+
+
+def test_current_view_needs_a_view(with_field):
+    assert "view" in error_of(bpy.ops.rosy.bake, camera="VIEW")
+
+
+def test_edit_mode_and_shared_mesh(with_field, scene):
+    other = bpy.data.objects.new("Other", with_field.data)
+    other.location.x = 2.5
+    scene.collection.objects.link(other)
+    assert bpy.ops.rosy.bake() == {"FINISHED"}
+    assert len(baked_images()) == 1
+    bpy.ops.rosy.remove()
+    bpy.ops.object.mode_set(mode="EDIT")
+    before = contents()
+    try:
+        done = bpy.ops.rosy.bake()
+    except RuntimeError:
+        assert contents() == before
+    else:
+        assert done == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -1,0 +1,68 @@
+"""``blender -b SCENE --command rosy ...``: what it writes and its exit status."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+
+import bpy
+import pytest
+
+
+def command(*words, scene=None):
+    """Run a Blender of its own with the command; its exit status and everything it said."""
+    opened = [str(scene)] if scene else []
+    done = subprocess.run(
+        [bpy.app.binary_path, "-b", *opened, "--command", "rosy", *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.fixture
+def saved(with_field, tmp_path):
+    path = tmp_path / "suzanne.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_bake_and_save(saved, tmp_path):
+    status, said = command(
+        "bake", "--size", "96x64", "--out", tmp_path / "out", "--save", scene=saved
+    )
+    assert status == 0, said
+    assert list((tmp_path / "out").glob("*.png"))
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    assert tuple(image.size) == (96, 64)
+
+
+def test_bad_input_is_one_line_and_status_2(saved):
+    status, said = command("bake", "--object", "Nobody", scene=saved)
+    assert status == 2
+    assert "Nobody" in said
+    assert "Traceback" not in said
+
+
+def test_an_unknown_verb_is_refused():
+    status, said = command("paint")
+    assert status == 2
+    assert "paint" in said and "Traceback" not in said
+
+
+def test_render_and_info(with_field, tmp_path):
+    mesh = tmp_path / "suzanne.obj"
+    bpy.ops.wm.obj_export(filepath=str(mesh), export_materials=False)
+    picture = tmp_path / "suzanne.png"
+    status, said = command(
+        "render", mesh, "-o", picture, "--degree", 4, "--generate", "curvature", "--size", "64x64"
+    )
+    assert status == 0, said
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    status, said = command("info", mesh, "--degree", 4, "--generate", "curvature", "--json")
+    assert status == 0, said
+    found = next(json.loads(line) for line in said.splitlines() if line.startswith("{"))
+    assert found["degree"] == 4

@@ -1,0 +1,306 @@
+"""RoSy in a window: the panel in its three states, a bake that is watched, and bakes that are broken off.
+
+Run by run.py as ``blender --enable-event-simulate -P window.py``. Every step is a generator that
+yields while Blender is to go on with its own affairs; a timer resumes it. What each step found is
+written to the file ROSY_RESULTS names, as {step: "" or what went wrong}.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+from conftest import add_camera, contents  # noqa: E402
+
+SHOTS = Path(os.environ["ROSY_SHOTS"])
+RESULTS = Path(os.environ["ROSY_RESULTS"])
+PATIENCE = 40.0
+
+bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.view.show_statusbar_stats = False
+
+
+def main():
+    bpy.app.timers.register(resume(all_steps()), first_interval=1.0, persistent=True)
+
+
+def resume(work):
+    def tick():
+        try:
+            pause = next(work)
+        except StopIteration:
+            failed = any(json.loads(RESULTS.read_text()).values())
+            sys.stdout.flush()
+            os._exit(1 if failed else 0)
+        return 0.05 if pause is None else pause
+
+    return tick
+
+
+def all_steps():
+    results = {}
+    for step in (
+        panel_without_field,
+        panel_with_field,
+        bake_with_progress,
+        panel_with_picture,
+        undo_after_bake,
+        stop_with_escape,
+        stop_when_an_object_is_deleted,
+        stop_on_undo,
+        stop_on_a_change_of_scene,
+        stop_when_switched_off,
+        stop_when_a_file_is_opened,
+        bake_the_current_view,
+    ):
+        name = step.__name__.replace("_", " ")
+        try:
+            yield from step()
+            results[name] = ""
+        except Exception:
+            results[name] = traceback.format_exc()
+        RESULTS.write_text(json.dumps(results))
+    results["the end"] = ""
+    RESULTS.write_text(json.dumps(results))
+
+
+# What the steps are made of
+
+
+def view():
+    """The window, the 3D view in it and its main region and sidebar."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    regions = {region.type: region for region in area.regions}
+    return window, area, regions["WINDOW"], regions["UI"]
+
+
+def in_view():
+    """A context in which operators find the 3D view."""
+    window, area, region, _ = view()
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def fresh_scene(size=(320, 240)):
+    """Suzanne before a camera, the sidebar open at RoSy's tab."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    with in_view():
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 2
+        bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.3, 0.2))
+        camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
+        bpy.context.scene.camera = camera
+        bpy.ops.object.select_all(action="DESELECT")
+        monkey = bpy.data.objects["Suzanne"]
+        monkey.select_set(True)
+        bpy.context.view_layer.objects.active = monkey
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = size
+    area = view()[1]
+    area.spaces.active.show_region_ui = True
+    area.spaces.active.shading.type = "SOLID"
+    yield 0.5
+    view()[3].active_panel_category = "RoSy"
+    area.tag_redraw()
+    yield 0.5
+    view()[3].active_panel_category = "RoSy"
+    area.tag_redraw()
+    yield 0.3
+    with in_view():
+        bpy.ops.ed.undo_push(message="fresh scene")
+
+
+def make_field():
+    with in_view():
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
+
+
+def status():
+    return sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.status"]
+
+
+def start_bake(**settings):
+    """Start a bake as its button does, and wait until it is on its way."""
+    with in_view():
+        assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+    yield from until(lambda: status().now is None or status().now.fraction > 0.1)
+    assert status().now is not None, "the bake was over before it could be broken off"
+
+
+def until(condition):
+    late = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > late:
+            raise AssertionError("waited in vain")
+        yield
+
+
+def all_is_quiet():
+    """No bake runs, and none of what one needs is left."""
+    assert status().now is None
+    for name in dir(bpy.app.handlers):
+        handlers = getattr(bpy.app.handlers, name)
+        for handler in handlers if isinstance(handlers, list) else ():
+            assert "rosy" not in getattr(handler, "__module__", ""), name
+
+
+def broken_off(interrupt, *, unchanged=True):
+    """Start a long bake, do `interrupt`, and see that it ends and leaves the scene as it was."""
+    yield from fresh_scene(size=(1600, 1200))
+    make_field()
+    before = contents()
+    yield from start_bake()
+    interrupt()
+    yield from until(lambda: status().now is None)
+    yield 0.5
+    all_is_quiet()
+    if unchanged:
+        assert contents() == before
+
+
+def photograph(name):
+    """Save the sidebar, down to where its panels end, as NAME.png."""
+    yield 0.5
+    window, _, _, sidebar = view()
+    # Blender's own screenshot is black on software OpenGL; the X server knows better.
+    whole = SHOTS / f"window-{name}.png"
+    subprocess.run(["import", "-window", "root", str(whole)], check=True, timeout=20)
+    left, top = sidebar.x, window.height - sidebar.y - sidebar.height
+    part = f"{sidebar.width}x{sidebar.height}+{left}+{top}"
+    path = SHOTS / f"{name}.png"
+    subprocess.run(
+        ["convert", str(whole), "-crop", part, "+repage", str(path)], check=True, timeout=20
+    )
+    assert path.stat().st_size > 1000
+
+
+# The steps
+
+
+def panel_without_field():
+    yield from fresh_scene()
+    yield from photograph("panel-1-no-field")
+
+
+def panel_with_field():
+    yield from fresh_scene(size=(640, 480))
+    make_field()
+    yield from photograph("panel-2-field")
+
+
+def bake_with_progress():
+    yield from fresh_scene(size=(640, 480))
+    make_field()
+    yield from start_bake()
+    seen = []
+    while status().now is not None:
+        seen.append(status().now.fraction)
+        if len(seen) == 3:
+            yield from photograph("baking")
+        yield
+    assert len(set(seen)) >= 3, seen
+    assert seen == sorted(seen), seen
+    all_is_quiet()
+    assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+
+
+def panel_with_picture():
+    view()[1].spaces.active.shading.type = "MATERIAL"
+    yield 3.0
+    yield from photograph("panel-3-baked")
+
+
+def undo_after_bake():
+    yield from fresh_scene(size=(64, 48))
+    make_field()
+    before = contents()
+    with in_view():
+        bpy.ops.rosy.bake("INVOKE_DEFAULT", True)
+    yield from until(lambda: status().now is None)
+    yield 0.3
+    after = contents()
+    assert after != before
+    with in_view():
+        bpy.ops.ed.undo()
+    yield 0.3
+    assert contents() == before
+    with in_view():
+        bpy.ops.ed.redo()
+    yield 0.3
+    assert contents() == after
+
+
+def stop_with_escape():
+    def press():
+        window, _, region, _ = view()
+        x, y = region.x + region.width // 2, region.y + region.height // 2
+        window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
+        window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
+
+    yield from broken_off(press)
+
+
+def stop_when_an_object_is_deleted():
+    def delete():
+        with in_view():
+            bpy.ops.object.delete()
+
+    yield from broken_off(delete, unchanged=False)
+    assert not [thing for thing in bpy.data.materials if "rosy" in thing.name.lower()]
+
+
+def stop_on_undo():
+    def undo():
+        with in_view():
+            bpy.ops.ed.undo()
+
+    yield from broken_off(undo, unchanged=False)
+    assert "rosy" not in bpy.data.objects["Suzanne"].data.attributes
+
+
+def stop_on_a_change_of_scene():
+    def change():
+        with in_view():
+            bpy.ops.scene.new(type="EMPTY")
+
+    yield from broken_off(change, unchanged=False)
+    assert not [thing for thing in bpy.data.materials if "rosy" in thing.name.lower()]
+
+
+def stop_when_switched_off():
+    def switch_off():
+        module = "bl_ext.user_default.rosy"
+        bpy.ops.preferences.addon_disable(module=module)
+        bpy.ops.preferences.addon_enable(module=module)
+
+    yield from broken_off(switch_off)
+
+
+def stop_when_a_file_is_opened():
+    def open_file():
+        bpy.ops.wm.read_homefile(use_empty=True)
+
+    yield from broken_off(open_file, unchanged=False)
+
+
+def bake_the_current_view():
+    yield from fresh_scene()
+    make_field()
+    with in_view():
+        bpy.ops.rosy.bake("EXEC_DEFAULT", True, camera="VIEW")
+    (image,) = [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
+    assert tuple(image.size) == (view()[2].width, view()[2].height)
+
+
+main()

@@ -29,7 +29,7 @@ def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     for member, turn in enumerate(rotations(flow.degree)):
         fan[:-1, member] = nearest * turn
         directions = flow.on_screen(nearest * turn, look.foreshorten)
-        screen[:, member] = direction_table(flow, directions)
+        screen[:, member] = direction_table(flow, directions, fan[:-1, member])
     walkers = [_best_of(fan, screen, member) for member in range(image_count(flow.degree))]
     return (yield from member_images(flow, look, noise, walkers))
 

@@ -11,7 +11,7 @@ from ..projection.gbuffer import GBuffer
 from ..progress import Work, drain, part
 from .brute import brute_images
 from .colour import map_colours, to_linear
-from .contrast import blend_gain, scale_contrast
+from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
 from .images import Images, relative_magnitude
 from .look import Look
@@ -80,7 +80,7 @@ def compose_planar(
         rows from the bottom. NaN is undefined.
     degree : int
     look : Look
-        Its supersampling is 1 here: give finer angles instead.
+        Its supersampling does not count here: give finer angles instead.
     magnitude : (H, W) ndarray or float, optional
         rho, 1 if not given.
     noise : (H, W) or (H, W, 3) ndarray, optional
@@ -93,7 +93,7 @@ def compose_planar(
     flow = planar_flow(angles, degree, magnitude)
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(flow.pixel), -1)
-    layers = drain(_layers(flow, look, noise))
+    layers = drain(_layers(flow, replace(look, supersampling=1), noise))
     colour = _ink(flow, layers.tone, look)
     return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
 
@@ -113,9 +113,19 @@ def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Lay
     """LIC images of the members, blended, with the contrast of one of them times the gain."""
     if noise is None:
         channels = 3 if look.noise == "colour" else 1
-        noise = image_noise(flow.pixel, flow.width, look.grain, look.seed, channels, look.high_pass)
+        noise = image_noise(
+            flow.pixel,
+            flow.width,
+            look.grain,
+            look.seed,
+            channels,
+            density=look.density,
+            high_pass=look.high_pass,
+        )
     images = yield from METHODS[look.method](flow, look, noise)
     gain = look.gain * blend_gain(flow.degree, images.samples, look)
+    if look.supersampling > 1:
+        gain *= np.float32(averaging_gain(look))
     tone = scale_contrast(images.blend, gain[:, None])
     return Layers(flow.degree, flow.pixel, images, tone)
 

@@ -52,15 +52,31 @@ def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:
     """
     images = image_count(degree)
     full = 2 * look.length + 1
-    _, crossing = streak_statistics(full * look.step, look.grain, look.high_pass, images)
+    noise = (full * look.step, look.grain, look.high_pass)
+    _, crossing = streak_statistics(*noise, images)
     shared = np.clip(crossing * full / samples, 0, images - 1)
     return np.sqrt(images / (1 + shared)).astype(np.float32)
+
+
+def averaging_gain(look: Look) -> float:
+    """The factor that gives supersampled streaks the contrast of those drawn at once.
+
+    Parameters
+    ----------
+    look : Look
+        With its lengths in the pixels of the supersampled frame.
+    """
+    side = look.supersampling
+    full = (2 * look.length + 1) * look.step
+    averaged, _ = streak_statistics(full, look.grain, look.high_pass, average=side)
+    at_once, _ = streak_statistics(full / side, look.grain / side, look.high_pass / side)
+    return at_once / averaged
 
 
 def expected_deviation(look: Look) -> float:
     """Standard deviation of one member image with whole streamlines, from theory."""
     length = (2 * look.length + 1) * look.step
-    return streak_statistics(length, look.grain, look.high_pass, 1)[0]
+    return streak_statistics(length, look.grain, look.high_pass)[0]
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:

@@ -63,27 +63,31 @@ class Flow:
         direction = self.axes[:, 0] * member.real + self.axes[:, 1] * member.imag
         return direction.astype(np.complex64) if foreshorten else phase(direction)
 
-    def turning(self, direction: np.ndarray) -> np.ndarray:
+    def turning(self, direction: np.ndarray, member: np.ndarray) -> np.ndarray:
         """How fast directions turn from pixel to pixel, by differences over linked neighbours.
 
         Parameters
         ----------
         direction : (P,) complex64 ndarray
             On screen.
+        member : (P,) complex64 ndarray
+            The same in the view plane, where members are told apart: a neighbour that differs by
+            more than half the angle between them is on another one, and does not count.
 
         Returns
         -------
         (P,) complex64 ndarray
-            d angle / dx + i d angle / dy, radians per pixel. Neighbours that differ by more than
-            half the angle between members are on another one, and do not count.
+            d angle / dx + i d angle / dy, radians per pixel.
         """
-        padded = np.append(phase(direction), np.complex64(0))
-        here, limit = padded[:-1], np.sin(min(np.pi / self.degree, np.pi / 2))
+        direction, member = (np.append(phase(a), np.complex64(0)) for a in (direction, member))
+        here, member_here = direction[:-1].conj(), member[:-1].conj()
+        same = np.cos(np.pi / max(self.degree, 2))
         sine = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-            there = padded.take(self.neighbours[:-1, OFFSETS.index(offset)])
-            turn = there * here.conj()
-            sine.append(np.where((turn.real > 0) & (np.abs(turn.imag) < limit), turn.imag, 0))
+            there = self.neighbours[:-1, OFFSETS.index(offset)]
+            turn = direction.take(there) * here
+            alike = (member.take(there) * member_here).real > same
+            sine.append(np.where(alike & (turn.real > 0), turn.imag, 0))
         left, right, below, above = sine
         return 0.5 * ((right - left) + 1j * (above - below)).astype(np.complex64)
 

@@ -54,6 +54,13 @@ class Look:
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
     grain: float = _number(1.5, 0.5, 256.0, "Size of a cell of the noise, in pixels")
+    density: float = _number(
+        0.1,
+        0.001,
+        0.999,
+        "Share of the noise's cells that are bright: few leave single streaks, which tell many "
+        "directions apart",
+    )
     high_pass: float = _number(
         16.0,
         0.0,
@@ -68,7 +75,7 @@ class Look:
         colour="Three channels, drawn separately: a plaid",
     )
     seed: int = _number(0, 0, 2**31 - 1, "Which noise")
-    gain: float = _number(2.0, 0.0, 16.0, "Contrast on top of the statistical correction")
+    gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
     guiding_angle: float = _number(
         0.0, -3.1416, 3.1416, "Direction in the picture nearest to which the first member is chosen"
     )

@@ -52,13 +52,15 @@ def _weights(flow: Flow, look: Look) -> np.ndarray:
 
 def _walkers(flow: Flow, look: Look, angle: float) -> list[Walker]:
     """Walkers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
-    if look.view_plane:
-        nearest = nearest_member(flow, angle)
-        turns = rotations(flow.degree)[: image_count(flow.degree)]
-        fields = [flow.on_screen(nearest * turn, look.foreshorten) for turn in turns]
-    else:
+    if not look.view_plane:
         fields = _projected_fields(flow, angle)
-    return [_along(direction_table(flow, field)) for field in fields]
+        return [_along(direction_table(flow, field, field)) for field in fields]
+    nearest = nearest_member(flow, angle)
+    members = [nearest * turn for turn in rotations(flow.degree)[: image_count(flow.degree)]]
+    return [
+        _along(direction_table(flow, flow.on_screen(member, look.foreshorten), member))
+        for member in members
+    ]
 
 
 def _along(table: np.ndarray) -> Walker:

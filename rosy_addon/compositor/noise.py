@@ -19,7 +19,7 @@ BLUR = 0.5
 TAPS = 3
 
 
-def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int) -> np.ndarray:
+def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int, density: float) -> np.ndarray:
     """One random bit for each cell of an integer lattice.
 
     Parameters
@@ -27,11 +27,12 @@ def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int) -> np.ndarr
     x, y : int ndarray
         Cell indices.
     seed, channel : int
+    density : float
+        Share of cells whose bit is set, to the nearest 2 ** -24.
 
     Returns
     -------
-    float32 ndarray
-        0 or 1.
+    bool ndarray
 
     References
     ----------
@@ -46,11 +47,18 @@ def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int) -> np.ndarr
     h *= np.uint32(0x7FEB352D)
     h ^= h >> np.uint32(15)
     h *= np.uint32(0x846CA68B)
-    return (h >> np.uint32(31)).astype(np.float32)
+    return h >> np.uint32(8) < np.uint32(round(density * 2**24))
 
 
 def image_noise(
-    pixel: np.ndarray, width: int, grain: float, seed: int, channels: int, high_pass: float = 0.0
+    pixel: np.ndarray,
+    width: int,
+    grain: float,
+    seed: int,
+    channels: int,
+    *,
+    density: float = 0.5,
+    high_pass: float = 0.0,
 ) -> np.ndarray:
     """Noise anchored to the picture: square cells of one bit, averaged over each pixel.
 
@@ -65,14 +73,16 @@ def image_noise(
     seed : int
     channels : int
         1 or 3, independent of each other.
+    density : float
+        Share of cells that are bright.
     high_pass : float
-        Pixels; variations broader than about this are taken out. 0 leaves the noise white, and
-        then it is nowhere below 0 or above 1.
+        Pixels; variations broader than about this are taken out. 0 leaves the noise white.
 
     Returns
     -------
     (P, channels) float32 ndarray
-        With mean `MEAN`.
+        With mean `MEAN`; that of a cell has the standard deviation `DEVIATION`. At half density
+        and without a high pass it is from 0 to 1.
     """
     row, column = pixel // width, pixel % width
     margin = int(np.ceil(3 * BLUR * high_pass))
@@ -80,7 +90,7 @@ def image_noise(
     bottom, top = int(row[0]) - margin, int(row[-1]) + margin + 1
     noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
-        cells = _cells(left, right, bottom, top, grain, seed, channel)
+        cells = _cells(left, right, bottom, top, grain, seed, channel, density)
         if high_pass:
             cells += MEAN - _blurred(cells, BLUR * high_pass)
         noise[:, channel] = cells[row - bottom, column - left]
@@ -88,9 +98,16 @@ def image_noise(
 
 
 def _cells(
-    left: int, right: int, bottom: int, top: int, grain: float, seed: int, channel: int
+    left: int,
+    right: int,
+    bottom: int,
+    top: int,
+    grain: float,
+    seed: int,
+    channel: int,
+    density: float,
 ) -> np.ndarray:
-    """(top - bottom, right - left) float32: the lattice of bits averaged over pixels."""
+    """(top - bottom, right - left) float32: the lattice of bits averaged over pixels, scaled."""
     cos, sin = np.cos(TURN) / grain, np.sin(TURN) / grain
     column = np.arange(left, right, dtype=np.float64)
     row = np.arange(bottom, top, dtype=np.float64)[:, None]
@@ -101,8 +118,9 @@ def _cells(
             px, py = column + x, row + y
             cell_x = np.floor(cos * px - sin * py).astype(np.int32)
             cell_y = np.floor(sin * px + cos * py).astype(np.int32)
-            total += hash_bits(cell_x, cell_y, seed, channel)
-    return total / np.float32(TAPS * TAPS)
+            total += hash_bits(cell_x, cell_y, seed, channel, density)
+    scale = DEVIATION / np.sqrt(density * (1 - density))
+    return np.float32(MEAN - density * scale) + np.float32(scale / (TAPS * TAPS)) * total
 
 
 def _blurred(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -127,7 +145,7 @@ def _mean_along(image: np.ndarray, reach: int, axis: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def streak_statistics(
-    length: float, grain: float, high_pass: float, images: int
+    length: float, grain: float, high_pass: float, images: int = 1, average: int = 1
 ) -> tuple[float, float]:
     """How much the noise averaged along straight streamlines varies, in closed form.
 
@@ -139,6 +157,8 @@ def streak_statistics(
         Of the noise, pixels.
     images : int
         M streamlines through a pixel, at multiples of pi / M.
+    average : int
+        Side of the squares of pixels over which the picture is averaged afterwards.
 
     Returns
     -------
@@ -162,6 +182,8 @@ def streak_statistics(
     kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
     cx, cy = np.cos(TURN) * kx - np.sin(TURN) * ky, np.sin(TURN) * kx + np.cos(TURN) * ky
     amplitude = np.sinc(grain * cx) * np.sinc(grain * cy) * np.sinc(kx) * np.sinc(ky)
+    if average > 1:
+        amplitude *= np.sinc(average * kx) * np.sinc(average * ky)
     power = (grain * DEVIATION * amplitude) ** 2
     kept = 1 - np.exp(-2 * (np.pi * BLUR * high_pass * k) ** 2) if high_pass else 1.0
     weight = power.mean(axis=1) * kept**2 * k * dk * (2 * np.pi / len(angle))

@@ -21,11 +21,14 @@ def blocks(count: int) -> Iterator[slice]:
         yield slice(start, min(start + BLOCK, count))
 
 
-def direction_table(flow: Flow, directions: np.ndarray) -> np.ndarray:
-    """(P + 1, 2) complex64: directions on screen and how they turn, 0 in row P; for `interpolate`."""
+def direction_table(flow: Flow, directions: np.ndarray, member: np.ndarray) -> np.ndarray:
+    """(P + 1, 2) complex64 for `interpolate`: directions and how they turn, 0 in row P.
+
+    `directions` are on screen, `member` the same in the view plane; both (P,) complex64.
+    """
     table = np.zeros((len(directions) + 1, 2), dtype=np.complex64)
     table[:-1, 0] = directions
-    table[:-1, 1] = flow.turning(directions)
+    table[:-1, 1] = flow.turning(directions, member)
     return table
 
 

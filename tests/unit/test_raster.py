@@ -251,3 +251,20 @@ def test_two_million_tiny_triangles_leave_no_hole():
     triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     clip = np.stack([x, y, 0.3 * np.sin(9 * x * y), np.ones(x.shape)], axis=1)
     assert len(rasterise(clip, triangles, 256, 256).pixel) == 256 * 256
+
+
+def test_edges_meet_the_near_plane_in_the_same_point_from_both_sides():
+    """Bit for bit: else the two triangles of an edge would be cut apart by rounding."""
+    vertices = np.random.default_rng(3).normal(size=(2000, 4))
+    first, second = np.arange(1000), np.arange(1000, 2000)
+    one = raster._crossings(vertices, first, second)
+    assert (one == raster._crossings(vertices, second, first)).all()
+
+
+def test_the_first_of_equal_depths_is_seen_among_cut_triangles_too():
+    camera = a_camera(True)
+    points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
+    # A floor four times, cut in different shapes, and a wall that is whole.
+    triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])
+    seen = rasterise(to_clip(points, camera), triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
+    assert set(seen.triangle) <= {0, 1, 2}

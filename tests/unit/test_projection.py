@@ -303,10 +303,14 @@ def test_mirrored_objects(display, degree):
     assert (by_scale.front != by_turned_mesh.front).all()
 
 
-def test_stretching_turns_members_by_its_rotation_alone():
-    """A stretch along the axes turns nothing; a shear by s turns by -atan(s / 2)."""
-    surface = plane()
-    field = RosyField(4, np.tile([np.cos(0.3), np.sin(0.3), 0], (16, 1)) * 2.0)
+@pytest.mark.parametrize("cells", [(4, 4), (9, 2), (1, 6)])
+def test_stretching_turns_members_by_its_rotation_alone(cells):
+    """A stretch along the axes turns nothing; a shear by s turns by -atan(s / 2).
+
+    Whatever the shape of the faces that the map is read from.
+    """
+    surface = plane(*cells)
+    field = RosyField(4, np.tile([np.cos(0.3), np.sin(0.3), 0], (surface.face_count, 1)) * 2.0)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, scale=8)
 
     def angle(linear):

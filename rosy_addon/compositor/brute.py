@@ -25,7 +25,7 @@ def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     """
     nearest = nearest_member(flow, look.guiding_angle)
     fan = np.zeros((len(flow.pixel) + 1, flow.degree), dtype=np.complex64)
-    screen = np.zeros((len(flow.pixel) + 1, flow.degree, 2), dtype=np.complex64)
+    screen = np.zeros((len(flow.pixel) + 1, flow.degree, 4), dtype=np.float32)
     for member, turn in enumerate(rotations(flow.degree)):
         fan[:-1, member] = nearest * turn
         directions = flow.on_screen(nearest * turn, look.foreshorten)
@@ -41,7 +41,7 @@ def _best_of(fan: np.ndarray, screen: np.ndarray, member: int) -> Walker:
     ----------
     fan : (P + 1, N) complex64 ndarray
         All members in the view plane, where they are matched.
-    screen : (P + 1, N, 2) complex64 ndarray
+    screen : (P + 1, N, 4) float32 ndarray
         The same on screen, where they lead: a `direction_table` of each.
     member : int
     """
@@ -56,7 +56,7 @@ def _best_of(fan: np.ndarray, screen: np.ndarray, member: int) -> Walker:
 def _matching(fan: np.ndarray, screen: np.ndarray, start: np.ndarray, sign: int) -> Direction:
     """Directions of streamlines that remember the member they are on."""
     degree = fan.shape[1]
-    members, tables = fan.reshape(-1), screen.reshape(-1, 2)
+    members, tables = fan.reshape(-1), screen.reshape(-1, 4)
     heading = start
 
     def follow(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:

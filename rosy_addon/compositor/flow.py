@@ -60,7 +60,9 @@ class Flow:
         """
         if self.axes is None:
             return member.astype(np.complex64)
-        direction = self.axes[:, 0] * member.real + self.axes[:, 1] * member.imag
+        # In double precision, so that all releases of numpy round to the same single one.
+        x, y = self.axes[:, 0].astype(np.complex128), self.axes[:, 1].astype(np.complex128)
+        direction = x * member.real + y * member.imag
         return direction.astype(np.complex64) if foreshorten else phase(direction)
 
     def turning(self, direction: np.ndarray, member: np.ndarray) -> np.ndarray:
@@ -94,9 +96,9 @@ class Flow:
 
 def phase(numbers: np.ndarray) -> np.ndarray:
     """complex64 numbers scaled to modulus 1; 0 stays 0."""
-    size = np.abs(numbers)
-    result = np.zeros(numbers.shape, dtype=np.complex64)
-    return np.divide(numbers, size, out=result, where=size > 0, casting="same_kind")
+    numbers = numbers.astype(np.complex128)
+    size = np.sqrt(numbers.real**2 + numbers.imag**2)
+    return np.divide(numbers, size, out=numbers, where=size > 0).astype(np.complex64)
 
 
 def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool) -> Flow:
@@ -193,7 +195,8 @@ def nearest_member(flow: Flow, guiding_angle: float) -> np.ndarray:
 
     Of two equally near ones it is the one on the counter-clockwise side, as in the paper.
     """
-    turned = flow.representation * np.exp(-1j * flow.degree * guiding_angle)
+    turned = flow.representation.astype(np.complex128)
+    turned *= np.exp(-1j * flow.degree * guiding_angle)
     member = np.exp(1j * (np.angle(turned) / flow.degree + guiding_angle))
     member[flow.representation == 0] = 0
     return member.astype(np.complex64)

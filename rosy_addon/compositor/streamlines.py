@@ -22,28 +22,50 @@ def blocks(count: int) -> Iterator[slice]:
 
 
 def direction_table(flow: Flow, directions: np.ndarray, member: np.ndarray) -> np.ndarray:
-    """(P + 1, 2) complex64 for `interpolate`: directions and how they turn, 0 in row P.
+    """Directions on screen, and how they turn from pixel to pixel, for `interpolate`.
 
-    `directions` are on screen, `member` the same in the view plane; both (P,) complex64.
+    Parameters
+    ----------
+    flow : Flow
+    directions : (P,) complex64 ndarray
+        On screen.
+    member : (P,) complex64 ndarray
+        The same in the view plane.
+
+    Returns
+    -------
+    (P + 1, 4) float32 ndarray
+        x and y of the direction, and of the gradient of its angle; 0 in row P.
     """
-    table = np.zeros((len(directions) + 1, 2), dtype=np.complex64)
-    table[:-1, 0] = directions
-    table[:-1, 1] = flow.turning(directions, member)
+    table = np.zeros((len(directions) + 1, 4), dtype=np.float32)
+    turning = flow.turning(directions, member)
+    table[:-1, 0], table[:-1, 1] = directions.real, directions.imag
+    table[:-1, 2], table[:-1, 3] = turning.real, turning.imag
     return table
 
 
 def interpolate(rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """(B,) complex64 directions at some offset from the centres of pixels, to first order.
+    """Directions at some offset from the centres of pixels, to first order.
+
+    Real numbers one by one, not complex ones: releases of numpy and processors round the product
+    of complex numbers differently, and a streamline may then step into another pixel.
 
     Parameters
     ----------
-    rows : (B, 2) complex64 ndarray
-        Of `direction_table`.
-    offset : (B,) complex64 ndarray
+    rows : (B, 4) float32 ndarray
+        Of a `direction_table`.
+    offset : (B, 2) float32 ndarray
         Pixels.
+
+    Returns
+    -------
+    (B, 2) float32 ndarray
     """
-    turn = (rows[:, 1].conj() * offset).real
-    return rows[:, 0] * (1 + 1j * turn)
+    turn = rows[:, 2] * offset[:, 0] + rows[:, 3] * offset[:, 1]
+    direction = np.empty((len(rows), 2), dtype=np.float32)
+    np.subtract(rows[:, 0], rows[:, 1] * turn, out=direction[:, 0])
+    np.add(rows[:, 1], rows[:, 0] * turn, out=direction[:, 1])
+    return direction
 
 
 def gather(
@@ -68,8 +90,8 @@ def gather(
         Of the flow's pixels.
     follow : function
         Takes the (B,) int32 entries that the streamlines are on, P for those that have ended, and
-        their (B,) complex64 offsets from the centres of those pixels, and returns their (B,)
-        complex64 directions on screen, 0 for P. It is called once a step, in order, and may keep
+        their (B, 2) float32 offsets from the centres of those pixels, and returns their (B, 2)
+        float32 directions on screen, 0 for P. It is called once a step, in order, and may keep
         what it needs of the streamlines between calls.
     noise : (P + 1, K) float32 ndarray
         0 in row P.
@@ -90,8 +112,7 @@ def gather(
     end = len(flow.pixel)
     neighbours = flow.neighbours.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
-    offset = np.zeros(len(entry), dtype=np.complex64)
-    parts = offset.view(np.float32).reshape(-1, 2)
+    offset = np.zeros((len(entry), 2), dtype=np.float32)
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
     samples = np.zeros(len(entry), dtype=np.float32)
     before = None
@@ -103,8 +124,8 @@ def gather(
             offset += np.float32(1.5 * step) * ahead - np.float32(0.5 * step) * before
         before = ahead
         # No further than a neighbour, however sharply the direction turned.
-        whole = np.clip(np.rint(parts), -1, 1)
-        parts -= whole
+        whole = np.clip(np.rint(offset), -1, 1)
+        offset -= whole
         move = whole[:, 0] + 3 * whole[:, 1]
         entry = neighbours.take(entry * 9 + (move.astype(np.int32) + 4))
         if limit is not None:

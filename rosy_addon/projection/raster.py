@@ -168,11 +168,7 @@ def _crossings(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> n
 
 def _on_screen(vertices: np.ndarray, width: int, height: int) -> _Screen:
     x, y, z, w = vertices.T
-    usable = w > 0
-    if usable.all():
-        inverse = 1.0 / w
-    else:
-        inverse = np.divide(1.0, w, out=np.zeros(len(w)), where=usable)
+    inverse = np.divide(1.0, w, out=np.zeros(len(w)), where=w > 0)
     x = (x * inverse + 1.0) * (0.5 * width)
     y = (y * inverse + 1.0) * (0.5 * height)
     column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int32)

@@ -455,9 +455,9 @@ def test_what_cannot_be_seen_is_said():
     field = tangent_field(ball, 4)
     camera = lens(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, name="Camera.001")
     shown = Body(ball, IDENTITY, field)
-    with pytest.raises(RosyError, match="in view of camera 'Camera.001': sphere is outside the"):
+    with pytest.raises(RosyError, match=r"in view of camera 'Camera\.001': sphere is outside the"):
         project([Body(ball, matrix_of(np.eye(3), (0, 0, 9)), field)], camera)
-    with pytest.raises(RosyError, match="in view of camera 'Camera.001': sphere is hidden"):
+    with pytest.raises(RosyError, match=r"in view of camera 'Camera\.001': sphere is hidden"):
         project([Body(wall, matrix_of(np.eye(3), (0, 0, 2))), shown], camera)
     with pytest.raises(RosyError, match="there is no RoSy object"):
         project([Body(wall, IDENTITY)], camera)

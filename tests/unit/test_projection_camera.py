@@ -116,7 +116,7 @@ def test_pixel_rays_go_through_pixel_centres(make):
 
 
 def test_a_shift_moves_the_picture_as_in_blender():
-    """Shifting the lens by a half of the longer side to the right puts the axis on the left edge."""
+    """With the lens shifted right by half of the longer side, the axis is at the left border."""
     for make in (perspective_camera, orthographic_camera):
         camera = make(np.eye(4), 40, 20, shift=(0.5, 0.25))
         np.testing.assert_allclose(in_frame(camera, np.array([[0, 0, -5.0]]))[0, :2], -1)

@@ -1,0 +1,153 @@
+"""Polygons cut into triangles that fill them once, convex or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rosy_addon.field.triangulate import triangulate
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def cut(*polygons):
+    """Triangles, their faces and the points of some (k, 2 or 3) polygons."""
+    polygons = [np.asarray(p, dtype=float) for p in polygons]
+    polygons = [np.pad(p, ((0, 0), (0, 3 - p.shape[1]))) for p in polygons]
+    points = np.concatenate(polygons)
+    start = np.concatenate([[0], np.cumsum([len(p) for p in polygons])]).astype(np.int32)
+    triangles, face = triangulate(points, np.arange(len(points), dtype=np.int32), start)
+    assert (np.bincount(face, minlength=len(polygons)) == np.diff(start) - 2).all()
+    assert (np.diff(face) >= 0).all()
+    assert ((triangles >= start[face][:, None]) & (triangles < start[face + 1][:, None])).all()
+    return points, triangles, face
+
+
+def signed_areas(points, triangles):
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    return 0.5 * np.cross(b - a, c - a)[:, 2]
+
+
+def polygon_area(points):
+    x, y = points[:, 0], points[:, 1]
+    return 0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum()
+
+
+def assert_filled(polygon):
+    """All triangles wind as the polygon does, and their areas add up: so none lies outside."""
+    points, triangles, _ = cut(polygon)
+    areas = signed_areas(points, triangles)
+    whole = polygon_area(np.asarray(polygon, dtype=float))
+    assert (areas * np.sign(whole) > 0).all()
+    assert areas.sum() == pytest.approx(whole)
+
+
+def star(random, corners):
+    """A star-shaped polygon, mostly with many reflex corners."""
+    angle = np.sort((np.arange(corners) + 0.8 * random.random(corners)) * 2 * np.pi / corners)
+    radius = random.uniform(0.2, 1.0, corners)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seeds, st.integers(4, 24), st.booleans())
+def test_star_shaped_polygons_are_filled(seed, corners, backward):
+    random = np.random.default_rng(seed)
+    polygon = np.roll(star(random, corners), random.integers(corners), axis=0)
+    assert_filled(polygon[::-1] if backward else polygon)
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_a_concave_quadrangle_is_cut_at_its_reflex_corner(turn):
+    assert_filled(np.roll([(0, 0), (3, 1), (0, 2), (1, 1.0)], turn, axis=0))
+
+
+@pytest.mark.parametrize("turn", range(12))
+def test_a_comb_and_a_spiral(turn):
+    comb = [
+        (0, 0),
+        (6, 0),
+        (6, 3),
+        (5, 3),
+        (5, 1),
+        (4, 1),
+        (4, 3),
+        (3, 3),
+        (3, 1),
+        (1, 1),
+        (1, 3),
+        (0, 3),
+    ]
+    assert_filled(np.roll(comb, turn, axis=0))
+    spiral = [
+        (0, 0),
+        (5, 0),
+        (5, 4),
+        (1, 4),
+        (1, 2),
+        (3, 2),
+        (3, 3),
+        (4, 3),
+        (4, 1),
+        (0.5, 1),
+        (0.5, 5),
+        (0, 5),
+    ]
+    assert_filled(np.roll(spiral, turn, axis=0))
+
+
+@pytest.mark.parametrize("turn", range(8))
+def test_corners_in_a_line_give_no_triangle_without_area(turn):
+    assert_filled(np.roll([(0, 0), (1, 0), (2, 0), (1, 2)], turn, axis=0))
+    assert_filled(np.roll([(0, 0), (1, 0), (2, 0), (2, 2), (0, 2)], turn, axis=0))
+    assert_filled(
+        np.roll([(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)], turn, axis=0)
+    )
+
+
+def test_convex_faces_are_fans_around_their_first_corner():
+    angle = np.arange(6) * np.pi / 3
+    hexagon = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    _, triangles, face = cut(square, hexagon, square[:3])
+    assert triangles.tolist() == [
+        *([0, 1, 2], [0, 2, 3]),
+        *([4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9]),
+        [10, 11, 12],
+    ]
+    assert face.tolist() == [0, 0, 1, 1, 1, 1, 2]
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_a_polygon_in_space_is_cut_as_in_the_plane(seed):
+    """Turned anywhere, moved far away, and a little out of its plane."""
+    random = np.random.default_rng(seed)
+    flat = np.pad(star(random, 9), ((0, 0), (0, 1)))
+    bumpy = flat + [0, 0, 1] * random.normal(size=(9, 1)) * 0.01
+    q, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    q *= np.sign(np.linalg.det(q))
+    _, triangles, _ = cut(bumpy @ q.T + 100 * random.normal(size=3))
+    areas = signed_areas(flat, triangles)
+    assert (areas > 0).all()
+    assert areas.sum() == pytest.approx(polygon_area(flat))
+
+
+def test_a_mixed_mesh_keeps_its_order():
+    random = np.random.default_rng(0)
+    polygons = [star(random, k) for k in (3, 7, 4, 12, 5, 4, 3, 9)]
+    points, triangles, face = cut(*polygons)
+    areas = signed_areas(points, triangles)
+    assert (areas > 0).all()
+    expected = [polygon_area(p) for p in polygons]
+    np.testing.assert_allclose(np.bincount(face, weights=areas), expected)
+
+
+def test_faces_without_area_or_that_cross_themselves_are_cut_somehow():
+    bow_tie = [(0, 0), (1, 1), (1, 0), (0, 1)]
+    pentagram = [(np.cos(a), np.sin(a)) for a in np.arange(5) * 0.8 * np.pi]
+    cut(bow_tie, pentagram, np.zeros((4, 2)), np.zeros((7, 2)), [(t, t) for t in range(6)])

@@ -31,9 +31,9 @@ def triangulate(
 
     Notes
     -----
-    Convex faces are cut into the fan around their first corner. With one flat corner, and for any
-    quadrangle, the fan around the corner that turns least is right. The few others are cut in a
-    Python loop.
+    Convex faces are cut into the fan around their first corner. A face with a single flat or reflex
+    corner is cut into the fan around that one, which sees all others: shortest paths inside a
+    polygon bend at reflex corners only. The few others are cut in a Python loop.
     """
     size = np.diff(face_start)
     hub = np.zeros(len(size), dtype=np.int32)
@@ -80,9 +80,7 @@ def _fan_hubs(
         bent = turn.min(axis=1) <= FLAT
         hub[of_size] = np.where(bent, least, 0)
         if count > 4:
-            single = (turn <= FLAT).sum(axis=1) == 1
-            flat = np.abs(turn.min(axis=1)) <= FLAT
-            needs_ears[of_size] = bent & ~(single & flat)
+            needs_ears[of_size] = (turn <= FLAT).sum(axis=1) > 1
     return hub, needs_ears
 
 

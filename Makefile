@@ -34,7 +34,7 @@ test-unit: .venv/ready .venv-numpy1/ready
 test-numpy1: .venv-numpy1/ready
 	$(NUMPY1) $(PYTEST) tests/unit
 
-test-bpy%: .venv-bpy%/ready
+test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/bin/python $(PYTEST) tests/bpy
 
 check: .venv/ready

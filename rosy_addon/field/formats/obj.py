@@ -15,7 +15,8 @@ def read_obj(path: Path) -> Polygons:
     """Read an .obj file: `v` and `f` lines, with v/vt/vn corners and negative (relative) indices."""
     rows = read_rows(path)
     kinds = [words[0] for words in rows.words]
-    is_vertex, is_face = (np.array([kind == letter for kind in kinds]) for letter in (b"v", b"f"))
+    is_vertex = np.array([kind == b"v" for kind in kinds], dtype=bool)
+    is_face = np.array([kind == b"f" for kind in kinds], dtype=bool)
     vertices = _chosen(rows, is_vertex, 3).points("vertex")
     corners = _chosen(rows, is_face)
     for row, words in enumerate(corners.words):

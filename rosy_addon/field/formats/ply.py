@@ -62,12 +62,12 @@ def read_ply(path: Path) -> Polygons:
     if not isinstance(corners, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
     corner_vertex, face_start = corners
-    wrong = (corner_vertex < 0) | (corner_vertex >= len(vertices))
+    wrong = ~((corner_vertex >= 0) & (corner_vertex < len(vertices)) & (corner_vertex % 1 == 0))
     if wrong.any():
         corner = int(np.argmax(wrong))
         number = int(np.searchsorted(face_start, corner, side="right")) - 1
         raise RosyError(
-            f"{path}: face {number} refers to vertex {corner_vertex[corner]:.0f}, "
+            f"{path}: face {number} refers to vertex {corner_vertex[corner]:.10g}, "
             f"there are {len(vertices)}, counted from 0"
         )
     return Polygons(vertices.astype(np.float64), corner_vertex.astype(np.int64), face_start)
@@ -77,7 +77,7 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     """Byte order ("" for text), elements, and where the header ends."""
     if data[:3] != b"ply":
         raise RosyError(f"{path}:1: found {shown(data[:3])}, wanted 'ply'")
-    end = re.compile(rb"^end_header[ \t]*\r?\n?", re.MULTILINE).search(data)
+    end = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE).search(data)
     if end is None:
         raise RosyError(f"{path}: the header has no end")
     order, elements = None, []

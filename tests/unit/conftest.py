@@ -1,0 +1,34 @@
+"""What several tests need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rosy_addon.errors import RosyError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Meshes and fields that other programs made, where they lie beside the repository."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("no ../shared/data")
+    return folder
+
+
+@pytest.fixture
+def error_of():
+    """The text of the RosyError that a call raises; it must be one line."""
+
+    def catch(function, *arguments, **more) -> str:
+        with pytest.raises(RosyError) as caught:
+            function(*arguments, **more)
+        message = str(caught.value)
+        assert "\n" not in message
+        return message
+
+    return catch

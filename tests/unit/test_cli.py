@@ -1,0 +1,275 @@
+"""The command line, in processes of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import zlib
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from shapes import icosphere, torus
+
+from rosy_addon.cli import main
+from rosy_addon.field.surface import Surface
+
+
+def rosy(*words, **more) -> subprocess.CompletedProcess:
+    """Run ``python -m rosy_addon``."""
+    command = [sys.executable, "-m", "rosy_addon", *map(str, words)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **more)
+
+
+def write_off(path, surface: Surface):
+    sizes = np.diff(surface.face_start)
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    rows = [f"OFF\n{len(surface.vertices)} {len(sizes)} 0"]
+    rows += [" ".join(map(repr, row)) for row in surface.vertices.tolist()]
+    rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory):
+    return write_off(tmp_path_factory.mktemp("meshes") / "sphere.off", icosphere(3))
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    return write_off(tmp_path_factory.mktemp("meshes") / "torus.off", torus(24, 12))
+
+
+def size_of(path) -> tuple[int, int]:
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
+    return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+
+
+def pixels_of(path) -> np.ndarray:
+    width, height = size_of(path)
+    data = path.read_bytes()
+    start = data.index(b"IDAT")
+    length = int.from_bytes(data[start - 4 : start])
+    rows = np.frombuffer(zlib.decompress(data[start + 4 : start + 4 + length]), np.uint8)
+    return rows.reshape(height, 1 + 4 * width)[:, 1:].reshape(height, width, 4)
+
+
+def assert_refused(done: subprocess.CompletedProcess, *wanted: str) -> None:
+    """Status 2 and one line of reason."""
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("rosy: ") and done.stderr.count("\n") == 1, done.stderr
+    assert done.stdout == ""
+    for words in wanted:
+        assert words in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--degree", "3", "--generate", "axis", "--axis", "-1,0.5,0"],
+        ["--preset", "plaid", "--set", "supersampling=2", "--set", "view_plane=off"],
+        ["--view", "-120,-30", "--ortho", "--set", "display=flat"],
+    ],
+    ids=["plain", "axis", "look", "view"],
+)
+def test_render_writes_a_picture(words, ring, tmp_path):
+    done = rosy("render", ring, "-o", tmp_path / "a.png", "--size", "96x64", *words)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert size_of(tmp_path / "a.png") == (96, 64)
+    covered = pixels_of(tmp_path / "a.png")[..., 3] == 255
+    assert 0.1 < covered.mean() < 0.9
+
+
+def test_same_command_same_bytes(ring, tmp_path):
+    for name in ("a.png", "b.png"):
+        assert main(["render", str(ring), "-o", str(tmp_path / name), "--size", "80x80"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_y_is_up_in_off_files_unless_said_otherwise(tmp_path):
+    tall = torus(24, 12)
+    path = write_off(tmp_path / "a.off", tall)  # around z
+    seen = {}
+    for up in ("y", "z"):
+        rendered = tmp_path / f"{up}.png"
+        words = ["--size", "64x64", "--up", up, "--view", "0,0", "--ortho"]
+        assert main(["render", str(path), "-o", str(rendered), *words]) == 0
+        seen[up] = pixels_of(rendered)[..., 3] > 0
+    # From the front a ring around the upward axis is seen edge on, one around y with its hole.
+    assert seen["z"].any(axis=1).mean() < 0.5
+    assert seen["y"].any(axis=1).mean() > 0.8 and not seen["y"][32, 32]
+
+
+@pytest.mark.parametrize("name", ["vase-7", "vase-2", "vase-4", "dome-6", "cheburashka"])
+def test_render_fields_of_others(name, shared_data, tmp_path):
+    mesh = shared_data / "meshes" / f"{name.partition('-')[0]}.off"
+    field = shared_data / "fields" / f"{name}.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "128x128")
+    assert done.returncode == 0, done.stderr
+    ink = pixels_of(tmp_path / "a.png")
+    assert ink[ink[..., 3] == 255][:, :3].std() > 15
+
+
+def test_what_is_not_a_rosy_is_refused(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "cheburashka.off"
+    field = shared_data / "fields" / "cheburashka-cf.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png")
+    assert_refused(done, "not a RoSy of degree 4", "40.7")
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_field_makes_converts_and_info_reads(sphere, tmp_path):
+    raw, rosy_file, again = (tmp_path / name for name in ("a.rawfield", "a.rosy", "b.rawfield"))
+    assert rosy("field", sphere, "-o", raw, "--degree", 6).returncode == 0
+    assert rosy("field", sphere, raw, "-o", rosy_file).returncode == 0
+    assert rosy("field", sphere, rosy_file, "-o", again).returncode == 0
+    assert raw.read_bytes() == again.read_bytes()
+    done = rosy("info", sphere, rosy_file, "--json")
+    facts = json.loads(done.stdout)
+    assert (facts["degree"], facts["faces"], facts["vertices"]) == (6, 1280, 642)
+    assert facts["euler_characteristic"] == 2
+    assert sum(index for _, index in facts["singularities"]) == 6 * 2
+    assert all(isinstance(part, int) for pair in facts["singularities"] for part in pair)
+    words = rosy("info", sphere, rosy_file)
+    assert words.returncode == 0
+    assert "degree 6" in words.stdout and "1280 faces" in words.stdout
+
+
+def test_the_torus_has_no_singularities_in_sum(ring):
+    facts = json.loads(rosy("info", ring, "--degree", 4, "--generate", "axis", "--json").stdout)
+    assert facts["euler_characteristic"] == 0
+    assert sum(index for _, index in facts["singularities"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("degree", "kind"), [(1, "axis"), (2, "curvature"), (4, "curvature"), (5, "axis")]
+)
+def test_the_generator_follows_the_degree(degree, kind, ring, tmp_path):
+    default, chosen = tmp_path / "a.rosy", tmp_path / "b.rosy"
+    common = ["field", str(ring), "--degree", str(degree), "-o"]
+    assert main([*common, str(default)]) == 0
+    assert main([*common, str(chosen), "--generate", kind]) == 0
+    assert default.read_bytes() == chosen.read_bytes()
+
+
+REFUSED = {
+    "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
+    "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
+    "kind of mesh": (["info", "a.vtk"], "not from '.vtk' files"),
+    "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
+    "degree -1": (["field", "{mesh}", "-o", "{out}", "--degree", "-1"], "degree -1 is not"),
+    "degree 1000": (["info", "{mesh}", "--degree", "1000"], "degree 1000 is not"),
+    "curvature 3": (
+        ["info", "{mesh}", "--degree", "3", "--generate", "curvature"],
+        "2 or 4, not 3",
+    ),
+    "axis": (["info", "{mesh}", "--generate", "axis", "--axis", "0,0,0"], "not a direction"),
+    "both": (["info", "{mesh}", "a.rosy", "--generate", "axis"], "not both"),
+    "size 0": (["render", "{mesh}", "-o", "{out}", "--size", "0x10"], "size 0x10: a side must be"),
+    "size 100000": (["render", "{mesh}", "-o", "{out}", "--size", "100000x100000"], "size 100000x"),
+    "preset": (
+        ["render", "{mesh}", "-o", "{out}", "--preset", "none"],
+        "no preset is named 'none'",
+    ),
+    "setting": (["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"], "no setting 'lenght'"),
+    "value": (
+        ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
+        "--set length=long: a whole",
+    ),
+    "range": (["render", "{mesh}", "-o", "{out}", "--set", "gain=-1"], "setting 'gain' is -1"),
+    "switch": (["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"], "not true or false"),
+    "no value": (["render", "{mesh}", "-o", "{out}", "--set", "gain"], "NAME=VALUE is wanted"),
+    "no folder": (["render", "{mesh}", "-o", "no/folder/a.png"], "there is no folder no/folder"),
+    "a folder": (["render", "{mesh}", "-o", "tests"], "tests: cannot be written: it is a folder"),
+    "format": (["field", "{mesh}", "-o", "{out}"], "not to '.png' files"),
+    "view": (["render", "{mesh}", "-o", "{out}", "--view", "nan,0"], "view nan,0"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    words, wanted = REFUSED[case]
+    out = tmp_path / "a.png"
+    words = [word.format(mesh=sphere, out=out) for word in words]
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("rosy: ") and said.err.count("\n") == 1
+    assert wanted in said.err
+    assert said.out == ""
+    assert not out.exists()
+
+
+def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
+    done = rosy("render", sphere, "-o", tmp_path / "a.png", "--degree", 0)
+    assert_refused(done, "degree 0 is not a whole number from 1 to 12")
+    (tmp_path / "a.rosy").write_text("2 4\n1 0 0\n")
+    assert_refused(rosy("info", sphere, tmp_path / "a.rosy"), "a.rosy: says 2 rows")
+
+
+def test_conflicting_degrees(sphere, tmp_path):
+    assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
+    done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
+    assert_refused(done, "a.rosy: holds a field of degree 6, not 4")
+
+
+def test_undefined_vectors_on_request(sphere, tmp_path):
+    path = tmp_path / "a.rosy"
+    assert main(["field", str(sphere), "-o", str(path)]) == 0
+    lines = path.read_text().splitlines()
+    lines[2 + 7] = "nan nan nan"
+    path.write_text("\n".join(lines))
+    assert_refused(rosy("info", sphere, path), "1 of 1280 vectors are not finite", "face 7")
+    facts = json.loads(rosy("info", sphere, path, "--undefined", "--json").stdout)
+    assert facts["undefined_faces"] >= 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["paint"],
+        ["render"],
+        ["render", "a.off"],
+        ["render", "a.off", "-o", "b", "--size", "big"],
+    ],
+)
+def test_wrong_usage_is_status_2(words):
+    done = rosy(*words)
+    assert done.returncode == 2
+    assert done.stderr.startswith("usage: python -m rosy_addon")
+    assert "Traceback" not in done.stderr
+
+
+def test_help_names_the_program_it_was_started_as(capsys):
+    assert rosy("--help").stdout.startswith("usage: python -m rosy_addon [-h] VERB")
+    assert main(["--help"]) == 0
+    assert capsys.readouterr().out.startswith("usage: blender -b --command rosy")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
+    command = [sys.executable, "-m", "rosy_addon", "render", str(sphere), "-o", "{}/a.png"]
+    command[-1] = str(tmp_path / "a.png")
+    command += ["--size", "4000x4000", "--set", "length=2000", "--set", "method=brute"]
+    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said == "rosy: stopped\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bake_without_blender_says_so(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
+    assert main(["bake"]) == 2
+    assert "bake needs Blender" in capsys.readouterr().err

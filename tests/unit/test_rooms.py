@@ -1,0 +1,103 @@
+"""Imports run one way, and the numpy rooms do without Blender."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+PACKAGE = ROOT / "rosy_addon"
+
+#: What each room may import besides itself. Modules at the top are rooms of their own.
+BASE = {"errors", "progress", "files"}
+MAY_IMPORT = {
+    "errors": set(),
+    "progress": set(),
+    "files": {"errors"},
+    "field": BASE,
+    "projection": BASE | {"field"},
+    "compositor": BASE | {"field", "projection"},
+    "scene": BASE | {"field", "projection", "compositor"},
+    "bake": BASE | {"field", "projection", "compositor", "scene"},
+    "ui": BASE | {"field", "projection", "compositor", "scene", "bake"},
+    "cli": BASE | {"field", "projection", "compositor", "scene", "bake"},
+    "__main__": {"cli"},
+    "__init__": set(),
+}
+NUMPY_ROOMS = ("field", "projection", "compositor")
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def imports_of(path: Path) -> tuple[set[str], set[str]]:
+    """Modules of RoSy as paths from the package, and top-level names of all others."""
+    here = path.relative_to(PACKAGE).parent.parts
+    inside, outside = set(), set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            outside |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            outside.add(node.module.split(".")[0])
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level <= len(here) + 1, f"{path} reaches out of the package"
+            base = here[: len(here) - node.level + 1]
+            names = [node.module] if node.module else [alias.name for alias in node.names]
+            inside |= {".".join((*base, name)) for name in names}
+    return inside, outside
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_run_one_way(path):
+    inside, outside = imports_of(path)
+    room = room_of(path)
+    assert room in MAY_IMPORT, f"which rooms may {room} import?"
+    rooms = {name.split(".")[0] for name in inside} - {room}
+    assert rooms <= MAY_IMPORT[room]
+    allowed = set(sys.stdlib_module_names) | {"numpy"}
+    if room in ("scene", "ui", "bake", "cli"):
+        allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "rna_keymap_ui"}
+    assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
+
+
+def test_the_rule_is_seen_when_broken(tmp_path, monkeypatch):
+    """The reader of imports finds what it is there to find."""
+    monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
+    (tmp_path / "field").mkdir()
+    path = tmp_path / "field" / "wrong.py"
+    path.write_text(
+        "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
+    )
+    assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
+
+
+def test_numpy_rooms_import_without_blender():
+    modules = [
+        "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+        for path in FILES
+        if room_of(path) in (*NUMPY_ROOMS, "cli") and path.stem != "__init__"
+    ]
+    assert len(modules) > 20
+    code = "\n".join(
+        [
+            "import importlib, sys",
+            "class Refuse:",
+            "    def find_spec(self, name, path=None, target=None):",
+            "        if name.split('.')[0] in ('bpy', 'mathutils', 'gpu', 'bmesh'):",
+            "            raise ImportError(name + ' is out of bounds')",
+            "sys.meta_path.insert(0, Refuse())",
+            *(f"importlib.import_module({name!r})" for name in modules),
+            "heavy = {'scipy', 'PIL', 'matplotlib'} & set(sys.modules)",
+            "assert not heavy, heavy",
+        ]
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

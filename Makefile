@@ -49,8 +49,8 @@ format: .venv/ready
 zip: .venv-bpy42/ready
 	$(BPY42) tools/build_zip.py dist
 
-gallery: .venv-bpy42/ready
-	$(BPY42) docs/gallery/make.py
+gallery: .venv-gallery/ready
+	.venv-gallery/bin/python -m tools.gallery
 
 # An environment is ready once all that its list of requirements names is installed.
 .venv/ready: tools/requirements/unit.txt

@@ -1,0 +1,32 @@
+"""The same pictures with another version of numpy, all but the last bit of a few pixels."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+
+import numpy as np
+import pytest
+import version_pictures
+from conftest import ROOT
+
+
+def test_another_numpy_draws_the_same(tmp_path):
+    other = os.environ.get("ROSY_OTHER_PYTHON")
+    if not other:
+        pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
+    script, file = ROOT / "tests" / "unit" / "version_pictures.py", tmp_path / "pictures.npz"
+    subprocess.run([other, script, file], check=True)
+    code = "import numpy; print(numpy.__version__, end='')"
+    version = subprocess.run([other, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert version != np.__version__
+    theirs = np.load(file)
+    for name, ours in version_pictures.draw().items():
+        difference = np.abs(ours.astype(int) - theirs[name]).max(axis=2)
+        assert difference.max() <= 1, name
+        assert (difference > 0).mean() <= 1e-3, name
+
+
+def test_two_runs_draw_the_same():
+    first, second = version_pictures.draw(), version_pictures.draw()
+    assert all(np.array_equal(first[name], second[name]) for name in first)

@@ -1,0 +1,43 @@
+"""Pictures to be compared between versions of numpy: ``python version_pictures.py FILE.npz``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+if __name__ == "__main__":  # started by another interpreter, without pytest's search path
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from planar_fields import pair_angle, pixel_centres
+from shapes import icosphere, torus
+
+from rosy_addon.compositor.compose import compose, compose_planar
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.png import to_bytes
+from rosy_addon.field.generate import generate
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.project import project
+
+
+def draw() -> dict[str, np.ndarray]:
+    """8 bit pictures by name."""
+    look = Look()
+    pictures = {"plane": compose_planar(pair_angle(*pixel_centres(96), 96, 4), 4, look)}
+    shapes = {
+        "torus": (torus(), "curvature", 4, look),
+        "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
+        "magnitude": (torus(40, 20), "axis", 3, Look(magnitude="both", supersampling=2)),
+    }
+    for name, (surface, kind, degree, drawn) in shapes.items():
+        size = 160 * drawn.supersampling
+        camera = orbit_camera(surface, -25, 30, size, size)
+        body = Body(surface, np.eye(4), generate(surface, kind, degree))
+        pictures[name] = compose(project([body], camera), drawn)
+    return {name: to_bytes(picture.rgba) for name, picture in pictures.items()}
+
+
+if __name__ == "__main__":
+    np.savez(sys.argv[1], **draw())

@@ -241,7 +241,7 @@ def test_unwritable_output_is_an_error_and_leaves_what_was_there(tmp_path, error
 
 
 def test_small_deviations_are_turned_into_the_plane_with_their_length():
-    vectors = (*WEST, 0, 0, 0.1)
+    vectors = WEST + (0, 0, 0.1)
     field = checked_field(SQUARES, vectors, 4, "here")
     assert np.allclose(field.vectors, (-np.hypot(2, 0.1), 0, 0), atol=1e-14)
 

@@ -9,16 +9,19 @@ import bpy
 
 from ..rosy_addon.bake import baking
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.progress import Work, part
+from ..rosy_addon.progress import Work
+from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.bodies import rosy_objects
+from ..rosy_addon.scene.cameras import (
+    camera_of_object,
+    camera_of_view,
+    picture_size,
+    render_camera,
+    scene_cameras,
+)
+from ..rosy_addon.ui.properties import CAMERAS, look_of
 from .meshes import is_idle
 from .ticking import Ticking
-
-CAMERAS = [
-    ("SCENE", "Scene Camera", "From the camera that renders the scene"),
-    ("ALL", "All Cameras", "From every camera in the scene, one picture each"),
-    ("VIEW", "Current View", "From where this 3D view looks now"),
-]
 
 
 class ROSY_OT_bake(Ticking, bpy.types.Operator):
@@ -42,10 +45,33 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
         return True
 
     def work(self, context: bpy.types.Context) -> Work[Any]:
-        return baking(context.scene, None)
+        scene = context.scene
+        depsgraph = context.evaluated_depsgraph_get()
+        cameras = self._cameras(context, depsgraph)
+        return baking(scene, depsgraph, cameras=cameras, look=look_of(scene.rosy))
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return rosy_objects(context.view_layer)
+
+    def finish(self, context: bpy.types.Context, result: Any) -> None:
+        self.report({"INFO"}, f"Baked {len(result)} picture{'s' * (len(result) != 1)}")
+
+    def _cameras(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> list[Camera]:
+        scene = context.scene
+        chosen = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
+        if chosen == "VIEW":
+            return [_view_camera(context)]
+        found = scene_cameras(scene) if chosen == "ALL" else [render_camera(scene)]
+        size = picture_size(scene, scene.rosy.percentage)
+        return [camera_of_object(scene, depsgraph, thing, *size) for thing in found]
+
+
+def _view_camera(context: bpy.types.Context) -> Camera:
+    area = context.area
+    if area is None or area.type != "VIEW_3D":
+        raise RosyError("the current view can only be baked from a 3D view")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return camera_of_view(region, area.spaces.active.region_3d)
 
 
 CLASSES = (ROSY_OT_bake,)

@@ -7,9 +7,8 @@ import bpy
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.generate import KINDS, generate
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.scene.attributes import write_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, selected_meshes
+from .meshes import can_change_fields, give_fields, selected_meshes
 
 
 class ROSY_OT_field_generate(bpy.types.Operator):
@@ -50,18 +49,18 @@ class ROSY_OT_field_generate(bpy.types.Operator):
         return can_change_fields(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        meshes = list(dict.fromkeys(thing.data for thing in selected_meshes(context)))
+        meshes = dict.fromkeys(thing.data for thing in selected_meshes(context))
+        axis = tuple(self.axis)
         try:
-            fields = [
-                generate(mesh_surface(mesh), self.kind, self.degree, axis=tuple(self.axis))
+            made = {
+                mesh: generate(mesh_surface(mesh), self.kind, self.degree, axis=axis)
                 for mesh in meshes
-            ]
-            for mesh, field in zip(meshes, fields, strict=True):
-                write_mesh_field(mesh, field, self.attribute)
+            }
+            give_fields(self, context, made, self.attribute)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        faces = sum(len(field.vectors) for field in fields)
+        faces = sum(len(field.vectors) for field in made.values())
         self.report({"INFO"}, f"Made a field of degree {self.degree} on {faces:,} faces")
         return {"FINISHED"}
 

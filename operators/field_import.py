@@ -7,9 +7,8 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.fieldfile import read_field
-from ..rosy_addon.scene.attributes import write_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, selected_meshes
+from .meshes import can_change_fields, give_fields, selected_meshes
 
 
 class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
@@ -49,7 +48,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
         try:
             path = bpy.path.abspath(self.filepath)
             field = read_field(path, mesh_surface(mesh), undefined=self.undefined)
-            write_mesh_field(mesh, field, self.attribute)
+            give_fields(self, context, {mesh: field}, self.attribute)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

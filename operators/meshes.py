@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import bpy
 
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.field.rosy_field import RosyField
+from ..rosy_addon.scene.attributes import is_native, write_mesh_field
+from ..rosy_addon.scene.capabilities import is_editable
 from ..rosy_addon.ui import status
+from ..rosy_addon.ui.preferences import start_scene
 
 
 def selected_meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -35,3 +40,29 @@ def is_idle(operator: type[bpy.types.Operator]) -> bool:
         operator.poll_message_set("RoSy is at work: wait, or press ESC to cancel")
         return False
     return True
+
+
+def give_fields(
+    operator: bpy.types.Operator,
+    context: bpy.types.Context,
+    made: dict[bpy.types.Mesh, RosyField],
+    name: str,
+) -> None:
+    """Write fields to meshes, all or none of them, and start the scene's settings.
+
+    Raises
+    ------
+    RosyError
+        If a field cannot be written to its mesh; nothing is changed then.
+    """
+    # Those that will refuse come first.
+    for mesh in sorted(made, key=lambda mesh: _will_take(mesh, name)):
+        write_mesh_field(mesh, made[mesh], name)
+    try:
+        start_scene(context)
+    except RosyError as error:
+        operator.report({"WARNING"}, f"RoSy's preferences: {error}")
+
+
+def _will_take(mesh: bpy.types.Mesh, name: str) -> bool:
+    return is_editable(mesh) and (name not in mesh.attributes or is_native(mesh, name))

@@ -8,6 +8,7 @@ import bpy
 
 from ..rosy_addon.compositor.presets import load_preset, preset_names
 from ..rosy_addon.errors import RosyError
+from ..rosy_addon.ui.properties import apply_look
 
 
 class ROSY_OT_preset_apply(bpy.types.Operator):
@@ -33,6 +34,11 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
             return str(error)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            apply_look(context.scene.rosy, load_preset(self.preset).look)
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         return {"FINISHED"}
 
 

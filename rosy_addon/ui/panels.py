@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 import bpy
 
@@ -27,6 +28,9 @@ OTHERS = tuple(
     for entry in fields(Look)
     if not any(entry.name in names for names in GROUPS.values())
 )
+
+#: Settings of where the picture goes and how it shines there.
+OUTPUT = ("percentage", "placement", "emission", "diffuse", "store", "directory", "image_format")
 
 #: View transforms that show a picture's values as they were drawn.
 FAITHFUL_TRANSFORMS = {"Standard", "Raw"}
@@ -59,29 +63,28 @@ def _draw_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if thing is None or thing.type != "MESH":
         layout.label(text="Select a mesh to draw on")
     elif has_field(thing):
-        _draw_field_there(layout, thing)
+        _draw_field_there(layout, context, thing)
     else:
-        _draw_field_missing(layout, context, thing)
+        layout.label(text=f"{thing.name} has no field yet")
+        _draw_generator(layout, context)
+        layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
 
 
-def _draw_field_there(layout: bpy.types.UILayout, thing: bpy.types.Object) -> None:
+def _draw_field_there(
+    layout: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object
+) -> None:
     mesh = thing.data
     box = layout.box().column(align=True)
     box.label(text=thing.name, icon="OUTLINER_OB_MESH")
     box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
     box.label(text=f"Attribute '{mesh.rosy.attribute}'")
     row = layout.row(align=True)
-    row.operator_context = "INVOKE_DEFAULT"
     row.operator("rosy.field_import", text="Import", icon="IMPORT")
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
-
-
-def _draw_field_missing(
-    layout: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object
-) -> None:
-    layout.label(text=f"{thing.name} has no field yet")
-    _draw_generator(layout, context)
-    layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
+    header, body = layout.panel("rosy_another_field", default_closed=True)
+    header.label(text="Another Field")
+    if body is not None:
+        _draw_generator(body, context)
 
 
 def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -105,28 +108,29 @@ def _draw_picture(
 ) -> None:
     """What is baked, and the button that bakes."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
-    settings = context.scene.rosy
-    made = bakes(context.scene)
-    for bake in made:
-        _draw_bake(layout, bake)
-    if not made and len(drawn) > 1:
-        layout.label(text=f"{len(drawn)} objects with a field are drawn")
     if status.now is not None:
         _draw_progress(layout)
         return
-    layout.prop(settings, "camera")
+    made = bakes(context.scene)
+    for bake in made:
+        _draw_bake(layout, bake)
+    if drawn:
+        layout.prop(context.scene.rosy, "camera")
+        if len(drawn) > 1:
+            layout.label(text=f"Draws {len(drawn)} objects")
     row = layout.row()
     row.scale_y = 1.5
-    button = row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
-    button.camera = settings.camera
+    row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
+    if not drawn:
+        layout.label(text="Needs a field first", icon="INFO")
     if made:
-        layout.operator("rosy.remove", text="Remove Pictures", icon="TRASH")
+        layout.operator("rosy.remove", icon="TRASH")
         _draw_how_to_see(layout, context)
     if drawn:
         _draw_view_transform(layout, context.scene)
 
 
-def _draw_bake(layout: bpy.types.UILayout, bake) -> None:
+def _draw_bake(layout: bpy.types.UILayout, bake: Any) -> None:
     box = layout.box().column(align=True)
     box.label(text=f"Drawn from {bake.camera}", icon="CAMERA_DATA")
     box.label(text=f"{bake.width} x {bake.height} pixels")
@@ -181,30 +185,53 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
             self.layout.operator("rosy.preset_apply", text=load_preset(name).name).preset = name
 
 
-def _group_panel(group: str) -> type[bpy.types.Panel]:
-    """A panel inside Look for one of `GROUPS`."""
+def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...]) -> type:
+    """A closed panel inside another that lists settings of `Scene.rosy`, or of its look."""
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        for name in GROUPS[group]:
-            column.prop(context.scene.rosy.look, name)
+        settings = context.scene.rosy
+        for name in names:
+            inside = settings.look if hasattr(settings.look, name) else settings
+            row = column.row()
+            row.active = _matters(settings, name)
+            row.prop(inside, name)
 
-    name = f"VIEW3D_PT_rosy_look_{group.lower()}"
     members = {
-        "__doc__": f"{group} of a look.",
-        "bl_label": group,
-        "bl_parent_id": "VIEW3D_PT_rosy_look",
+        "__doc__": f"{label}: settings of the picture.",
+        "bl_label": label,
+        "bl_parent_id": parent,
+        "bl_options": {"DEFAULT_CLOSED"},
         "draw": draw,
     }
-    return type(name, (_Sidebar, bpy.types.Panel), members)
+    return type(f"VIEW3D_PT_rosy_{group}", (_Sidebar, bpy.types.Panel), members)
+
+
+def _matters(settings: Any, name: str) -> bool:
+    """Whether a setting makes a difference beside the others as they are."""
+    look = settings.look
+    if name in {"magnitude_range", "colour_map"}:
+        return look.magnitude != "none" and (name, look.magnitude) != ("colour_map", "length")
+    if name == "light":
+        return look.shading > 0
+    if name == "directory":
+        return settings.store == "SAVED"
+    if name == "crease_angle":
+        return not look.cross_creases
+    return True
 
 
 CLASSES = (
     VIEW3D_MT_rosy_presets,
     VIEW3D_PT_rosy,
     VIEW3D_PT_rosy_look,
-    *map(_group_panel, GROUPS),
+    *(
+        _settings_panel(label, "VIEW3D_PT_rosy_look", f"look_{label.lower()}", names)
+        for label, names in GROUPS.items()
+    ),
+    _settings_panel("Output", "VIEW3D_PT_rosy", "output", OUTPUT),
+    _settings_panel("Advanced", "VIEW3D_PT_rosy", "advanced", (*OTHERS, "undefined")),
 )

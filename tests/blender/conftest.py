@@ -74,7 +74,7 @@ def contents():
         names["object " + thing.name] = [
             [modifier.name for modifier in thing.modifiers],
             [slot.name for slot in thing.material_slots],
-            sorted(thing.keys()),
+            sorted(set(thing.keys()) - {"rosy"}),
         ]
     for mesh in bpy.data.meshes:
         names["mesh " + mesh.name] = [

@@ -88,7 +88,7 @@ def _read_rawfield(rows: Rows, surface: Surface) -> tuple[int, np.ndarray]:
     degree, count, numbers = _header(rows, "degree", "count")
     degree = _degree(rows, 0, degree)
     members = _table(rows, numbers, 3 * degree, count, surface).reshape(-1, degree, 3)
-    _check_members(rows.path, members, surface)
+    check_members(rows.path, members, surface)
     vectors = members[:, 0].copy()
     vectors[~np.isfinite(members).all(axis=(1, 2))] = np.nan
     return degree, vectors
@@ -138,7 +138,7 @@ def _table(rows: Rows, numbers: int, columns: int, count: int, surface: Surface)
     return rows.floats("part of a vector")[2:].reshape(found, columns)
 
 
-def _check_members(path: Path, members: np.ndarray, surface: Surface) -> None:
+def check_members(path: Path, members: np.ndarray, surface: Surface) -> None:
     """Raise an error unless the members of each row are a RoSy, in whatever order.
 
     `members` is (n, N, 3). Rows that hold zeros alone, or anything not finite, are left out.

@@ -1,0 +1,169 @@
+"""The main job: read the scene, project it, compose the picture, apply it to the objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from .compositor.compose import composing
+from .compositor.look import Look
+from .errors import RosyError
+from .progress import Progress, Work, drain, part
+from .projection.camera import Camera, check_size
+from .projection.project import projecting
+from .scene.apply import Baked, Settings, Shot, apply_picture, check_appliable, settings_of
+from .scene.bodies import read_scene
+from .scene.cameras import camera_of_object, picture_size, render_camera, scene_cameras
+from .scene.lights import read_lights
+from .scene.looks import look_of
+
+__all__ = ["ALL_CAMERAS", "Baked", "bake", "baking"]
+
+#: Draw from every camera in the scene.
+ALL_CAMERAS = "ALL"
+
+Source = bpy.types.Object | Camera
+
+
+def baking(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph | None = None,
+    *,
+    objects: Sequence[bpy.types.Object] | None = None,
+    camera: Source | str | None = None,
+    look: Look | None = None,
+    size: tuple[int, int] | None = None,
+    settings: Settings | None = None,
+) -> Work[list[Baked]]:
+    """Draw the fields of a scene and put the pictures on the objects.
+
+    Nothing is changed in the scene until all pictures are there: closing the generator before
+    leaves no trace. Blender's data is read in the first step, at once.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph, optional
+        That of the scene's view layer in the context, or else its first, if not given.
+    objects : sequence of bpy.types.Object, optional
+        Whose fields are drawn; all that have one if not given. Everything else hides.
+    camera : bpy.types.Object, Camera, ALL_CAMERAS, optional
+        The scene's own if not given. A `Camera` is taken in its own size, as for a 3D view
+        (`camera_of_view`).
+    look : Look, optional
+        The scene's if not given.
+    size : (int, int), optional
+        Of the picture in pixels; if not given, that of renders, in the percentage that
+        ``scene.rosy`` says.
+    settings : Settings, optional
+        How the pictures get into the scene; as ``scene.rosy`` says if not given.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    list of Baked
+        One a camera; the objects show the last one's.
+
+    Raises
+    ------
+    RosyError
+        If there is nothing to draw or it cannot be drawn; see `read_scene`, `camera_of_object`,
+        `projecting` and `check_appliable`.
+    """
+    look = look_of(scene.rosy) if look is None else look
+    settings = settings_of(scene) if settings is None else settings
+    sources = _sources(scene, camera)
+    yield Progress(0.0, "reading the scene")
+    depsgraph = _depsgraph(scene) if depsgraph is None else depsgraph
+    cameras = [_camera(scene, depsgraph, source, size) for source in sources]
+    fine = [_scaled(view, look.supersampling) for view in cameras]
+    reading = read_scene(depsgraph, objects, _undefined(scene))
+    lights = [read_lights(depsgraph, view.view) for view in cameras]
+    check_appliable(reading.owners, settings)
+    shots = []
+    for number, source in enumerate(sources):
+        start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
+        middle = start + 0.4 * (stop - start)
+        gbuffer = yield from part(
+            projecting(reading.bodies, fine[number], look.display), start, middle
+        )
+        picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
+        own = source if isinstance(source, bpy.types.Object) else None
+        shots.append(Shot(picture, cameras[number], look, own))
+    yield Progress(0.97, "putting the picture on")
+    return [apply_picture(scene, reading, shot, settings) for shot in shots]
+
+
+def bake(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph | None = None,
+    *,
+    objects: Sequence[bpy.types.Object] | None = None,
+    camera: Source | str | None = None,
+    look: Look | None = None,
+    size: tuple[int, int] | None = None,
+    settings: Settings | None = None,
+) -> list[Baked]:
+    """`baking`, run to its end."""
+    return drain(
+        baking(
+            scene,
+            depsgraph,
+            objects=objects,
+            camera=camera,
+            look=look,
+            size=size,
+            settings=settings,
+        )
+    )
+
+
+def _sources(scene: bpy.types.Scene, camera: Source | str | None) -> list[Source]:
+    if camera is None:
+        return [render_camera(scene)]
+    if camera == ALL_CAMERAS:
+        return list(scene_cameras(scene))
+    if isinstance(camera, str):
+        raise RosyError(f"camera is '{camera}', not a camera or {ALL_CAMERAS}")
+    return [camera]
+
+
+def _camera(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    source: Source,
+    size: tuple[int, int] | None,
+) -> Camera:
+    if isinstance(source, Camera):
+        return source
+    if size is None:
+        size = picture_size(scene, scene.rosy.percentage)
+    return camera_of_object(scene, depsgraph, source, *check_size(*size))
+
+
+def _scaled(camera: Camera, factor: int) -> Camera:
+    """The same camera with more pixels."""
+    return Camera(
+        camera.view,
+        np.array(camera.projection),
+        camera.width * factor,
+        camera.height * factor,
+        camera.name,
+    )
+
+
+def _undefined(scene: bpy.types.Scene) -> str:
+    return "zero" if scene.rosy.undefined else "error"
+
+
+def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    context = bpy.context
+    if context.scene == scene:
+        return context.evaluated_depsgraph_get()
+    with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        return context.evaluated_depsgraph_get()

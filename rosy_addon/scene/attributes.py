@@ -1,0 +1,287 @@
+"""Fields as attributes of meshes.
+
+The convention: a vector attribute (FLOAT_VECTOR) on faces, one member in object space each, its
+length the magnitude and zero where the field is undefined. Name and degree are in ``mesh.rosy``.
+Also read are
+
+- such vectors on points, averaged onto the faces, and on corners, likewise;
+- ``dir0`` ... ``dir{N-1}``, the N members of each face, which have to be a RoSy;
+- a float on faces: the angle of a member from the face's first edge, counter-clockwise about its
+  normal, in radians; the magnitude is 1, and NaN is undefined where that is asked for.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..errors import RosyError
+from ..field.check import checked_field, into_planes, tangent_normals
+from ..field.fieldfile import check_members
+from ..field.frames import tangent_frame, unit
+from ..field.representation import face_frames, from_representation, to_representation
+from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
+from ..field.surface import Surface, mean_over_faces
+from .capabilities import has_properties, is_editable
+from .meshes import flush_edit_mode, mesh_surface
+
+DEFAULT_NAME = "rosy"
+DEFAULT_DEGREE = 4
+
+_VECTOR, _FLOAT = "FLOAT_VECTOR", "FLOAT"
+
+
+def attribute_name(mesh: bpy.types.Mesh) -> str:
+    """What the mesh's field is called."""
+    return (mesh.rosy.attribute if has_properties() else "") or DEFAULT_NAME
+
+
+def field_degree(mesh: bpy.types.Mesh) -> int:
+    """The degree of the mesh's field."""
+    return mesh.rosy.degree if has_properties() else DEFAULT_DEGREE
+
+
+def has_field(thing: bpy.types.Object) -> bool:
+    """Whether an object is a mesh with a field on it, good or not."""
+    if thing.type != "MESH" or thing.data is None:
+        return False
+    attributes = thing.data.attributes
+    return attribute_name(thing.data) in attributes or "dir0" in attributes
+
+
+def is_native(mesh: bpy.types.Mesh, name: str | None = None) -> bool:
+    """Whether the field is stored by the convention proper: vectors on faces."""
+    attribute = mesh.attributes.get(name or attribute_name(mesh))
+    return attribute is not None and (attribute.domain, attribute.data_type) == ("FACE", _VECTOR)
+
+
+def read_mesh_field(
+    mesh: bpy.types.Mesh,
+    name: str | None = None,
+    degree: int | None = None,
+    surface: Surface | None = None,
+    *,
+    undefined: str = "error",
+    owner: str | None = None,
+) -> RosyField:
+    """The field of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        May be in edit mode.
+    name : str, optional
+        Of the attribute; ``mesh.rosy.attribute`` if not given.
+    degree : int, optional
+        ``mesh.rosy.degree`` if not given.
+    surface : Surface, optional
+        Of the mesh, if it is at hand.
+    undefined : {"error", "zero"}
+        What to do about NaN and infinite values: refuse them, or call them undefined.
+    owner : str, optional
+        What to call the mesh in messages.
+
+    Raises
+    ------
+    RosyError
+        If there is no such attribute, it is of another type or on another domain, or its values
+        are not a field on the mesh (see `checked_field`). The message names mesh and attribute.
+    """
+    owner = f"mesh '{mesh.name}'" if owner is None else owner
+    flush_edit_mode(mesh)
+    surface = mesh_surface(mesh, owner) if surface is None else surface
+    wanted = name or attribute_name(mesh)
+    degree = check_degree(field_degree(mesh) if degree is None else degree)
+    if wanted not in mesh.attributes and "dir0" in mesh.attributes:
+        return _read_members(mesh, surface, undefined, owner)
+    attribute = mesh.attributes.get(wanted)
+    if attribute is None:
+        raise RosyError(
+            f"{owner} has no attribute '{wanted}'; a vector on faces is wanted{_others(mesh)}"
+        )
+    source = f"{owner}, attribute '{wanted}'"
+    values = _values(attribute, source, mesh)
+    if attribute.data_type == _FLOAT:
+        return _from_angles(surface, values, degree, source, undefined)
+    if attribute.domain == "CORNER":
+        return _from_corners(surface, values, degree, source, undefined)
+    domain = {"FACE": "face", "POINT": "vertex"}[attribute.domain]
+    return checked_field(surface, values, degree, source, undefined, domain)
+
+
+def read_carried_field(
+    mesh: bpy.types.Mesh, name: str, degree: int, surface: Surface, undefined: str, owner: str
+) -> RosyField:
+    """The field of an evaluated mesh, whose faces a modifier may have made anew.
+
+    The vectors are in the planes of the faces they come from, which `Surface.rest` keeps but for
+    the warp of its polygons; so they are turned into the faces' planes, however far that is.
+
+    Raises
+    ------
+    RosyError
+        If values are not finite.
+    """
+    source = f"{owner}, attribute '{name}'"
+    attribute = mesh.attributes[name]
+    vectors = _values(attribute, source, mesh).astype(np.float64)
+    _settle(vectors, source, undefined)
+    return RosyField(
+        degree, into_planes(vectors, tangent_normals(surface, "face"), 180.0, source, "face")
+    )
+
+
+def write_mesh_field(
+    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_NAME
+) -> bpy.types.Attribute:
+    """Store a field on a mesh, in place of one of the same name.
+
+    Raises
+    ------
+    RosyError
+        If the mesh is linked from a library or in edit mode, has another number of faces, or the
+        name belongs to an attribute of another kind. Nothing is changed then.
+    """
+    name = name or DEFAULT_NAME
+    _check_writable(mesh)
+    faces = len(mesh.polygons)
+    if len(field.vectors) != faces:
+        raise RosyError(
+            f"mesh '{mesh.name}' has {faces} faces, but the field has {len(field.vectors)}"
+        )
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", _VECTOR):
+        raise RosyError(
+            f"mesh '{mesh.name}' has an attribute '{name}' of another kind, {_kind(attribute)}; "
+            "remove it, or give the field another name"
+        )
+    if attribute is None:
+        attribute = mesh.attributes.new(name, _VECTOR, "FACE")
+        if attribute is None or attribute.name != name:
+            if attribute is not None:
+                mesh.attributes.remove(attribute)
+            raise RosyError(f"mesh '{mesh.name}': an attribute cannot be named '{name}'")
+    attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    if has_properties():
+        mesh.rosy.degree, mesh.rosy.attribute = field.degree, name
+    mesh.update()
+    return attribute
+
+
+def _check_writable(mesh: bpy.types.Mesh) -> None:
+    if not is_editable(mesh):
+        library = mesh.library.filepath if mesh.library else "its library"
+        raise RosyError(
+            f"mesh '{mesh.name}' is linked from {library}: make it local to give it a field"
+        )
+    if mesh.is_editmode:
+        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave it (Tab) to give it a field")
+
+
+def _values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Mesh) -> np.ndarray:
+    """(n, 3) vectors or (n,) angles, float32.
+
+    Raises
+    ------
+    RosyError
+        If the attribute is of another type, or where a field cannot be.
+    """
+    kind = (attribute.domain, attribute.data_type)
+    vectors = [(domain, _VECTOR) for domain in ("FACE", "POINT", "CORNER")]
+    if kind not in [*vectors, ("FACE", _FLOAT)]:
+        raise RosyError(
+            f"{source}: found {_kind(attribute)}; wanted FLOAT_VECTOR on FACE (or POINT or "
+            "CORNER), or angles as FLOAT on FACE"
+        )
+    columns = 3 if attribute.data_type == _VECTOR else 1
+    size = {"FACE": mesh.polygons, "POINT": mesh.vertices, "CORNER": mesh.loops}
+    if len(attribute.data) != len(size[attribute.domain]):
+        raise RosyError(f"{source}: cannot be read in edit mode: leave it (Tab) first")
+    values = np.empty(len(attribute.data) * columns, dtype=np.float32)
+    attribute.data.foreach_get("vector" if columns == 3 else "value", values)
+    return values.reshape(-1, 3) if columns == 3 else values
+
+
+def _kind(attribute: bpy.types.Attribute) -> str:
+    return f"{attribute.data_type} on {attribute.domain}"
+
+
+def _others(mesh: bpy.types.Mesh) -> str:
+    """Attributes that could be meant, for a message."""
+    names = [
+        f"'{other.name}'"
+        for other in mesh.attributes
+        if other.data_type == _VECTOR and other.name not in ("position", "rest_position")
+    ]
+    return f"; there are {', '.join(names)}" if names else ""
+
+
+def _settle(values: np.ndarray, source: str, undefined: str) -> None:
+    """Refuse rows that are not finite, or make them zero, in place."""
+    lost = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    if not lost.any():
+        return
+    if undefined == "error":
+        raise RosyError(
+            f"{source}: {lost.sum()} of {len(values)} values are not finite, the first is number "
+            f"{int(np.argmax(lost))}; ask for them to be undefined, or mend them"
+        )
+    values[lost] = 0.0
+
+
+def _read_members(mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner: str) -> RosyField:
+    """From ``dir0`` ... ``dir{N-1}``; N is how many there are."""
+    degree = 0
+    while f"dir{degree}" in mesh.attributes:
+        degree += 1
+    if degree > MAX_DEGREE:
+        raise RosyError(f"{owner}: has {degree} attributes dir0 ..., at most {MAX_DEGREE} are read")
+    first = mesh.attributes["dir0"]
+    members = []
+    for number in range(degree):
+        attribute = mesh.attributes[f"dir{number}"]
+        source = f"{owner}, attribute 'dir{number}'"
+        kind = (attribute.domain, attribute.data_type)
+        if kind not in (("FACE", _VECTOR), ("POINT", _VECTOR)) or attribute.domain != first.domain:
+            raise RosyError(
+                f"{source}: found {_kind(attribute)}; wanted FLOAT_VECTOR on FACE or POINT, the "
+                "same for all members"
+            )
+        members.append(_values(attribute, source, mesh))
+    members = np.stack(members, axis=1).astype(np.float64)
+    source = f"{owner}, attributes dir0 to dir{degree - 1}"
+    check_members(source, members, surface)
+    vectors = members[:, 0].copy()
+    vectors[~np.isfinite(members).all(axis=(1, 2))] = np.nan
+    domain = {"FACE": "face", "POINT": "vertex"}[first.domain]
+    return checked_field(surface, vectors, degree, source, undefined, domain)
+
+
+def _from_angles(
+    surface: Surface, angles: np.ndarray, degree: int, source: str, undefined: str
+) -> RosyField:
+    x, y = face_frames(surface)
+    angles = angles.astype(np.float64)
+    defined = np.isfinite(angles)
+    _settle(angles, source, undefined)
+    vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
+    return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
+
+
+def _from_corners(
+    surface: Surface, vectors: np.ndarray, degree: int, source: str, undefined: str
+) -> RosyField:
+    """Turned into the face's plane at each corner, then averaged as RoSys."""
+    vectors = vectors.astype(np.float64)
+    _settle(vectors, source, undefined)
+    normal = surface.face_normal
+    of_corner = normal[surface.corner_face]
+    vectors = into_planes(vectors, of_corner, CORNER_TOLERANCE, source, "corner")
+    x, y = tangent_frame(normal)
+    z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
+    mean = from_representation(mean_over_faces(z, surface.face_start), x, y, degree)
+    return RosyField(degree, np.where(unit(normal).any(axis=1)[:, None], mean, 0.0))
+
+
+#: Vectors on corners may be tangent to a smooth surface there rather than to the face: degrees.
+CORNER_TOLERANCE = 30.0

@@ -1,0 +1,308 @@
+"""What is in front of the camera: evaluated meshes, their fields, and all that hides them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..errors import RosyError
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..projection.gbuffer import Body
+from .attributes import (
+    attribute_name,
+    field_degree,
+    has_field,
+    is_native,
+    read_carried_field,
+    read_mesh_field,
+)
+from .capabilities import has_properties, is_editable
+from .meshes import mesh_surface
+
+#: Objects that can be turned into a mesh.
+SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+
+#: Custom property on every datablock that RoSy made.
+MADE = "rosy_made"
+
+#: Face vectors standing in, while a scene is read, for a field that is stored in another way.
+STAND_IN = "rosy_stand_in"
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A scene as arrays.
+
+    Attributes
+    ----------
+    bodies : list of Body
+        One an instance; first those with a field.
+    owners : list of bpy.types.Object
+        The original object of each body with a field, in the same order.
+    """
+
+    bodies: list[Body]
+    owners: list[bpy.types.Object]
+
+
+def rosy_objects(
+    view_layer: bpy.types.ViewLayer, names: Iterable[str] | None = None
+) -> list[bpy.types.Object]:
+    """The mesh objects with a field that renders of a view layer show, by name.
+
+    Those in collections that are instanced in it, too.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer
+    names : iterable of str, optional
+        Only these.
+
+    Raises
+    ------
+    RosyError
+        If one of the names is not there, has no field or is hidden.
+    """
+    found = {
+        thing.name: thing
+        for thing in _shown_objects(view_layer)
+        if has_field(thing) and _is_included(thing)
+    }
+    if names is None:
+        return [found[name] for name in sorted(found)]
+    return [_named(name, found) for name in dict.fromkeys(names)]
+
+
+def read_bodies(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object] | None = None,
+    undefined: str = "error",
+) -> list[Body]:
+    """The bodies of `read_scene`."""
+    return read_scene(depsgraph, objects, undefined).bodies
+
+
+def read_scene(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object] | None = None,
+    undefined: str = "error",
+) -> Reading:
+    """All that a camera could see, as arrays.
+
+    Modifiers, shape keys and armatures have had their say, and every instance stands for itself.
+    Of a modifier that has one, it is the setting for the viewport that counts. Undeformed positions
+    are read of all objects with a field that deform; for that Blender's own option for them is
+    switched on meanwhile.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Of a view layer.
+    objects : sequence of bpy.types.Object, optional
+        Original objects whose fields are drawn, everything else only hides; all of `rosy_objects`
+        if not given.
+    undefined : {"error", "zero"}
+        What to do about vectors that are not finite.
+
+    Raises
+    ------
+    RosyError
+        If there are no objects with a field, one of them is nowhere to be seen, or its field cannot
+        be read or is lost on the way through its modifiers.
+    """
+    view_layer = depsgraph.view_layer
+    objects = rosy_objects(view_layer) if objects is None else list(objects)
+    if not objects:
+        raise RosyError("no visible object has a RoSy field: make or import one first")
+    shown = set(_shown_objects(view_layer))
+    with _prepared(depsgraph, objects, undefined) as names:
+        reader = _Reader(names, undefined)
+        for instance in depsgraph.object_instances:
+            if _is_seen(instance, shown):
+                reader.add(instance)
+    reader.check_found(objects)
+    return Reading(
+        [body for body, _ in reader.drawn] + reader.hiding, [owner for _, owner in reader.drawn]
+    )
+
+
+class _Reader:
+    """Collects bodies; one surface and one field an evaluated mesh, however many instances."""
+
+    def __init__(self, names: dict[bpy.types.Object, tuple[str, int]], undefined: str) -> None:
+        self.names = names
+        self.undefined = undefined
+        self.drawn: list[tuple[Body, bpy.types.Object]] = []
+        self.hiding: list[Body] = []
+        self.read: dict[tuple, tuple[Surface, RosyField | None] | None] = {}
+
+    def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        thing = instance.object
+        owner = thing.original
+        name_and_degree = self.names.get(owner)
+        key = (thing.type, thing.data.as_pointer(), owner if name_and_degree else None)
+        if key not in self.read:
+            self.read[key] = self._read(thing, name_and_degree)
+        if self.read[key] is None:
+            return
+        surface, field = self.read[key]
+        body = Body(surface, np.array(instance.matrix_world, dtype=np.float64), field)
+        if field is None:
+            self.hiding.append(body)
+        else:
+            self.drawn.append((body, owner))
+
+    def _read(
+        self, thing: bpy.types.Object, name_and_degree: tuple[str, int] | None
+    ) -> tuple[Surface, RosyField | None] | None:
+        mesh = thing.to_mesh()
+        try:
+            if mesh is None or not len(mesh.polygons):
+                return None
+            if name_and_degree is None or name_and_degree[0] not in mesh.attributes:
+                return mesh_surface(mesh, thing.name, plain=True), None
+            name, degree = name_and_degree
+            owner = f"object '{thing.name}'"
+            surface = mesh_surface(mesh, owner, rest=True)
+            field = read_carried_field(mesh, name, degree, surface, self.undefined, owner)
+            return surface, field
+        finally:
+            thing.to_mesh_clear()
+
+    def check_found(self, objects: Sequence[bpy.types.Object]) -> None:
+        found = {owner for _, owner in self.drawn}
+        seen = {key[2] for key in self.read}
+        for thing in objects:
+            if thing in found:
+                continue
+            if thing not in seen:
+                raise RosyError(f"object '{thing.name}' has a field, but is hidden in the viewport")
+            faceless = all(value is None for key, value in self.read.items() if key[2] == thing)
+            what = "has no faces" if faceless else f"has lost attribute '{self.names[thing][0]}'"
+            raise RosyError(
+                f"object '{thing.name}': after its modifiers "
+                f"({', '.join(modifier.name for modifier in own_modifiers(thing)) or 'none'}) "
+                f"the mesh {what}"
+            )
+
+
+def own_modifiers(thing: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """The user's modifiers: all but those that RoSy put there."""
+    return [modifier for modifier in thing.modifiers if not is_rosy_modifier(modifier)]
+
+
+def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
+    """Whether RoSy put it there."""
+    group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
+    return group is not None and bool(group.get(MADE))
+
+
+@contextmanager
+def _prepared(
+    depsgraph: bpy.types.Depsgraph, objects: Sequence[bpy.types.Object], undefined: str
+) -> Iterator[dict[bpy.types.Object, tuple[str, int]]]:
+    """Have Blender carry along undeformed positions, and fields stored in other ways.
+
+    Yields the attribute and degree of each object's field in its evaluated mesh. All fields are
+    checked on the meshes as they are without modifiers.
+    """
+    names: dict[bpy.types.Object, tuple[str, int]] = {}
+    switched: list[bpy.types.Object] = []
+    lent: dict[bpy.types.Mesh, int] = {}
+    try:
+        for thing in objects:
+            mesh, owner = thing.data, f"object '{thing.name}'"
+            field = read_mesh_field(mesh, undefined=undefined, owner=owner)
+            names[thing] = (attribute_name(mesh), field.degree)
+            if mesh in lent or not is_native(mesh):
+                if mesh not in lent:
+                    lent[mesh] = field.degree
+                    _lend(mesh, field, owner)
+                names[thing] = (STAND_IN, field.degree)
+            deforms = own_modifiers(thing) or mesh.shape_keys
+            if deforms and is_editable(thing) and not thing.add_rest_position_attribute:
+                thing.add_rest_position_attribute = True
+                switched.append(thing)
+        depsgraph.update()
+        yield names
+    finally:
+        for thing in switched:
+            thing.add_rest_position_attribute = False
+        for mesh in lent:
+            if STAND_IN in mesh.attributes:
+                mesh.attributes.remove(mesh.attributes[STAND_IN])
+                mesh.update_tag()
+        depsgraph.update()
+
+
+def _lend(mesh: bpy.types.Mesh, field: RosyField, owner: str) -> None:
+    """Store a field on a mesh as vectors on faces, for as long as it is read."""
+    if not is_editable(mesh) or mesh.is_editmode:
+        why = "in edit mode" if mesh.is_editmode else "linked"
+        raise RosyError(
+            f"{owner}: its mesh is {why}; there its field can be read only as vectors on faces"
+        )
+    attribute = mesh.attributes.new(STAND_IN, "FLOAT_VECTOR", "FACE")
+    attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    mesh.update_tag()
+
+
+def _is_seen(instance: bpy.types.DepsgraphObjectInstance, shown: set[bpy.types.Object]) -> bool:
+    """Whether a render shows this."""
+    thing = instance.object
+    if thing.type not in SOLID or not instance.show_self or not thing.visible_camera:
+        return False
+    if instance.is_instance:
+        by = instance.parent
+        return not thing.original.hide_render and (by is None or by.original in shown)
+    return thing.original in shown
+
+
+def _is_included(thing: bpy.types.Object) -> bool:
+    return thing.rosy.include if has_properties() else True
+
+
+def _shown_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """Original objects that renders of a view layer show, directly or in instanced collections."""
+    found: dict[bpy.types.Object, None] = {}
+
+    def add(thing: bpy.types.Object) -> None:
+        if thing.hide_render or thing in found:
+            return
+        found[thing] = None
+        if thing.instance_type == "COLLECTION" and thing.instance_collection is not None:
+            for inner in thing.instance_collection.all_objects:
+                add(inner)
+
+    def walk(layer: bpy.types.LayerCollection) -> None:
+        if layer.exclude or layer.collection.hide_render:
+            return
+        for thing in layer.collection.objects:
+            add(thing)
+        for child in layer.children:
+            walk(child)
+
+    walk(view_layer.layer_collection)
+    return list(found)
+
+
+def _named(name: str, found: dict[str, bpy.types.Object]) -> bpy.types.Object:
+    if name in found:
+        return found[name]
+    thing = bpy.data.objects.get(name)
+    if thing is None:
+        raise RosyError(f"there is no object '{name}'")
+    if thing.type != "MESH":
+        raise RosyError(f"object '{name}' is a {thing.type.lower()}, not a mesh")
+    if not has_field(thing):
+        wanted = attribute_name(thing.data)
+        raise RosyError(
+            f"object '{name}' has no attribute '{wanted}'; degree {field_degree(thing.data)} and "
+            "a vector on faces are wanted: make or import a field first"
+        )
+    raise RosyError(f"object '{name}' is hidden in renders of this view layer, or switched off")

@@ -1,0 +1,20 @@
+"""What this Blender can do, asked of it rather than told from its version."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def has_properties() -> bool:
+    """Whether RoSy's own properties are registered, as they are while the extension is on."""
+    return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
+
+
+def is_editable(thing: bpy.types.ID) -> bool:
+    """Whether a datablock may be changed: local, or a library override."""
+    return thing.library is None and getattr(thing, "is_editable", True)
+
+
+def can_show_nodes_by_default(material: bpy.types.Material) -> bool:
+    """Whether a material has nodes without being told so (from 5.0 on telling it is deprecated)."""
+    return material.node_tree is not None and len(material.node_tree.nodes) > 0

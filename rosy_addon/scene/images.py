@@ -1,0 +1,148 @@
+"""Pictures as Blender's images."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..compositor.colour import to_display, to_linear
+from ..compositor.picture import Picture
+from ..compositor.png import write_png
+from ..errors import RosyError
+from ..files import check_writable
+
+#: How far, in pixels, colours are carried on past the border of what is covered, so that a render
+#: whose border differs by a little (other subdivision, filtering) still finds the picture there.
+MARGIN = 4
+
+#: What is shown where there is no picture: mid grey on screen, in linear light.
+NEUTRAL = float(to_linear(np.array(0.5, dtype=np.float32)))
+
+
+def new_image(
+    name: str, picture: Picture, *, as_float: bool = False, folder: Path | None = None
+) -> bpy.types.Image:
+    """A new image of a picture.
+
+    Parameters
+    ----------
+    name : str
+    picture : Picture
+    as_float : bool
+        Linear values in single precision, an .exr file; 8 bits sRGB, a .png file, if not.
+    folder : Path, optional
+        Where to save it; packed into the .blend file if not given.
+
+    Raises
+    ------
+    RosyError
+        If it cannot be written. No image is left then.
+    """
+    rgba = with_margin(picture.rgba)
+    height, width = rgba.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
+    try:
+        image.alpha_mode = "CHANNEL_PACKED"
+        image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
+        if not as_float:
+            rgba[..., :3] = to_display(rgba[..., :3])
+        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        image.update()
+        if folder is None:
+            image.pack()
+        else:
+            _save(image, picture, folder, as_float)
+    except BaseException:
+        bpy.data.images.remove(image)
+        raise
+    return image
+
+
+def with_margin(rgba: np.ndarray) -> np.ndarray:
+    """A picture with the colours of its border carried on by `MARGIN` pixels, and neutral beyond.
+
+    Alpha stays: it says what is covered.
+    """
+    rgba = rgba.copy()
+    colour, known = rgba[..., :3], rgba[..., 3] > 0
+    colour[~known] = NEUTRAL
+    for _ in range(MARGIN):
+        total = np.zeros_like(colour)
+        count = np.zeros(known.shape, dtype=np.float32)
+        for here, there in _NEIGHBOURS:
+            total[here] += colour[there] * known[there][..., None]
+            count[here] += known[there]
+        fresh = ~known & (count > 0)
+        colour[fresh] = total[fresh] / count[fresh][:, None]
+        known |= fresh
+    return rgba
+
+
+def check_folder(folder: Path) -> None:
+    """Find out before long work whether pictures can be saved to a folder; make it if need be.
+
+    Raises
+    ------
+    RosyError
+        If not.
+    """
+    if str(folder).startswith("//"):
+        raise RosyError(f"{folder}: save the .blend file first, or choose another folder")
+    if not folder.exists():
+        parent = next((up for up in folder.parents if up.exists()), folder)
+        if not parent.is_dir() or not os.access(parent, os.W_OK):
+            raise RosyError(f"{folder}: cannot be made: {parent} may not be written")
+        return
+    if not folder.is_dir():
+        raise RosyError(f"{folder}: is not a folder")
+    check_writable(folder / "picture.png")
+
+
+def _save(image: bpy.types.Image, picture: Picture, folder: Path, as_float: bool) -> None:
+    path = folder / f"{bpy.path.clean_name(image.name)}{'.exr' if as_float else '.png'}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise RosyError(f"{folder}: cannot be made: {reason.strerror.lower()}") from reason
+    check_writable(path)
+    if as_float:
+        image.file_format = "OPEN_EXR"
+        image.filepath_raw = str(path)
+        try:
+            image.save()
+        except RuntimeError as reason:
+            raise RosyError(f"{path}: cannot be written: {reason}") from reason
+    else:
+        write_png(path, with_margin(picture.rgba))
+        image.file_format = "PNG"
+    image.source = "FILE"
+    image.filepath = _relative(path)
+    image.reload()
+
+
+def _relative(path: Path) -> str:
+    """As Blender writes paths beside a saved file."""
+    try:
+        return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    except ValueError:
+        return str(path)  # another drive
+
+
+def _shifted(step: int) -> tuple[slice, slice]:
+    if step == 0:
+        return slice(None), slice(None)
+    return (slice(1, None), slice(None, -1)) if step > 0 else (slice(None, -1), slice(1, None))
+
+
+_NEIGHBOURS = [
+    (
+        (_shifted(row)[0], _shifted(column)[0]),
+        (_shifted(row)[1], _shifted(column)[1]),
+    )
+    for row in (-1, 0, 1)
+    for column in (-1, 0, 1)
+    if row or column
+]

@@ -1,0 +1,35 @@
+"""A look as Blender's properties, and back."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from ..compositor.look import Look
+
+
+def look_of(settings: Any) -> Look:
+    """The look that properties hold.
+
+    Parameters
+    ----------
+    settings : PropertyGroup
+        ``scene.rosy``, or its ``look``.
+    """
+    group = getattr(settings, "look", settings)
+    return Look(**{entry.name: _exact(getattr(group, entry.name), entry) for entry in fields(Look)})
+
+
+def apply_look(settings: Any, look: Look) -> None:
+    """Give the properties of ``scene.rosy``, or its ``look``, the values of a look."""
+    group = getattr(settings, "look", settings)
+    for entry in fields(Look):
+        setattr(group, entry.name, getattr(look, entry.name))
+
+
+def _exact(value: Any, entry: Any) -> Any:
+    """The decimal number that was meant by one that Blender keeps in single precision."""
+    if not isinstance(value, float):
+        return value
+    value = float(f"{value:.7g}")
+    return min(max(value, entry.metadata["low"]), entry.metadata["high"])

@@ -1,0 +1,91 @@
+"""Blender's meshes as surfaces."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..errors import RosyError
+from ..field.surface import Surface, build_surface
+
+#: Attribute that Blender writes for objects with `add_rest_position_attribute`.
+REST = "rest_position"
+
+
+def mesh_surface(
+    mesh: bpy.types.Mesh, name: str | None = None, *, rest: bool = False, plain: bool = False
+) -> Surface:
+    """The surface of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Original or evaluated. One in edit mode is read as it is there.
+    name : str, optional
+        For messages; the mesh's own if not given.
+    rest : bool
+        Whether to read the undeformed positions from the attribute `REST`, where it is.
+    plain : bool
+        Whether no normals will be mixed on it: cheaper, for what only hides others.
+
+    Raises
+    ------
+    RosyError
+        If it has no faces (be it empty, or points and loose edges alone) or a coordinate that is
+        not finite.
+    """
+    name = mesh.name if name is None else name
+    flush_edit_mode(mesh)
+    faces = len(mesh.polygons)
+    if not faces:
+        has = "only points and loose edges" if len(mesh.vertices) else "nothing in it"
+        raise RosyError(f"{name}: the mesh has no faces to draw on, {has}")
+    corners = len(mesh.loops)
+    face_start = np.empty(faces + 1, dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", face_start[:-1])
+    face_start[-1] = corners
+    triangles = len(mesh.loop_triangles)
+    flat = np.ones(faces, dtype=bool) if plain else read_values(mesh, "sharp_face", bool, 1)
+    return build_surface(
+        _get(mesh.vertices, "co", np.float32, 3),
+        _get(mesh.loops, "vertex_index", np.int32),
+        face_start,
+        name=name,
+        sharp_edges=None if plain else _sharp_edges(mesh),
+        flat_faces=flat,
+        corner_normal=_get(mesh.corner_normals, "vector", np.float32, 3),
+        triangles=_get(mesh.loop_triangles, "loops", np.int32, 3) if triangles else None,
+        triangle_face=_get(mesh.loop_triangle_polygons, "value", np.int32) if triangles else None,
+        rest=read_values(mesh, REST, np.float32, 3) if rest else None,
+    )
+
+
+def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
+    """Bring a mesh up to date with what is being edited, if it is."""
+    if not mesh.is_editmode:
+        return
+    for thing in bpy.data.objects:
+        if thing.data == mesh and thing.mode == "EDIT":
+            thing.update_from_editmode()
+            return
+
+
+def read_values(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
+    """(n, columns), or (n,) for one column: the values of an attribute; None if there is none."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        return None
+    return _get(attribute.data, "vector" if columns == 3 else "value", dtype, columns)
+
+
+def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray | None:
+    sharp = read_values(mesh, "sharp_edge", bool, 1)
+    if sharp is None or not sharp.any():
+        return None
+    return _get(mesh.edges, "vertices", np.int32, 2)[sharp]
+
+
+def _get(collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1):
+    values = np.empty(len(collection) * columns, dtype=dtype)
+    collection.foreach_get(key, values)
+    return values.reshape(-1, columns) if columns > 1 else values

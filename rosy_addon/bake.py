@@ -9,20 +9,16 @@ import numpy as np
 
 from .compositor.compose import composing
 from .compositor.look import Look
-from .errors import RosyError
 from .progress import Progress, Work, drain, part
 from .projection.camera import Camera, check_size
 from .projection.project import projecting
 from .scene.apply import Baked, Settings, Shot, apply_picture, check_appliable, settings_of
 from .scene.bodies import read_scene
-from .scene.cameras import camera_of_object, picture_size, render_camera, scene_cameras
+from .scene.cameras import camera_of_object, picture_size, render_camera
 from .scene.lights import read_lights
 from .scene.looks import look_of
 
-__all__ = ["ALL_CAMERAS", "Baked", "bake", "baking"]
-
-#: Draw from every camera in the scene.
-ALL_CAMERAS = "ALL"
+__all__ = ["Baked", "bake", "baking"]
 
 Source = bpy.types.Object | Camera
 
@@ -32,7 +28,7 @@ def baking(
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     objects: Sequence[bpy.types.Object] | None = None,
-    camera: Source | str | None = None,
+    cameras: Sequence[Source] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
     settings: Settings | None = None,
@@ -49,13 +45,13 @@ def baking(
         That of the scene's view layer in the context, or else its first, if not given.
     objects : sequence of bpy.types.Object, optional
         Whose fields are drawn; all that have one if not given. Everything else hides.
-    camera : bpy.types.Object, Camera, ALL_CAMERAS, optional
-        The scene's own if not given. A `Camera` is taken in its own size, as for a 3D view
-        (`camera_of_view`).
+    cameras : sequence of bpy.types.Object or Camera, optional
+        From where; the camera that renders the scene if not given, `scene_cameras` for all. A
+        `Camera` is taken in its own size, as for a 3D view (`camera_of_view`).
     look : Look, optional
         The scene's if not given.
     size : (int, int), optional
-        Of the picture in pixels; if not given, that of renders, in the percentage that
+        Of the pictures in pixels; if not given, that of renders, in the percentage that
         ``scene.rosy`` says.
     settings : Settings, optional
         How the pictures get into the scene; as ``scene.rosy`` says if not given.
@@ -77,13 +73,13 @@ def baking(
     """
     look = look_of(scene.rosy) if look is None else look
     settings = settings_of(scene) if settings is None else settings
-    sources = _sources(scene, camera)
+    sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
     depsgraph = _depsgraph(scene) if depsgraph is None else depsgraph
-    cameras = [_camera(scene, depsgraph, source, size) for source in sources]
-    fine = [_scaled(view, look.supersampling) for view in cameras]
+    views = [_camera(scene, depsgraph, source, size) for source in sources]
+    fine = [_scaled(view, look.supersampling) for view in views]
     reading = read_scene(depsgraph, objects, _undefined(scene))
-    lights = [read_lights(depsgraph, view.view) for view in cameras]
+    lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
     shots = []
     for number, source in enumerate(sources):
@@ -93,8 +89,7 @@ def baking(
             projecting(reading.bodies, fine[number], look.display), start, middle
         )
         picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
-        own = source if isinstance(source, bpy.types.Object) else None
-        shots.append(Shot(picture, cameras[number], look, own))
+        shots.append(Shot(picture, views[number], look, _camera_object(scene, source)))
     yield Progress(0.97, "putting the picture on")
     return [apply_picture(scene, reading, shot, settings) for shot in shots]
 
@@ -104,7 +99,7 @@ def bake(
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     objects: Sequence[bpy.types.Object] | None = None,
-    camera: Source | str | None = None,
+    cameras: Sequence[Source] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
     settings: Settings | None = None,
@@ -115,7 +110,7 @@ def bake(
             scene,
             depsgraph,
             objects=objects,
-            camera=camera,
+            cameras=cameras,
             look=look,
             size=size,
             settings=settings,
@@ -123,14 +118,12 @@ def bake(
     )
 
 
-def _sources(scene: bpy.types.Scene, camera: Source | str | None) -> list[Source]:
-    if camera is None:
-        return [render_camera(scene)]
-    if camera == ALL_CAMERAS:
-        return list(scene_cameras(scene))
-    if isinstance(camera, str):
-        raise RosyError(f"camera is '{camera}', not a camera or {ALL_CAMERAS}")
-    return [camera]
+def _camera_object(scene: bpy.types.Scene, source: Source) -> bpy.types.Object | None:
+    """The scene's camera that a picture is from, None for a view."""
+    if not isinstance(source, Camera):
+        return source
+    thing = scene.objects.get(source.name)
+    return thing if thing is not None and thing.type == "CAMERA" else None
 
 
 def _camera(

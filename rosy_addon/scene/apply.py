@@ -93,7 +93,7 @@ class Bake:
     Attributes
     ----------
     camera : str
-        Name of the camera, or ``View``.
+        Name of the camera, or ``3D View``.
     width, height : int
         Pixels.
     image : bpy.types.Image

@@ -9,7 +9,7 @@ from ..errors import RosyError
 from ..projection.camera import Camera, check_size
 
 #: What a picture from a 3D view is named after.
-VIEW_NAME = "View"
+VIEW_NAME = "3D View"
 
 
 def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:

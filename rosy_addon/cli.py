@@ -10,7 +10,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
 def render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file."""
     check_writable(options.output)
-    look = _look(options)
+    look = _look(options, Look())
     surface, field = _mesh_and_field(options)
     matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
     camera = _camera(options, surface.vertices @ matrix[:3, :3].T, look.supersampling)
@@ -117,14 +117,60 @@ def info(options: argparse.Namespace) -> None:
 
 def bake(options: argparse.Namespace) -> None:
     """Draw the fields of a Blender file as its cameras see them."""
+    if options.out is None and not options.save:
+        raise RosyError("bake would keep nothing: give --out DIR for the pictures, --save, or both")
     try:
-        import bpy  # noqa: F401
+        import bpy
     except ImportError:
         raise RosyError(
             "bake needs Blender: start it as `blender -b SCENE.blend --command rosy bake`, "
             "or install its Python module, bpy"
         ) from None
-    raise RosyError("bake is not there yet")
+    from .bake import bake as bake_scene
+    from .scene.apply import settings_of
+    from .scene.bodies import rosy_objects
+    from .scene.files import open_file, save_file
+    from .scene.looks import look_of
+    from .ui.properties import ensure_registered
+
+    ensure_registered()
+    if options.scene is not None:
+        open_file(options.scene)
+    scene = bpy.context.scene
+    settings = settings_of(scene)
+    if options.out is not None:
+        settings = replace(settings, folder=options.out.resolve())
+    baked = bake_scene(
+        scene,
+        objects=rosy_objects(bpy.context.view_layer, options.object),
+        cameras=_cameras(scene, options),
+        look=_look(options, look_of(scene.rosy)),
+        size=options.size,
+        settings=settings,
+    )
+    for note in dict.fromkeys(note for picture in baked for note in picture.notes):
+        print(f"rosy: {note}", file=sys.stderr)
+    for picture in baked:
+        place = bpy.path.abspath(picture.image.filepath) if options.out else picture.image.name
+        print(f"{picture.camera}: {place}")
+    if options.save:
+        print(save_file())
+
+
+def _cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
+    """The chosen camera objects of a Blender scene; None for its own."""
+    from .scene.cameras import scene_cameras
+
+    if options.all_cameras:
+        return scene_cameras(scene)
+    if options.camera is None:
+        return None
+    if options.camera not in scene.objects:
+        names = ", ".join(f"'{thing.name}'" for thing in scene.objects if thing.type == "CAMERA")
+        raise RosyError(
+            f"there is no camera '{options.camera}' in scene '{scene.name}', only {names or 'none'}"
+        )
+    return [scene.objects[options.camera]]
 
 
 def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
@@ -141,8 +187,8 @@ def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
     return surface, generate(surface, kind, degree, axis=options.axis)
 
 
-def _look(options: argparse.Namespace) -> Look:
-    look = load_preset(options.preset).look if options.preset else Look()
+def _look(options: argparse.Namespace, default: Look) -> Look:
+    look = load_preset(options.preset).look if options.preset else default
     return look.with_settings(dict(_setting(text) for text in options.set))
 
 
@@ -208,7 +254,9 @@ def _parser(prog: str) -> argparse.ArgumentParser:
 
 def _add_bake(verbs: Any) -> None:
     verb = _verb(verbs, "bake", bake)
-    verb.add_argument("scene", nargs="?", metavar="SCENE.blend", help="the open file if not given")
+    verb.add_argument(
+        "scene", nargs="?", type=Path, metavar="SCENE.blend", help="the open file if not given"
+    )
     verb.add_argument(
         "--object", nargs="+", metavar="NAME", help="all that have a field if not given"
     )

@@ -1,7 +1,4 @@
-"""Build the extension with the builder that comes with Blender, and validate it.
-
-    python tools/build_zip.py FOLDER        with a Python that has bpy
-"""
+"""Build the extension into a folder, with the builder that comes with bpy, and validate it."""
 
 from __future__ import annotations
 

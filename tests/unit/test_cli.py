@@ -271,5 +271,10 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
 
 def test_bake_without_blender_says_so(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
-    assert main(["bake"]) == 2
+    assert main(["bake", "--save"]) == 2
     assert "bake needs Blender" in capsys.readouterr().err
+
+
+def test_bake_that_would_keep_nothing_is_refused(capsys):
+    assert main(["bake"]) == 2
+    assert "give --out DIR" in capsys.readouterr().err

@@ -24,7 +24,7 @@ MAY_IMPORT = {
     "scene": BASE | {"field", "projection", "compositor"},
     "bake": BASE | {"field", "projection", "compositor", "scene"},
     "ui": BASE | {"field", "projection", "compositor", "scene", "bake"},
-    "cli": BASE | {"field", "projection", "compositor", "scene", "bake"},
+    "cli": BASE | {"field", "projection", "compositor", "scene", "bake", "ui"},
     "__main__": {"cli"},
     "__init__": set(),
 }

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import bake, field_export, field_generate, field_import, preset_apply, remove, ticking
+from . import bake, field_export, field_generate, field_import, preset_apply, remove, show, ticking
 
-MODULES = (field_generate, field_import, field_export, bake, remove, preset_apply)
+MODULES = (field_generate, field_import, field_export, bake, show, remove, preset_apply)
 
 
 def register() -> None:

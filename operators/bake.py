@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import bpy
 
-from ..rosy_addon.bake import baking
+from ..rosy_addon.bake import Baked, Source, baking
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.progress import Work
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.bodies import rosy_objects
-from ..rosy_addon.scene.cameras import (
-    camera_of_object,
-    camera_of_view,
-    picture_size,
-    render_camera,
-    scene_cameras,
-)
-from ..rosy_addon.ui.properties import CAMERAS, look_of
+from ..rosy_addon.scene.cameras import camera_of_view, render_camera, scene_cameras
+from ..rosy_addon.ui.properties import CAMERAS
 from .meshes import is_idle
 from .ticking import Ticking
 
@@ -44,26 +37,24 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
             return False
         return True
 
-    def work(self, context: bpy.types.Context) -> Work[Any]:
-        scene = context.scene
-        depsgraph = context.evaluated_depsgraph_get()
-        cameras = self._cameras(context, depsgraph)
-        return baking(scene, depsgraph, cameras=cameras, look=look_of(scene.rosy))
+    def work(self, context: bpy.types.Context) -> Work[list[Baked]]:
+        return baking(context.scene, cameras=self._cameras(context))
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return rosy_objects(context.view_layer)
 
-    def finish(self, context: bpy.types.Context, result: Any) -> None:
-        self.report({"INFO"}, f"Baked {len(result)} picture{'s' * (len(result) != 1)}")
+    def finish(self, context: bpy.types.Context, result: list[Baked]) -> None:
+        names = ", ".join(f"'{baked.camera}'" for baked in result)
+        self.report({"INFO"}, f"Baked from {names}")
+        for note in dict.fromkeys(note for baked in result for note in baked.notes):
+            self.report({"WARNING"}, note)
 
-    def _cameras(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> list[Camera]:
+    def _cameras(self, context: bpy.types.Context) -> list[Source]:
         scene = context.scene
         chosen = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
         if chosen == "VIEW":
             return [_view_camera(context)]
-        found = scene_cameras(scene) if chosen == "ALL" else [render_camera(scene)]
-        size = picture_size(scene, scene.rosy.percentage)
-        return [camera_of_object(scene, depsgraph, thing, *size) for thing in found]
+        return scene_cameras(scene) if chosen == "ALL" else [render_camera(scene)]
 
 
 def _view_camera(context: bpy.types.Context) -> Camera:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.apply import bakes, remove
 from .meshes import is_idle
 
@@ -26,11 +25,8 @@ class ROSY_OT_remove(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            remove(context.scene)
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        removed = remove(context.scene)
+        self.report({"INFO"}, f"Removed {removed.images} pictures from {removed.objects} objects")
         return {"FINISHED"}
 
 

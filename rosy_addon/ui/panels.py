@@ -9,7 +9,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..compositor.presets import load_preset, preset_names
-from ..scene.apply import bakes
+from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
 from . import status
@@ -31,9 +31,6 @@ OTHERS = tuple(
 
 #: Settings of where the picture goes and how it shines there.
 OUTPUT = ("percentage", "placement", "emission", "diffuse", "store", "directory", "image_format")
-
-#: View transforms that show a picture's values as they were drawn.
-FAITHFUL_TRANSFORMS = {"Standard", "Raw"}
 
 
 class _Sidebar:
@@ -113,7 +110,7 @@ def _draw_picture(
         return
     made = bakes(context.scene)
     for bake in made:
-        _draw_bake(layout, bake)
+        _draw_bake(layout, bake, several=len(made) > 1)
     if drawn:
         layout.prop(context.scene.rosy, "camera")
         if len(drawn) > 1:
@@ -125,39 +122,49 @@ def _draw_picture(
         layout.label(text="Needs a field first", icon="INFO")
     if made:
         layout.operator("rosy.remove", icon="TRASH")
-        _draw_how_to_see(layout, context)
+        _draw_how_to_see(layout, context, made)
     if drawn:
         _draw_view_transform(layout, context.scene)
 
 
-def _draw_bake(layout: bpy.types.UILayout, bake: Any) -> None:
+def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:
     box = layout.box().column(align=True)
-    box.label(text=f"Drawn from {bake.camera}", icon="CAMERA_DATA")
+    row = box.row()
+    row.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
+    if several:
+        row.operator("rosy.show", text="Show").camera = bake.camera
     box.label(text=f"{bake.width} x {bake.height} pixels")
     if bake.stale:
-        box.label(text=f"Out of date: {bake.stale}", icon="ERROR")
+        box.label(text="Out of date:", icon="ERROR")
+        box.label(text=bake.stale)
     else:
         box.label(text="Up to date", icon="CHECKMARK")
 
 
 def _draw_progress(layout: bpy.types.UILayout) -> None:
-    layout.progress(factor=status.now.fraction, text=status.now.label)
+    layout.progress(factor=status.now.fraction, text=status.now.label.capitalize())
     layout.label(text="Press ESC to cancel")
 
 
-def _draw_how_to_see(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """A way to the picture from a view that does not show materials."""
-    if context.space_data.shading.type in {"WIREFRAME", "SOLID"}:
-        column = layout.column(align=True)
+def _draw_how_to_see(
+    layout: bpy.types.UILayout, context: bpy.types.Context, made: list[Bake]
+) -> None:
+    """A way to the picture from a view that does not show materials, or looks from elsewhere."""
+    view, camera = context.space_data, context.scene.camera
+    column = layout.column(align=True)
+    if view.shading.type in {"WIREFRAME", "SOLID"}:
         column.label(text="This view shows no materials", icon="INFO")
         button = column.operator("wm.context_set_enum", text="Show the Picture Here")
         button.data_path, button.value = "space_data.shading.type", "MATERIAL"
+    through_camera = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"
+    if not through_camera and camera is not None and any(b.camera == camera.name for b in made):
+        column.operator("view3d.view_camera", text="Look Through the Camera")
 
 
 def _draw_view_transform(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
     """Say so where colour management would change the picture's tones."""
     transform = scene.view_settings.view_transform
-    if transform not in FAITHFUL_TRANSFORMS:
+    if transform not in FAITHFUL:
         column = layout.column(align=True)
         column.label(text=f"{transform} greys the lines", icon="ERROR")
         button = column.operator("wm.context_set_enum", text="View Transform: Standard")

@@ -12,25 +12,29 @@ def baked_images():
     return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
+def material_of(thing):
+    """What an object is drawn with once its modifiers have run."""
+    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return evaluated.data.materials[-1].original
+
+
 def pixels(image):
     values = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(values)
     return values.reshape(image.size[1], image.size[0], 4)
 
 
-def render(scene, engine, folder):
-    """What the scene looks like, (H, W, 4) as on screen."""
-    scene.render.engine = engine
-    if engine == "CYCLES":
-        scene.cycles.samples, scene.cycles.use_denoising = 16, False
-        scene.cycles.device = "CPU"
+def render(scene, folder):
+    """What Cycles shows of the scene, (H, W, 4) as on screen, sampled at the centres of pixels."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 4, False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
     scene.render.film_transparent = True
     scene.render.image_settings.file_format = "PNG"
     scene.render.image_settings.color_mode = "RGBA"
-    scene.render.filepath = str(folder / f"{engine}.png")
+    scene.render.filepath = str(folder / "cycles.png")
     bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(scene.render.filepath)
-    return pixels(image)
+    return pixels(bpy.data.images.load(scene.render.filepath))
 
 
 def test_bake_makes_a_picture(baked, scene):
@@ -42,16 +46,18 @@ def test_bake_makes_a_picture(baked, scene):
     assert picture[covered][:, 0].std() > 0.1
 
 
-def test_cycles_shows_the_picture(with_field, scene, tmp_path):
+@pytest.mark.parametrize("placement", ["PROJECTION", "WINDOW"])
+def test_cycles_shows_the_picture(with_field, scene, tmp_path, placement):
     scene.rosy.look.shading = 0.0
+    scene.rosy.placement = placement
     bpy.ops.rosy.bake()
     (image,) = baked_images()
     picture = pixels(image)
-    seen = render(scene, "CYCLES", tmp_path)
+    seen = render(scene, tmp_path)
     inside = (picture[..., 3] > 0.99) & (seen[..., 3] > 0.99)
     assert inside.mean() > 0.05
-    difference = np.abs(seen - picture)[..., :3][inside]
-    assert difference.mean() < 0.02
+    assert (inside != (picture[..., 3] > 0.5)).mean() < 0.01
+    assert np.abs(seen - picture)[..., :3][inside].mean() < 0.02
 
 
 @pytest.mark.parametrize("what", ["another picture", "no picture"])
@@ -91,6 +97,13 @@ def test_all_cameras(with_field, scene):
     add_camera("Behind", (0.0, 6.0, 0.0), (np.pi / 2, 0.0, np.pi))
     assert bpy.ops.rosy.bake(camera="ALL") == {"FINISHED"}
     assert len(baked_images()) == 2
+    shown = {material_of(with_field).name}
+    for bake in scene.rosy.bakes:
+        assert bpy.ops.rosy.show(camera=bake.name) == {"FINISHED"}
+        assert material_of(with_field) == bake.material
+        shown.add(material_of(with_field).name)
+    assert len(shown) == 2
+    assert "Nobody" in error_of(bpy.ops.rosy.show, camera="Nobody")
 
 
 def test_bake_refuses(with_field, scene):

@@ -40,11 +40,23 @@ def test_bake_and_save(saved, tmp_path):
     assert tuple(image.size) == (96, 64)
 
 
-def test_bad_input_is_one_line_and_status_2(saved):
-    status, said = command("bake", "--object", "Nobody", scene=saved)
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--object", "Nobody"], "Nobody"),
+        (["--camera", "Nothing"], "Nothing"),
+        (["--preset", "nonsense"], "nonsense"),
+        (["--size", "100000x10"], "100000x10"),
+        (["--object", "Camera"], "Camera"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(saved, tmp_path, words, named):
+    status, said = command("bake", *words, "--out", tmp_path, scene=saved)
     assert status == 2
-    assert "Nobody" in said
+    (line,) = [line for line in said.splitlines() if line.startswith("rosy: ")]
+    assert named in line
     assert "Traceback" not in said
+    assert not list(tmp_path.glob("*.png"))
 
 
 def test_an_unknown_verb_is_refused():

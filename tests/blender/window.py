@@ -17,6 +17,7 @@ import traceback
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
@@ -53,6 +54,8 @@ def all_steps():
         panel_with_field,
         bake_with_progress,
         panel_with_picture,
+        panel_out_of_date,
+        eevee_shows_the_picture,
         undo_after_bake,
         stop_with_escape,
         stop_when_an_object_is_deleted,
@@ -130,6 +133,16 @@ def status():
     return sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.status"]
 
 
+def panels():
+    return sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.panels"]
+
+
+def pixels(image):
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)
+
+
 def start_bake(**settings):
     """Start a bake as its button does, and wait until it is on its way."""
     with in_view():
@@ -203,14 +216,17 @@ def bake_with_progress():
     yield from fresh_scene(size=(640, 480))
     make_field()
     yield from start_bake()
-    seen = []
+    seen, longest, last = [], 0.0, time.monotonic()
     while status().now is not None:
+        longest, last = max(longest, time.monotonic() - last), time.monotonic()
         seen.append(status().now.fraction)
         if len(seen) == 3:
             yield from photograph("baking")
+            last = time.monotonic()
         yield
     assert len(set(seen)) >= 3, seen
     assert seen == sorted(seen), seen
+    assert longest < 2.0, f"Blender did not respond for {longest:.1f} s"
     all_is_quiet()
     assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
@@ -219,6 +235,45 @@ def panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
     yield from photograph("panel-3-baked")
+
+
+def panel_out_of_date():
+    scene = bpy.context.scene
+    scene.camera.location.x += 0.5
+    other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
+    yield 1.0
+    assert [bake.stale for bake in panels().bakes(scene)] == ["camera 'Camera' was changed"]
+    scene.camera = other
+    with in_view():
+        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    scene.view_settings.view_transform = "Standard"
+    view()[1].spaces.active.shading.type = "SOLID"
+    yield from photograph("panel-4-out-of-date")
+
+
+def eevee_shows_the_picture():
+    """Rendered by EEVEE, which needs a window on most machines, the picture is what was drawn."""
+    yield from fresh_scene(size=(200, 150))
+    make_field()
+    scene = bpy.context.scene
+    scene.rosy.look.shading = 0.0
+    scene.view_settings.view_transform = "Standard"
+    with in_view():
+        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    engines = scene.render.bl_rna.properties["engine"].enum_items_static.keys()
+    scene.render.engine = next(name for name in engines if name.startswith("BLENDER_EEVEE"))
+    scene.render.film_transparent, scene.render.filter_size = True, 0.0
+    scene.eevee.taa_render_samples = 1
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.image_settings.color_mode = "RGBA"
+    scene.render.filepath = str(SHOTS / "eevee.png")
+    bpy.ops.render.render(write_still=True)
+    seen = pixels(bpy.data.images.load(scene.render.filepath))
+    picture = pixels(scene.rosy.bakes[0].image)
+    inside = (seen[..., 3] > 0.99) & (picture[..., 3] > 0.99)
+    assert inside.mean() > 0.05
+    difference = np.abs(seen - picture)[..., :3][inside].mean()
+    assert difference < 0.02, difference
 
 
 def undo_after_bake():

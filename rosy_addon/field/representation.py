@@ -25,9 +25,7 @@ def power(numbers: np.ndarray, degree: int) -> np.ndarray:
         numbers = numbers * numbers
 
 
-def to_representation(
-    vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
-) -> np.ndarray:
+def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
     """z of member vectors in the frames x, y.
 
     Parameters
@@ -49,9 +47,7 @@ def to_representation(
     return rho * power(phase, degree)
 
 
-def from_representation(
-    z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
-) -> np.ndarray:
+def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
     """The member vector nearest to x that has the representation z; the inverse of the above.
 
     Returns

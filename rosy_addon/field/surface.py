@@ -238,7 +238,9 @@ def _check_polygons(
         raise RosyError(f"{name}: a face refers to a vertex that does not exist")
     finite = np.isfinite(vertices).all(axis=1)
     if not finite.all():
-        raise RosyError(f"{name}: vertex {int(np.argmin(finite))} has a coordinate that is not finite")
+        raise RosyError(
+            f"{name}: vertex {int(np.argmin(finite))} has a coordinate that is not finite"
+        )
 
 
 def _smooth_corner_pairs(

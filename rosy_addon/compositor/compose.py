@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..projection.gbuffer import GBuffer
 from ..progress import Work, drain, part
+from ..projection.gbuffer import GBuffer
 from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast

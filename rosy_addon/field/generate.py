@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from .corners import corner_angles, corner_rotations, smooth_faces
-from .frames import dot, unit
+from .frames import dot
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, build_surface, sum_over_faces

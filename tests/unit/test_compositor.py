@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import ndimage
 from planar_fields import pair_angle, pixel_centres, swirl_angle
+from scipy import ndimage
 
 from rosy_addon.compositor.compose import compose_planar
 from rosy_addon.compositor.contrast import blend_gain, expected_deviation

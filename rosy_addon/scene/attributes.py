@@ -18,15 +18,18 @@ import numpy as np
 from ..errors import RosyError
 from ..field.check import checked_field, into_planes, tangent_normals
 from ..field.fieldfile import check_members
-from ..field.frames import tangent_frame, unit
+from ..field.frames import carry, dot, tangent_frame, unit
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface, mean_over_faces
 from .capabilities import has_properties, is_editable
-from .meshes import flush_edit_mode, mesh_surface
+from .meshes import flush_edit_mode, mesh_surface, read_values
 
 DEFAULT_NAME = "rosy"
 DEFAULT_DEGREE = 4
+
+#: Normals of the faces that vectors were given on, carried through modifiers while a scene is read.
+FACE_NORMAL = "rosy_face_normal"
 
 _VECTOR, _FLOAT = "FLOAT_VECTOR", "FLOAT"
 
@@ -114,8 +117,10 @@ def read_carried_field(
 ) -> RosyField:
     """The field of an evaluated mesh, whose faces a modifier may have made anew.
 
-    The vectors are in the planes of the faces they come from, which `Surface.rest` keeps but for
-    the warp of its polygons; so they are turned into the faces' planes, however far that is.
+    A face's vector came unchanged from the face it was given on, and `Surface.rest` knows the face
+    from before any deformation, still not in quite the same plane where polygons are warped. The
+    minimal rotation between the two normals turns the vector there, if the mesh carries the former
+    ones as `FACE_NORMAL`; it is projected if not.
 
     Raises
     ------
@@ -123,12 +128,18 @@ def read_carried_field(
         If values are not finite.
     """
     source = f"{owner}, attribute '{name}'"
-    attribute = mesh.attributes[name]
-    vectors = _values(attribute, source, mesh).astype(np.float64)
+    vectors = _values(mesh.attributes[name], source, mesh).astype(np.float64)
     _settle(vectors, source, undefined)
-    return RosyField(
-        degree, into_planes(vectors, tangent_normals(surface, "face"), 180.0, source, "face")
-    )
+    normal = tangent_normals(surface, "face")
+    former = read_values(mesh, FACE_NORMAL, np.float32, 3)
+    if former is not None:
+        former = unit(former.astype(np.float64))
+        # A mirrored face has turned over: its plane is what matters.
+        former *= np.where(dot(former, normal) < 0, -1.0, 1.0)[:, None]
+        vectors = into_planes(vectors, former, 180.0, source, "face")
+        vectors = carry(vectors, former, normal)
+    vectors = into_planes(vectors, normal, 180.0, source, "face")
+    return RosyField(degree, vectors)
 
 
 def write_mesh_field(

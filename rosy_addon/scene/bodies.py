@@ -14,6 +14,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import Body
 from .attributes import (
+    FACE_NORMAL,
     attribute_name,
     field_degree,
     has_field,
@@ -23,9 +24,6 @@ from .attributes import (
 )
 from .capabilities import has_properties, is_editable
 from .meshes import mesh_surface
-
-#: Objects that can be turned into a mesh.
-SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 #: Custom property on every datablock that RoSy made.
 MADE = "rosy_made"
@@ -145,7 +143,7 @@ class _Reader:
         thing = instance.object
         owner = thing.original
         name_and_degree = self.names.get(owner)
-        key = (thing.type, thing.data.as_pointer(), owner if name_and_degree else None)
+        key = (thing.data.as_pointer(), owner if name_and_degree else None)
         if key not in self.read:
             self.read[key] = self._read(thing, name_and_degree)
         if self.read[key] is None:
@@ -176,13 +174,13 @@ class _Reader:
 
     def check_found(self, objects: Sequence[bpy.types.Object]) -> None:
         found = {owner for _, owner in self.drawn}
-        seen = {key[2] for key in self.read}
+        seen = {key[1] for key in self.read}
         for thing in objects:
             if thing in found:
                 continue
             if thing not in seen:
                 raise RosyError(f"object '{thing.name}' has a field, but is hidden in the viewport")
-            faceless = all(value is None for key, value in self.read.items() if key[2] == thing)
+            faceless = all(value is None for key, value in self.read.items() if key[1] == thing)
             what = "has no faces" if faceless else f"has lost attribute '{self.names[thing][0]}'"
             raise RosyError(
                 f"object '{thing.name}': after its modifiers "
@@ -206,56 +204,79 @@ def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
 def _prepared(
     depsgraph: bpy.types.Depsgraph, objects: Sequence[bpy.types.Object], undefined: str
 ) -> Iterator[dict[bpy.types.Object, tuple[str, int]]]:
-    """Have Blender carry along undeformed positions, and fields stored in other ways.
+    """Have Blender carry what a field needs through the modifiers, and take it away afterwards.
 
-    Yields the attribute and degree of each object's field in its evaluated mesh. All fields are
-    checked on the meshes as they are without modifiers.
+    These are undeformed positions, the normals of the faces on which vectors were given, and
+    vectors where the field is stored in another way. Yields the attribute and degree of each
+    object's field in its evaluated mesh. All fields are checked on the meshes without modifiers.
     """
     names: dict[bpy.types.Object, tuple[str, int]] = {}
     switched: list[bpy.types.Object] = []
-    lent: dict[bpy.types.Mesh, int] = {}
+    lent: list[bpy.types.Mesh] = []
     try:
         for thing in objects:
-            mesh, owner = thing.data, f"object '{thing.name}'"
-            field = read_mesh_field(mesh, undefined=undefined, owner=owner)
-            names[thing] = (attribute_name(mesh), field.degree)
-            if mesh in lent or not is_native(mesh):
-                if mesh not in lent:
-                    lent[mesh] = field.degree
-                    _lend(mesh, field, owner)
-                names[thing] = (STAND_IN, field.degree)
-            deforms = own_modifiers(thing) or mesh.shape_keys
+            mesh = thing.data
+            names[thing] = _checked_name(thing, undefined, lent)
+            deforms = bool(own_modifiers(thing) or mesh.shape_keys)
             if deforms and is_editable(thing) and not thing.add_rest_position_attribute:
                 thing.add_rest_position_attribute = True
                 switched.append(thing)
-        depsgraph.update()
+            if deforms and FACE_NORMAL not in mesh.attributes and _may_lend(mesh):
+                lent.append(mesh)
+                _lend(mesh, FACE_NORMAL, mesh_surface(mesh, thing.name).face_normal)
+        if switched or lent:
+            depsgraph.update()
         yield names
     finally:
         for thing in switched:
             thing.add_rest_position_attribute = False
-        for mesh in lent:
-            if STAND_IN in mesh.attributes:
-                mesh.attributes.remove(mesh.attributes[STAND_IN])
-                mesh.update_tag()
-        depsgraph.update()
+        for mesh in set(lent):
+            for name in (FACE_NORMAL, STAND_IN):
+                if name in mesh.attributes:
+                    mesh.attributes.remove(mesh.attributes[name])
+            mesh.update_tag()
+        if switched or lent:
+            depsgraph.update()
 
 
-def _lend(mesh: bpy.types.Mesh, field: RosyField, owner: str) -> None:
-    """Store a field on a mesh as vectors on faces, for as long as it is read."""
-    if not is_editable(mesh) or mesh.is_editmode:
-        why = "in edit mode" if mesh.is_editmode else "linked"
+def _checked_name(
+    thing: bpy.types.Object, undefined: str, lent: list[bpy.types.Mesh]
+) -> tuple[str, int]:
+    """Which attribute holds an object's field as vectors on faces, and its degree."""
+    mesh, owner = thing.data, f"object '{thing.name}'"
+    name = attribute_name(mesh)
+    if mesh.is_editmode and is_native(mesh):
+        return name, field_degree(mesh)  # only its evaluated mesh can be read
+    field = read_mesh_field(mesh, undefined=undefined, owner=owner)
+    if is_native(mesh):
+        return name, field.degree
+    if not _may_lend(mesh):
         raise RosyError(
-            f"{owner}: its mesh is {why}; there its field can be read only as vectors on faces"
+            f"{owner}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}; there its "
+            "field can be read only as vectors on faces"
         )
-    attribute = mesh.attributes.new(STAND_IN, "FLOAT_VECTOR", "FACE")
-    attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    if STAND_IN not in mesh.attributes:
+        lent.append(mesh)
+        _lend(mesh, STAND_IN, field.vectors)
+    return STAND_IN, field.degree
+
+
+def _may_lend(mesh: bpy.types.Mesh) -> bool:
+    return is_editable(mesh) and not mesh.is_editmode
+
+
+def _lend(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
+    """Store vectors on the faces of a mesh for as long as it is read."""
+    attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "FACE")
+    attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
     mesh.update_tag()
 
 
 def _is_seen(instance: bpy.types.DepsgraphObjectInstance, shown: set[bpy.types.Object]) -> bool:
     """Whether a render shows this."""
     thing = instance.object
-    if thing.type not in SOLID or not instance.show_self or not thing.visible_camera:
+    # Curves, texts, surfaces and metaballs come with their meshes as instances of their own.
+    if thing.type != "MESH" or not instance.show_self or not thing.visible_camera:
         return False
     if instance.is_instance:
         by = instance.parent

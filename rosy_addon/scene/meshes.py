@@ -71,9 +71,9 @@ def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
 
 
 def read_values(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
-    """(n, columns), or (n,) for one column: the values of an attribute; None if there is none."""
+    """(n, columns), or (n,) for one column: the values of an attribute; None if there are none."""
     attribute = mesh.attributes.get(name)
-    if attribute is None:
+    if attribute is None or not len(attribute.data):  # none is readable in edit mode
         return None
     return _get(attribute.data, "vector" if columns == 3 else "value", dtype, columns)
 

@@ -1,0 +1,142 @@
+"""Things to put in scenes, and what is in a file."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from rosy.rosy_addon.field.generate import generate
+from rosy.rosy_addon.scene.attributes import write_mesh_field
+from rosy.rosy_addon.scene.meshes import mesh_surface
+
+
+def link(thing):
+    """Put an object into the scene."""
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def add_camera(name="Camera", location=(0.0, -5.0, 0.5), target=(0.0, 0.0, 0.0)):
+    camera = link(bpy.data.objects.new(name, bpy.data.cameras.new(name)))
+    aim(camera, location, target)
+    return camera
+
+
+def aim(camera, location, target=(0.0, 0.0, 0.0)):
+    """Place a camera so that it looks at a target."""
+    camera.location = location
+    toward = Vector(target) - Vector(location)
+    camera.rotation_euler = toward.to_track_quat("-Z", "Y").to_euler()
+    bpy.context.view_layer.update()
+
+
+def add_monkey(location=(0.0, 0.0, 0.0)):
+    bpy.ops.mesh.primitive_monkey_add(location=location)
+    bpy.ops.object.shade_smooth()
+    return bpy.context.object
+
+
+def add_mesh(name, vertices, faces, edges=()):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices, edges, faces)
+    return link(bpy.data.objects.new(name, mesh))
+
+
+def add_plane(name="Plane", size=1.0, cuts=1):
+    """A square in the plane y = 0 that faces -y."""
+    line = np.linspace(-size, size, cuts + 1)
+    vertices = [(x, 0.0, z) for z in line for x in line]
+    row = cuts + 1
+    faces = [
+        (j * row + i, j * row + i + 1, (j + 1) * row + i + 1, (j + 1) * row + i)
+        for j in range(cuts)
+        for i in range(cuts)
+    ]
+    return add_mesh(name, vertices, faces)
+
+
+def add_field(thing, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
+    field = generate(mesh_surface(thing.data), kind, degree, axis=axis)
+    write_mesh_field(thing.data, field)
+    return thing
+
+
+def member_vectors(mesh, name="rosy"):
+    values = np.empty(3 * len(mesh.attributes[name].data), dtype=np.float32)
+    mesh.attributes[name].data.foreach_get("vector", values)
+    return values.reshape(-1, 3)
+
+
+def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
+    """Store values in a new attribute, as another program would."""
+    old = mesh.attributes.get(name)
+    if old is not None:
+        mesh.attributes.remove(old)
+    attribute = mesh.attributes.new(name, kind, domain)
+    key = "vector" if kind == "FLOAT_VECTOR" else "value"
+    attribute.data.foreach_set(key, np.asarray(vectors, dtype=np.float32).ravel())
+    mesh.update()
+
+
+def pixels(image):
+    """(H, W, 4) values of an image, rows from the bottom."""
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return values.reshape(image.size[1], image.size[0], 4)
+
+
+def render(scene, path, *, samples=16, box=True):
+    """What Cycles makes of the scene, (H, W, 4) linear values, not premultiplied."""
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.seed = "CPU", samples, 1
+    cycles.use_denoising = cycles.use_adaptive_sampling = False
+    cycles.pixel_filter_type = "BOX" if box else "BLACKMAN_HARRIS"
+    cycles.filter_width = 1.0 if box else 1.5
+    scene.render.film_transparent = True
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGBA", "32"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    values = pixels(image).copy()
+    bpy.data.images.remove(image)
+    alpha = values[..., 3:]
+    np.divide(values[..., :3], alpha, out=values[..., :3], where=alpha > 0)
+    return values
+
+
+def contents():
+    """All that is in the file: datablocks, and what hangs on objects and meshes."""
+    found = {
+        prop.identifier: sorted(thing.name for thing in getattr(bpy.data, prop.identifier))
+        for prop in bpy.data.bl_rna.properties
+        if prop.type == "COLLECTION"
+    }
+    for thing in bpy.data.objects:
+        found["object " + thing.name] = [
+            [modifier.name for modifier in thing.modifiers],
+            [slot.material and slot.material.name for slot in thing.material_slots],
+            sorted(key for key, _ in thing.items() if key != "rosy"),
+            thing.type == "MESH" and thing.add_rest_position_attribute,
+            np.round(thing.matrix_world, 6).tolist(),
+        ]
+    for mesh in bpy.data.meshes:
+        found["mesh " + mesh.name] = [
+            sorted(
+                (attribute.name, attribute.domain, attribute.data_type)
+                for attribute in mesh.attributes
+                if not attribute.name.startswith(".")
+            ),
+            [material and material.name for material in mesh.materials],
+            len(mesh.vertices),
+            len(mesh.polygons),
+        ]
+    for scene in bpy.data.scenes:
+        found["scene " + scene.name] = [
+            len(scene.rosy.bakes),
+            scene.view_settings.view_transform,
+            bool(scene.render.use_compositing),
+            scene.render.engine,
+        ]
+    return found

@@ -1,0 +1,142 @@
+"""A render through the material is the compositor's picture."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.compositor.colour import to_display
+from rosy.rosy_addon.compositor.look import Look
+from scenes import add_field, add_plane, aim, link, render
+
+#: No shading, so that only the picture is compared.
+LOOK = Look(shading=0.0)
+
+#: Eight bits, and lookups that fall on the far side of a pixel's border.
+TOLERANCE = 0.004
+
+
+def difference(scene, path, picture, **how):
+    """Mean absolute difference on covered pixels, as displayed, and how many these are."""
+    seen = render(scene, path, **how)
+    assert seen.shape == picture.rgba.shape
+    covered = (picture.rgba[..., 3] > 0.999) & (seen[..., 3] > 0.999)
+    gap = to_display(seen[..., :3]) - to_display(picture.rgba[..., :3])
+    return np.abs(gap[covered]).mean(), covered.mean()
+
+
+def far_lens(camera, scene):
+    camera.data.lens = 20.0
+    camera.data.shift_x, camera.data.shift_y = 0.11, -0.07
+
+
+def odd_pixels(camera, scene):
+    scene.render.resolution_x, scene.render.resolution_y = 160, 96
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = 1.0, 1.4
+
+
+def orthographic(camera, scene):
+    camera.data.type = "ORTHO"
+    camera.data.ortho_scale = 3.0
+    camera.data.shift_x = 0.1
+
+
+def vertical_sensor(camera, scene):
+    camera.data.sensor_fit = "VERTICAL"
+    camera.data.sensor_height = 30.0
+    scene.render.resolution_x = 192
+
+
+@pytest.mark.parametrize("change", [None, far_lens, odd_pixels, orthographic, vertical_sensor])
+@pytest.mark.parametrize("placement", ["PROJECTION", "WINDOW"])
+def test_render_is_the_picture(scene, camera, monkey, tmp_path, change, placement):
+    if change is not None:
+        change(camera, scene)
+    scene.rosy.placement = placement
+    (baked,) = bake(scene, look=LOOK)
+    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    assert share > 0.02
+    assert gap < TOLERANCE
+
+
+def test_with_the_default_filter(scene, camera, monkey, tmp_path):
+    """Blender's own pixel filter reaches into neighbouring pixels, and so blurs any picture."""
+    (baked,) = bake(scene, look=LOOK)
+    gap, _ = difference(scene, tmp_path / "render.exr", baked.picture, box=False)
+    assert gap < 0.06
+
+
+@pytest.mark.parametrize("as_float", [False, True])
+def test_subdivided(scene, camera, monkey, tmp_path, as_float):
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = 2
+    scene.rosy.image_format = "FLOAT" if as_float else "BYTE"
+    (baked,) = bake(scene, look=LOOK)
+    assert baked.image.is_float == as_float
+    gap, _ = difference(scene, tmp_path / "render.exr", baked.picture)
+    assert gap < (1e-3 if as_float else TOLERANCE)
+
+
+def test_supersampled(scene, camera, monkey, tmp_path):
+    (baked,) = bake(scene, look=Look(shading=0.0, supersampling=2))
+    assert baked.picture.rgba.shape == (128, 128, 4)
+    assert difference(scene, tmp_path / "render.exr", baked.picture)[0] < TOLERANCE
+
+
+def test_large_faces_under_perspective(scene, camera, tmp_path):
+    """One quad, seen steeply: texture coordinates at its corners would bend."""
+    plane = add_field(add_plane(), kind="axis")
+    plane.rotation_euler = (1.2, 0.3, 0.5)
+    camera.data.lens = 15.0
+    aim(camera, (0.0, -1.2, 0.0))
+    (baked,) = bake(scene, look=LOOK)
+    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    assert share > 0.1
+    assert gap < TOLERANCE
+
+
+def test_it_stays_when_the_camera_and_the_object_move(scene, camera, monkey, tmp_path):
+    """Object and camera moved together show the same picture, with the baked projection."""
+    (baked,) = bake(scene, look=LOOK)
+    parent = link(bpy.data.objects.new("Parent", None))
+    for thing in (camera, monkey):
+        thing.parent = parent
+    parent.location, parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.2, 1.0)
+    assert difference(scene, tmp_path / "render.exr", baked.picture)[0] < TOLERANCE
+
+
+def test_instances(scene, camera, monkey, tmp_path):
+    """A collection with Suzanne, instanced twice: each shows its own part of the picture."""
+    collection = bpy.data.collections.new("Monkeys")
+    scene.collection.objects.unlink(monkey)
+    collection.objects.link(monkey)
+    for x, turn in ((-0.9, 0.4), (0.9, -0.8)):
+        empty = link(bpy.data.objects.new("Instance", None))
+        empty.instance_type, empty.instance_collection = "COLLECTION", collection
+        empty.location, empty.rotation_euler = (x, 0, 0), (0, 0, turn)
+        empty.scale = (0.7, 0.7, 0.7)
+    (baked,) = bake(scene, look=LOOK)
+    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    assert share > 0.1
+    assert gap < TOLERANCE
+
+
+def test_two_objects_share_a_mesh(scene, camera, monkey, tmp_path):
+    monkey.location.x = -0.9
+    other = link(bpy.data.objects.new("Other", monkey.data))
+    other.location, other.scale = (1.0, 0.5, 0.0), (1.0, 1.0, 1.4)
+    (baked,) = bake(scene, look=LOOK)
+    assert set(baked.objects) == {monkey, other}
+    assert difference(scene, tmp_path / "render.exr", baked.picture)[0] < TOLERANCE
+
+
+def test_deformed(scene, camera, monkey, tmp_path):
+    monkey.shape_key_add(name="Basis")
+    key = monkey.shape_key_add(name="Long")
+    shape = np.empty(3 * len(key.data), dtype=np.float32)
+    key.data.foreach_get("co", shape)
+    key.data.foreach_set("co", (shape.reshape(-1, 3) * (1.0, 1.0, 1.5)).ravel())
+    key.value = 0.7
+    (baked,) = bake(scene, look=LOOK)
+    assert difference(scene, tmp_path / "render.exr", baked.picture)[0] < TOLERANCE

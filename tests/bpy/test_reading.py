@@ -1,0 +1,355 @@
+"""Fields and scenes as arrays."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.field.representation import face_frames, face_representation
+from rosy.rosy_addon.field.rosy_field import RosyField
+from rosy.rosy_addon.projection.project import project
+from rosy.rosy_addon.scene.attributes import has_field, read_mesh_field, write_mesh_field
+from rosy.rosy_addon.scene.bodies import STAND_IN, read_bodies, rosy_objects
+from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.lights import read_lights
+from rosy.rosy_addon.scene.meshes import mesh_surface
+from scenes import (
+    add_field,
+    add_mesh,
+    add_plane,
+    aim,
+    contents,
+    link,
+    member_vectors,
+    set_vectors,
+)
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def representation(mesh, field):
+    return face_representation(mesh_surface(mesh), field)
+
+
+# --- attributes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 2, 5, 12])
+def test_written_and_read(monkey, degree):
+    mesh = monkey.data
+    surface = mesh_surface(mesh)
+    x, _ = face_frames(surface)
+    write_mesh_field(mesh, RosyField(degree, 3 * x), "other")
+    assert (mesh.rosy.degree, mesh.rosy.attribute) == (degree, "other")
+    field = read_mesh_field(mesh)
+    assert field.degree == degree
+    np.testing.assert_allclose(field.vectors, 3 * x, atol=1e-5)
+    assert read_mesh_field(mesh, "rosy", 4).degree == 4
+
+
+def test_surface_agrees_with_blender(monkey):
+    mesh = monkey.data
+    mesh.polygons[3].use_smooth = False
+    surface = mesh_surface(mesh)
+    assert surface.face_count == len(mesh.polygons)
+    normal = np.array([face.normal for face in mesh.polygons])
+    np.testing.assert_allclose(surface.face_normal, normal, atol=1e-5)
+    corner = np.array([corner.vector for corner in mesh.corner_normals])
+    np.testing.assert_allclose(surface.corner_normal, corner, atol=1e-5)
+    alone = surface.corner_fan[surface.corner_face == 3]
+    others = surface.corner_fan[surface.corner_face != 3]
+    assert not np.isin(alone, others).any()
+
+
+def test_sharp_edges_part_fans(scene):
+    plane = add_plane(cuts=2)
+    mesh = plane.data
+    mesh.shade_smooth()
+    assert len(np.unique(mesh_surface(mesh).corner_fan)) == 9
+    for edge in mesh.edges:
+        along = [mesh.vertices[vertex].co.x for vertex in edge.vertices]
+        edge.use_edge_sharp = along == [0.0, 0.0]
+    assert len(np.unique(mesh_surface(mesh).corner_fan)) == 12
+
+
+@pytest.mark.parametrize("domain", ["POINT", "CORNER"])
+def test_vectors_elsewhere(scene, domain):
+    plane = add_plane(cuts=3)
+    mesh = plane.data
+    count = {"POINT": len(mesh.vertices), "CORNER": len(mesh.loops)}[domain]
+    set_vectors(mesh, np.tile([0.6, 0.0, 0.8], (count, 1)), domain=domain)
+    mesh.rosy.degree = 3
+    field = read_mesh_field(mesh)
+    expected = RosyField(3, np.tile([0.6, 0.0, 0.8], (9, 1)))
+    np.testing.assert_allclose(
+        representation(mesh, field), representation(mesh, expected), atol=1e-5
+    )
+
+
+def test_any_member_on_corners(scene):
+    plane = add_plane(cuts=2)
+    mesh = plane.data
+    turn = 2 * np.pi / 4 * np.arange(len(mesh.loops)) + 0.3
+    zero = np.zeros(len(turn))
+    set_vectors(mesh, np.stack([np.cos(turn), zero, np.sin(turn)], axis=1), domain="CORNER")
+    z = representation(mesh, read_mesh_field(mesh))
+    np.testing.assert_allclose(np.abs(z), 1, atol=1e-5)
+
+
+def test_angles(scene):
+    """About the face's normal, counter-clockwise from its first edge."""
+    plane = add_plane(cuts=1)
+    set_vectors(plane.data, [np.pi / 6], kind="FLOAT")
+    plane.data.rosy.degree = 5
+    field = read_mesh_field(plane.data)
+    # Seen from -y, where it faces to, x points to the right and z up.
+    np.testing.assert_allclose(field.vectors, [[np.cos(np.pi / 6), 0, 0.5]], atol=1e-6)
+
+
+def member_attributes(mesh, degree, off=0.0, longer=1.0):
+    x, y = face_frames(mesh_surface(mesh))
+    for number in range(degree):
+        angle = 2 * np.pi * number / degree + 0.2 + (off if number == 1 else 0.0)
+        vectors = np.cos(angle) * x + np.sin(angle) * y
+        set_vectors(mesh, vectors * (longer if number == 1 else 1.0), f"dir{number}")
+
+
+def test_all_members(scene):
+    plane = add_plane(cuts=2)
+    member_attributes(plane.data, 3)
+    assert has_field(plane)
+    field = read_mesh_field(plane.data)
+    assert field.degree == 3
+    np.testing.assert_allclose(field.vectors, member_vectors(plane.data, "dir0"), atol=1e-6)
+
+
+# --- scenes ----------------------------------------------------------------------------------
+
+
+def test_one_surface_for_all_instances(scene, monkey):
+    collection = bpy.data.collections.new("Monkeys")
+    scene.collection.objects.unlink(monkey)
+    collection.objects.link(monkey)
+    for x in range(3):
+        empty = link(bpy.data.objects.new("Instance", None))
+        empty.instance_type, empty.instance_collection = "COLLECTION", collection
+        empty.location.x = 3.0 * x
+    bodies = read_bodies(depsgraph())
+    assert len(bodies) == 3
+    assert len({id(body.surface) for body in bodies}) == 1
+    assert sorted(body.matrix[0, 3] for body in bodies) == [0, 3, 6]
+    assert rosy_objects(bpy.context.view_layer) == [monkey]
+
+
+def scatter(thing, what):
+    """Have geometry nodes put instances of an object on the points of another."""
+    group = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    entry, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    points = group.nodes.new("GeometryNodeInstanceOnPoints")
+    info = group.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value = what
+    info.inputs["As Instance"].default_value = True
+    group.links.new(entry.outputs[0], points.inputs["Points"])
+    group.links.new(info.outputs["Geometry"], points.inputs["Instance"])
+    group.links.new(points.outputs[0], end.inputs[0])
+    thing.modifiers.new("Scatter", "NODES").node_group = group
+
+
+def test_instances_of_geometry_nodes(scene, monkey):
+    plane = add_plane()
+    scatter(plane, monkey)
+    monkey.location.z = 10.0
+    bodies = [body for body in read_bodies(depsgraph()) if body.field is not None]
+    assert len(bodies) == 5
+    assert len({id(body.surface) for body in bodies}) == 1
+
+
+def test_everything_solid_hides(scene, monkey):
+    bpy.ops.mesh.primitive_cube_add(location=(4, 0, 0))
+    bpy.ops.object.text_add(location=(5, 0, 0))
+    bpy.context.object.data.extrude = 0.1
+    bpy.ops.curve.primitive_bezier_circle_add(location=(6, 0, 0))
+    bpy.context.object.data.bevel_depth = 0.1
+    bpy.ops.object.metaball_add(location=(7, 0, 0))
+    bpy.ops.surface.primitive_nurbs_surface_sphere_add(location=(8, 0, 0))
+    bpy.ops.object.light_add(location=(9, 0, 0))
+    bpy.ops.mesh.primitive_cube_add(location=(10, 0, 0))
+    bpy.context.object.hide_render = True
+    bpy.ops.mesh.primitive_cube_add(location=(11, 0, 0))
+    bpy.context.object.visible_camera = False
+    bodies = read_bodies(depsgraph())
+    assert bodies[0].field is not None
+    assert sorted(body.matrix[0, 3] for body in bodies) == [0, 4, 5, 6, 7, 8]
+
+
+def test_an_occluder_covers(scene, camera):
+    far = add_field(add_plane("Far"), kind="axis")
+    near = add_plane("Near", size=0.4)
+    near.location.y = -1.0
+    graph = depsgraph()
+    view = camera_of_object(scene, graph, camera)
+    whole = len(project([body for body in read_bodies(graph) if body.field], view).pixel)
+    part = len(project(read_bodies(graph), view).pixel)
+    assert 0 < part < whole
+    near.rosy.include = False
+    assert rosy_objects(bpy.context.view_layer) == [far]
+
+
+def test_switched_off_objects_only_hide(scene, monkey):
+    other = add_field(add_plane(), kind="axis")
+    other.rosy.include = False
+    assert rosy_objects(bpy.context.view_layer) == [monkey]
+    assert [body.field is None for body in read_bodies(depsgraph())] == [False, True]
+
+
+def test_reading_changes_nothing(scene, monkey):
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    before = contents()
+    (body,) = read_bodies(depsgraph())
+    assert body.surface.rest is not None
+    assert contents() == before
+
+
+@pytest.mark.parametrize("modifier", [None, "SUBSURF"])
+def test_the_field_has_no_preferred_member(scene, camera, monkey, modifier):
+    """Any of the members stored on a face gives the same picture, through modifiers, too."""
+    if modifier:
+        monkey.modifiers.new("Modifier", modifier).levels = 2
+    graph = depsgraph()
+    view = camera_of_object(scene, graph, camera)
+    first = project(read_bodies(graph), view)
+    mesh = monkey.data
+    surface = mesh_surface(mesh)
+    vectors = member_vectors(mesh).astype(np.float64)
+    across = np.cross(surface.face_normal, vectors)
+    turn = (np.arange(len(vectors)) % 4 * np.pi / 2)[:, None]
+    set_vectors(mesh, np.cos(turn) * vectors + np.sin(turn) * across)
+    second = project(read_bodies(depsgraph()), view)
+    np.testing.assert_array_equal(first.pixel, second.pixel)
+    scale = np.abs(first.representation).max()
+    assert np.abs(first.representation - second.representation).max() < 1e-4 * scale
+
+
+def turn_by_shape_key(thing, matrix):
+    thing.shape_key_add(name="Basis")
+    key = thing.shape_key_add(name="Turned")
+    shape = np.empty(3 * len(key.data), dtype=np.float32)
+    key.data.foreach_get("co", shape)
+    key.data.foreach_set("co", (shape.reshape(-1, 3) @ np.array(matrix).T).astype("f4").ravel())
+    key.value = 1.0
+
+
+def turn_by_armature(thing, matrix):
+    bpy.ops.object.armature_add()
+    rig = bpy.context.object
+    thing.vertex_groups.new(name="Bone").add(range(len(thing.data.vertices)), 1.0, "REPLACE")
+    thing.modifiers.new("Armature", "ARMATURE").object = rig
+    from mathutils import Matrix
+
+    rig.pose.bones["Bone"].matrix = Matrix(matrix).to_4x4() @ rig.pose.bones["Bone"].matrix
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("deform", [turn_by_shape_key, turn_by_armature])
+def test_the_field_follows_a_deformation(scene, camera, monkey, deform):
+    """Turned by a shape key or an armature, a mesh looks as if the object were turned."""
+    from mathutils import Matrix
+
+    turn = Matrix.Rotation(0.7, 3, (0.3, 0.5, 0.8))
+    monkey.rotation_mode = "QUATERNION"
+    monkey.rotation_quaternion = turn.to_quaternion()
+    graph = depsgraph()
+    view = camera_of_object(scene, graph, camera)
+    expected = project(read_bodies(graph), view)
+    monkey.rotation_quaternion = (1, 0, 0, 0)
+    deform(monkey, turn)
+    found = project(read_bodies(depsgraph()), view)
+    same = np.intersect1d(expected.pixel, found.pixel, return_indices=True)[1:]
+    assert len(same[0]) > 0.99 * len(expected.pixel)
+    z, w = expected.representation[same[0]], found.representation[same[1]]
+    usable = np.abs(z) > 1e-3 * np.abs(z).max()
+    off = np.abs(np.angle(z * w.conj())) / 4
+    assert np.degrees(np.percentile(off[usable], 98)) < 0.1
+
+
+def test_mirrored_and_moved_copies(scene, camera):
+    """Modifiers that copy faces copy the field: mirrored, it is the mirror image."""
+    plane = add_field(add_plane(cuts=2), kind="axis", degree=1, axis=(1.0, 0.0, 0.5))
+    for vertex in plane.data.vertices:
+        vertex.co.x += 1.5
+    plane.modifiers.new("Mirror", "MIRROR")
+    aim(camera, (0.0, -12.0, 0.0))
+    graph = depsgraph()
+    buffer = project(read_bodies(graph), camera_of_object(scene, graph, camera), "flat")
+    left = buffer.position[:, 0] < 0
+    expected = np.where(left, np.pi, 0) + np.where(left, -1, 1) * np.arctan2(0.5, 1.0)
+    angle = np.angle(buffer.representation * np.exp(-1j * expected))
+    assert np.abs(angle).max() < 0.05
+
+
+def test_evaluated_field_of_other_kinds(scene, monkey):
+    """Angles have no meaning on faces that a modifier makes: vectors stand in for them."""
+    mesh = monkey.data
+    z = representation(mesh, read_mesh_field(mesh))
+    angle = np.where(np.abs(z) > 0, np.angle(z) / 4, 0.0)
+    set_vectors(mesh, angle, kind="FLOAT")
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = 1
+    (body,) = read_bodies(depsgraph())
+    assert body.surface.face_count == len(body.field.vectors) > len(mesh.polygons)
+    assert STAND_IN not in mesh.attributes
+    np.testing.assert_allclose(body.field.magnitude, 1, atol=1e-4)
+
+
+def test_edit_mode_is_read(scene, monkey):
+    bpy.context.view_layer.objects.active = monkey
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0, 2.0))
+    (body,) = read_bodies(depsgraph())
+    assert body.surface.vertices[:, 2].mean() > 1.5
+    assert body.field.magnitude.max() > 0
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_lights(scene):
+    for kind, energy in (("SUN", np.pi), ("POINT", 4 * np.pi**2), ("AREA", 1.0), ("SPOT", 1.0)):
+        data = bpy.data.lights.new(kind, kind)
+        data.energy, data.color = energy, (1.0, 0.5, 0.25)
+        thing = link(bpy.data.objects.new(kind, data))
+        thing.location = (0, 0, 3)
+    view = np.eye(4)
+    view[2, 3] = -5.0
+    lights = sorted(
+        read_lights(depsgraph(), view), key=lambda light: (round(light.strength, 4), light.kind)
+    )
+    assert [light.kind for light in lights] == ["point", "point", "point", "sun"]
+    np.testing.assert_allclose(lights[3].strength, 1.0, rtol=1e-6)
+    np.testing.assert_allclose(lights[2].strength, 1.0, rtol=1e-6)
+    np.testing.assert_allclose(lights[3].vector, (0, 0, 1), atol=1e-6)
+    np.testing.assert_allclose(lights[2].vector, (0, 0, -2), atol=1e-6)
+    np.testing.assert_allclose(lights[2].colour, (1, 0.5, 0.25))
+
+
+def test_no_loops_over_faces(scene):
+    """Half a million triangles are read in seconds."""
+    import time
+
+    thing = add_plane(cuts=500)
+    add_field(thing, kind="axis")
+    start = time.monotonic()
+    (body,) = read_bodies(depsgraph())
+    assert body.surface.face_count == 250_000
+    assert time.monotonic() - start < 10.0
+
+
+def test_degenerate_faces_are_undefined(scene, camera):
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (0.5, 0, 1), (2, 0, 2), (2, 0, 2)]
+    thing = add_mesh("Odd", vertices, [(0, 1, 2, 3), (3, 4, 2), (2, 5, 6)])
+    add_field(thing, kind="axis")
+    (body,) = read_bodies(depsgraph())
+    np.testing.assert_array_equal(body.field.magnitude > 0, [True, False, False])

@@ -29,7 +29,7 @@ def main() -> int:
     ensure_registered()
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
-    add_camera(scene, (-1.1, -3.5, 0.7))
+    add_camera(scene, (-1.2, -4.0, 0.8))
     add_suzanne_with_field()
     bake(scene, look=LOOK, size=(SIZE, SIZE))
     render(scene, target)

@@ -211,6 +211,8 @@ DAMAGED = {
     "faces.ply": (binary_ply("<").replace(b"face 2", b"face 500000000"), "says 500000000 rows"),
     "nomesh.ply": (PLY_HEADER.format(format="ascii").split("element face")[0].encode()
                    + b"end_header\n" + PLY_BODY[:50].encode(), "no faces"),
+    "signal.ply": (binary_ply(">").replace(struct.pack(">f", 0.001), b"\x7f\x81\0\0"), "vertex 4 has"),
+    "signal.stl": (binary_stl().replace(struct.pack("<f", 0.001), b"\0\0\x81\x7f"), "not finite"),
     "not.ply": (b"solid\n", "found 'sol', wanted 'ply'"),
     "truncated.stl": (binary_stl()[:-30], "says 3 triangles, but ends after 2"),
     "claims.stl": (binary_stl(40_000_000), "says 40000000 triangles, but ends after 3"),

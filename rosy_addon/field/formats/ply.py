@@ -70,7 +70,9 @@ def read_ply(path: Path) -> Polygons:
             f"{path}: face {number} refers to vertex {corner_vertex[corner]:.10g}, "
             f"there are {len(vertices)}, counted from 0"
         )
-    return Polygons(vertices.astype(np.float64), corner_vertex.astype(np.int64), face_start)
+    with np.errstate(invalid="ignore"):  # signalling NaN; refused with the other ones
+        vertices = vertices.astype(np.float64)
+    return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:

@@ -25,7 +25,9 @@ def read_stl(path: Path) -> Polygons:
         points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
-    vertices, corner_vertex = weld(points.astype(np.float64))
+    with np.errstate(invalid="ignore"):  # signalling NaN; refused with the other ones
+        points = points.astype(np.float64)
+    vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
 

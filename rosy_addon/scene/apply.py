@@ -144,10 +144,18 @@ class Shot:
 
 
 def settings_of(scene: bpy.types.Scene) -> Settings:
-    """How the scene wants its pictures."""
+    """How the scene wants its pictures.
+
+    Raises
+    ------
+    RosyError
+        If they are to be saved beside a .blend file that has not been saved.
+    """
     chosen = scene.rosy
     folder = None
     if chosen.store == "SAVED":
+        if chosen.directory.startswith("//") and not bpy.data.filepath:
+            raise RosyError(f"{chosen.directory}: save the .blend file first, or choose a folder")
         folder = Path(bpy.path.abspath(chosen.directory))
     return Settings(
         window=chosen.placement == "WINDOW",

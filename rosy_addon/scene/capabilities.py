@@ -18,3 +18,12 @@ def is_editable(thing: bpy.types.ID) -> bool:
 def can_show_nodes_by_default(material: bpy.types.Material) -> bool:
     """Whether a material has nodes without being told so (from 5.0 on telling it is deprecated)."""
     return material.node_tree is not None and len(material.node_tree.nodes) > 0
+
+
+def folder_options() -> set[str]:
+    """Options of a property for a path that may begin with ``//``, the .blend file's folder.
+
+    Since 5.0 such a property has to say so; before, every one may.
+    """
+    known = "is_path_supports_blend_relative" in bpy.types.Property.bl_rna.properties
+    return {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if known else {"ANIMATABLE"}

@@ -54,7 +54,7 @@ def new_image(
         if folder is None:
             image.pack()
         else:
-            _save(image, picture, folder, as_float)
+            _save(image, picture, folder / bpy.path.clean_name(name))
     except BaseException:
         bpy.data.images.remove(image)
         raise
@@ -89,8 +89,6 @@ def check_folder(folder: Path) -> None:
     RosyError
         If not.
     """
-    if str(folder).startswith("//"):
-        raise RosyError(f"{folder}: save the .blend file first, or choose another folder")
     if not folder.exists():
         parent = next((up for up in folder.parents if up.exists()), folder)
         if not parent.is_dir() or not os.access(parent, os.W_OK):
@@ -101,14 +99,15 @@ def check_folder(folder: Path) -> None:
     check_writable(folder / "picture.png")
 
 
-def _save(image: bpy.types.Image, picture: Picture, folder: Path, as_float: bool) -> None:
-    path = folder / f"{bpy.path.clean_name(image.name)}{'.exr' if as_float else '.png'}"
+def _save(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
+    """Have a file hold what an image holds; it takes the place of one from an earlier bake."""
+    path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
-        raise RosyError(f"{folder}: cannot be made: {reason.strerror.lower()}") from reason
+        raise RosyError(f"{path.parent}: cannot be made: {reason.strerror.lower()}") from reason
     check_writable(path)
-    if as_float:
+    if image.is_float:
         image.file_format = "OPEN_EXR"
         image.filepath_raw = str(path)
         try:

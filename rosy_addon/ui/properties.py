@@ -10,7 +10,7 @@ import bpy
 from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
 from ..scene.attributes import DEFAULT_DEGREE, DEFAULT_NAME
-from ..scene.capabilities import has_properties
+from ..scene.capabilities import folder_options, has_properties
 from ..scene.looks import apply_look, look_of
 
 __all__ = ["apply_look", "ensure_registered", "look_of", "register", "unregister"]
@@ -123,6 +123,7 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Folder that pictures are saved to",
         subtype="DIR_PATH",
         default="//rosy/",
+        options=folder_options(),
     )
     image_format: bpy.props.EnumProperty(
         name="Format", description="Depth of the picture's values", items=FORMATS

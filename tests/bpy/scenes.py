@@ -108,6 +108,7 @@ def render(scene, path, *, samples=16, box=True):
 
 def contents():
     """All that is in the file: datablocks, and what hangs on objects and meshes."""
+    bpy.context.view_layer.update()
     found = {
         prop.identifier: sorted(thing.name for thing in getattr(bpy.data, prop.identifier))
         for prop in bpy.data.bl_rna.properties

@@ -1,0 +1,284 @@
+"""Pictures in the scene: made, replaced, remembered, taken away, and never left half done."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake, baking
+from rosy.rosy_addon.compositor.colour import to_display
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.scene import apply as apply_room
+from rosy.rosy_addon.scene.apply import bakes, remove, use_bake
+from rosy.rosy_addon.scene.cameras import scene_cameras
+from rosy.rosy_addon.ui.properties import apply_look, look_of
+from scenes import add_camera, add_field, add_plane, contents, link, pixels, set_vectors
+
+
+def material_of(thing):
+    """What the evaluated object is painted with."""
+    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    painted = {mesh.materials[face.material_index] for face in mesh.polygons}
+    evaluated.to_mesh_clear()
+    (material,) = painted
+    return material.original if material else None
+
+
+def test_the_image_is_the_picture(scene, camera, monkey):
+    (baked,) = bake(scene)
+    image, rgba = baked.image, baked.picture.rgba
+    assert (image.name, tuple(image.size)) == ("RoSy Camera", (128, 128))
+    assert image.packed_file is not None
+    covered = rgba[..., 3] > 0
+    stored = pixels(image)
+    np.testing.assert_allclose(
+        stored[covered][:, :3], to_display(rgba[covered][:, :3]), atol=0.5 / 255 + 1e-6
+    )
+    np.testing.assert_array_equal(stored[..., 3] > 0, covered)
+
+
+def test_it_survives_saving(scene, camera, monkey, tmp_path):
+    (baked,) = bake(scene)
+    before = pixels(baked.image)
+    path = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), before)
+    scene = bpy.context.scene
+    assert [(bake.camera, bake.stale) for bake in bakes(scene)] == [("Camera", "")]
+    assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
+
+
+@pytest.mark.parametrize(("chosen", "ending"), [("BYTE", ".png"), ("FLOAT", ".exr")])
+def test_saved_to_a_folder(scene, camera, monkey, tmp_path, chosen, ending):
+    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "pictures")
+    scene.rosy.image_format = chosen
+    (baked,) = bake(scene)
+    (path,) = (tmp_path / "pictures").iterdir()
+    assert path.suffix == ending
+    assert baked.image.packed_file is None
+    covered = baked.picture.rgba[..., 3] > 0
+    stored = pixels(baked.image)[covered][:, :3]
+    wanted = baked.picture.rgba[covered][:, :3]
+    if chosen == "BYTE":
+        np.testing.assert_allclose(stored, to_display(wanted), atol=0.5 / 255 + 1e-6)
+    else:
+        np.testing.assert_allclose(stored, wanted, atol=1e-3)
+    bake(scene)
+    assert len(list((tmp_path / "pictures").iterdir())) == 1
+
+
+def test_the_users_materials_and_modifiers_stay(scene, camera, monkey):
+    own = bpy.data.materials.new("Own")
+    monkey.data.materials.append(own)
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    other = link(bpy.data.objects.new("Other", monkey.data))
+    other.rosy.include = False
+    (baked,) = bake(scene)
+    assert [slot.material for slot in monkey.material_slots] == [own]
+    assert [modifier.name for modifier in monkey.modifiers] == ["Subdivision", "RoSy"]
+    assert material_of(monkey) == baked.material
+    assert material_of(other) == own
+
+
+def test_baking_again_replaces(scene, camera, monkey):
+    bake(scene)
+    before = contents()
+    monkey.modifiers.new("Bevel", "BEVEL")
+    first = pixels(bpy.data.images["RoSy Camera"])
+    bake(scene, look=Look(seed=5))
+    assert np.abs(pixels(bpy.data.images["RoSy Camera"]) - first).max() > 0.1
+    assert [modifier.name for modifier in monkey.modifiers] == ["Bevel", "RoSy"]
+    monkey.modifiers.remove(monkey.modifiers["Bevel"])
+    assert contents() == before
+
+
+def test_reading_is_not_disturbed_by_an_earlier_bake(scene, camera, monkey):
+    first = bake(scene)[0].picture.rgba
+    second = bake(scene)[0].picture.rgba
+    np.testing.assert_array_equal(first, second)
+
+
+def test_remove_leaves_no_trace(scene, camera, monkey):
+    monkey.data.materials.append(bpy.data.materials.new("Own"))
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    other = add_field(add_plane("Other"), kind="axis")
+    other.location.x = 1.0
+    add_camera("Second", (3.0, -4.0, 1.0))
+    before = contents()
+    bake(scene, cameras=scene_cameras(scene))
+    assert contents() != before
+    removed = remove(scene)
+    assert (removed.objects, removed.images, removed.materials, removed.groups) == (2, 2, 2, 2)
+    assert contents() == before
+    assert remove(scene).objects == 0
+
+
+def test_remove_from_one_object(scene, camera, monkey):
+    other = add_field(add_plane("Other"), kind="axis")
+    other.location.x = 1.0
+    bake(scene)
+    assert remove(scene, [other]).objects == 1
+    assert not other.modifiers
+    assert [entry.camera for entry in bakes(scene)] == ["Camera"]
+    assert remove(scene, [monkey]).images == 1
+    assert not bakes(scene)
+    assert not bpy.data.materials
+
+
+def test_cancelled_at_any_step_nothing_is_left(scene, camera, monkey):
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    before = contents()
+    steps = 0
+    work = baking(scene)
+    for _ in work:
+        steps += 1
+    remove(scene)
+    assert steps > 3
+    for stop in range(steps):
+        work = baking(scene)
+        for _ in range(stop + 1):
+            next(work)
+        work.close()
+        assert contents() == before
+
+
+def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypatch):
+    before = contents()
+
+    def fails(*_):
+        raise RosyError("no more")
+
+    monkeypatch.setattr(apply_room, "new_group", fails)
+    with pytest.raises(RosyError, match="no more"):
+        bake(scene)
+    assert contents() == before
+
+
+def test_several_cameras(scene, camera, monkey):
+    second = add_camera("Second", (3.0, -4.0, 1.0))
+    first_bake, last_bake = bake(scene, cameras=scene_cameras(scene))
+    assert (first_bake.camera, last_bake.camera) == ("Second", "Camera")
+    assert [entry.camera for entry in bakes(scene)] == ["Camera", "Second"]
+    assert material_of(monkey).name == "RoSy Camera"
+    groups = len(bpy.data.node_groups)
+    use_bake(scene, "Second")
+    assert material_of(monkey).name == "RoSy Second"
+    assert len(bpy.data.node_groups) == groups
+    with pytest.raises(RosyError, match="camera 'Third'; there are 'Second', 'Camera'"):
+        use_bake(scene, "Third")
+    assert second.name == "Second"
+
+
+def change_look(scene, camera, monkey):
+    scene.rosy.look.seed += 1
+    return "look"
+
+
+def change_camera(scene, camera, monkey):
+    camera.data.lens += 5.0
+    return "camera 'Camera' was changed"
+
+
+def move_camera(scene, camera, monkey):
+    camera.location.x += 0.1
+    bpy.context.view_layer.update()
+    return "camera 'Camera' was changed"
+
+
+def move_object(scene, camera, monkey):
+    monkey.location.x += 0.1
+    bpy.context.view_layer.update()
+    return "'Suzanne' was moved"
+
+
+def change_field(scene, camera, monkey):
+    set_vectors(monkey.data, np.zeros((len(monkey.data.polygons), 3)))
+    return "mesh or field of 'Suzanne'"
+
+
+def change_mesh(scene, camera, monkey):
+    monkey.data.vertices[7].co.x += 0.1
+    return "mesh or field of 'Suzanne'"
+
+
+def change_degree(scene, camera, monkey):
+    monkey.data.rosy.degree = 2
+    return "mesh or field of 'Suzanne'"
+
+
+def delete_object(scene, camera, monkey):
+    bpy.data.objects.remove(monkey)
+    return "'Suzanne' is gone"
+
+
+def delete_camera(scene, camera, monkey):
+    bpy.data.objects.remove(camera)
+    return "'Camera' is gone"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        change_look,
+        change_camera,
+        move_camera,
+        move_object,
+        change_field,
+        change_mesh,
+        change_degree,
+        delete_object,
+        delete_camera,
+    ],
+)
+def test_out_of_date(scene, camera, monkey, change, monkeypatch):
+    monkeypatch.setattr(apply_room, "PATIENCE", 0.0)
+    bake(scene)
+    assert bakes(scene)[0].stale == ""
+    why = change(scene, camera, monkey)
+    assert why in bakes(scene)[0].stale
+
+
+def test_notes(scene, camera, monkey):
+    assert bake(scene)[0].notes == ()
+    scene.view_settings.view_transform = "Filmic"
+    (note,) = bake(scene)[0].notes
+    assert "Filmic" in note
+    assert scene.view_settings.view_transform == "Filmic"
+
+
+def test_settings_of_a_look(scene):
+    assert look_of(scene.rosy) == Look()
+    look = Look(method="brute", gain=1.234, density=0.999, seed=2**31 - 1, magnitude="both")
+    apply_look(scene.rosy, look)
+    assert look_of(scene.rosy) == look
+    for name, rules in ((entry.name, entry.metadata) for entry in look_fields()):
+        description = scene.rosy.look.bl_rna.properties[name].description
+        assert description == rules["text"]
+
+
+def look_fields():
+    from dataclasses import fields
+
+    return fields(Look)
+
+
+def test_same_scene_same_bytes(scene, camera, monkey):
+    first = bytes(bake(scene)[0].image.packed_file.data)
+    remove(scene)
+    assert bytes(bake(scene)[0].image.packed_file.data) == first
+
+
+def test_lit_by_the_scene(scene, camera, monkey):
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy = 3.0
+    sun = link(bpy.data.objects.new("Sun", data))
+    sun.rotation_euler = (0.0, np.pi / 2, 0.0)
+    look = Look(light="scene", shading=1.0)
+    rgba = bake(scene, look=look)[0].picture.rgba
+    columns = np.arange(rgba.shape[1])
+    brightness = (rgba[..., 0] * rgba[..., 3]).sum(axis=0)
+    middle = (rgba[..., 3].sum(axis=0) * columns).sum() / rgba[..., 3].sum()
+    assert brightness[columns > middle].sum() > 2 * brightness[columns < middle].sum()

@@ -1,0 +1,314 @@
+"""What cannot be drawn is refused in one line that names it, and nothing is made or lost."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.field.generate import generate
+from rosy.rosy_addon.field.rosy_field import RosyField
+from rosy.rosy_addon.scene.attributes import read_mesh_field, write_mesh_field
+from rosy.rosy_addon.scene.bodies import rosy_objects
+from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.meshes import mesh_surface
+from scenes import (
+    add_camera,
+    add_field,
+    add_mesh,
+    add_plane,
+    aim,
+    contents,
+    link,
+    member_vectors,
+    set_vectors,
+)
+from test_reading import member_attributes
+
+
+def refused(*words, **how):
+    """Bake, and expect an error of one line with these words that leaves the file as it was."""
+    before = contents()
+    with pytest.raises(RosyError) as caught:
+        bake(bpy.context.scene, **how)
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+    assert contents() == before
+
+
+def test_no_field(scene, camera):
+    plane = add_plane()
+    refused("no visible object has a RoSy field")
+    with pytest.raises(RosyError, match="object 'Plane' has no attribute 'rosy'"):
+        rosy_objects(bpy.context.view_layer, ["Plane"])
+    with pytest.raises(RosyError, match="there is no object 'Plain'"):
+        rosy_objects(bpy.context.view_layer, ["Plain"])
+    with pytest.raises(RosyError, match="'Camera' is a camera, not a mesh"):
+        rosy_objects(bpy.context.view_layer, ["Camera"])
+    add_field(plane, kind="axis").hide_render = True
+    with pytest.raises(RosyError, match="'Plane' is hidden in renders"):
+        rosy_objects(bpy.context.view_layer, ["Plane"])
+
+
+def test_hidden_in_the_viewport(scene, camera, monkey):
+    monkey.hide_viewport = True
+    refused("'Suzanne'", "hidden in the viewport")
+
+
+@pytest.mark.parametrize(
+    ("domain", "kind", "found"),
+    [
+        ("FACE", "INT", "INT on FACE"),
+        ("FACE", "FLOAT_COLOR", "FLOAT_COLOR on FACE"),
+        ("POINT", "FLOAT", "FLOAT on POINT"),
+        ("EDGE", "FLOAT_VECTOR", "FLOAT_VECTOR on EDGE"),
+    ],
+)
+def test_wrong_type_or_domain(scene, camera, domain, kind, found):
+    plane = add_plane()
+    plane.data.attributes.new("rosy", kind, domain)
+    refused("object 'Plane', attribute 'rosy'", f"found {found}", "wanted FLOAT_VECTOR on FACE")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("domain", ["FACE", "POINT", "CORNER", "ANGLE"])
+def test_not_finite(scene, camera, value, domain):
+    plane = add_plane(cuts=3)
+    size = {"FACE": 9, "POINT": 16, "CORNER": 36, "ANGLE": 9}[domain]
+    if domain == "ANGLE":
+        values = np.zeros(size)
+        values[1] = value
+        set_vectors(plane.data, values, kind="FLOAT")
+    else:
+        values = np.tile([1.0, 0.0, 0.0], (size, 1))
+        values[1, 2] = value
+        set_vectors(plane.data, values, domain=domain)
+    refused("'Plane', attribute 'rosy'", f"1 of {size}", "not finite", "undefined")
+    scene.rosy.undefined = True
+    (baked,) = bake(scene)
+    assert baked.picture.rgba[..., 3].max() == 1
+    field = read_mesh_field(plane.data, undefined="zero")
+    assert np.isfinite(field.vectors).all()
+    if domain in ("FACE", "ANGLE"):
+        np.testing.assert_array_equal(field.magnitude > 0, np.arange(9) != 1)
+
+
+def test_off_the_surface(scene, camera, monkey):
+    set_vectors(monkey.data, member_vectors(monkey.data)[:, [1, 2, 0]])
+    refused("'Suzanne', attribute 'rosy'", "degrees off the surface", "worst on face")
+
+
+@pytest.mark.parametrize(("off", "longer"), [(0.1, 1.0), (0.0, 1.1)])
+def test_members_that_are_no_rosy(scene, camera, off, longer):
+    plane = add_plane(cuts=2)
+    member_attributes(plane.data, 3, off, longer)
+    refused("'Plane', attributes dir0 to dir2", "not a RoSy of degree 3", "allowed")
+
+
+def test_too_many_members(scene, camera):
+    plane = add_plane()
+    member_attributes(plane.data, 13)
+    refused("'Plane'", "13 attributes", "at most 12")
+
+
+@pytest.mark.parametrize(
+    ("vertices", "edges", "says"),
+    [
+        ([], [], "nothing in it"),
+        ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1), (1, 2)], "only points and loose edges"),
+    ],
+)
+def test_no_faces(scene, camera, vertices, edges, says):
+    thing = add_mesh("Bare", vertices, [], edges)
+    thing.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
+    refused("object 'Bare'", "no faces", says)
+    with pytest.raises(RosyError, match="Bare: the mesh has no faces"):
+        mesh_surface(thing.data)
+
+
+def test_loose_edges_beside_faces_do_no_harm(scene, camera):
+    thing = add_mesh(
+        "Plane", [(-1, 0, -1), (1, 0, -1), (0, 0, 1), (2, 0, 2)], [(0, 1, 2)], [(2, 3)]
+    )
+    add_field(thing, kind="axis")
+    assert bake(scene)
+
+
+def test_non_manifold_edges_do_no_harm(scene, camera):
+    vertices = [(0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
+    thing = add_mesh("Fan", vertices, [(0, 2, 1), (0, 3, 1), (0, 4, 1)])
+    add_field(thing, kind="axis")
+    assert bake(scene)
+
+
+def test_a_modifier_loses_the_attribute(scene, camera, monkey):
+    modifier = monkey.modifiers.new("Rebuild", "REMESH")
+    modifier.mode, modifier.voxel_size = "VOXEL", 0.2
+    refused("'Suzanne'", "Rebuild", "lost attribute 'rosy'")
+
+
+def test_a_modifier_leaves_no_faces(scene, camera, monkey):
+    monkey.vertex_groups.new(name="None")
+    modifier = monkey.modifiers.new("Hide All", "MASK")
+    modifier.vertex_group = "None"
+    refused("'Suzanne'", "Hide All", "no faces")
+
+
+def test_outside_the_frame(scene, camera, monkey):
+    monkey.location.x = 100.0
+    refused("'Camera'", "Suzanne", "outside the frame")
+
+
+def test_hidden_behind(scene, camera, monkey):
+    wall = add_plane("Wall", size=3.0)
+    wall.location.y = -3.0
+    refused("'Camera'", "Suzanne", "hidden behind")
+
+
+def test_inside_the_camera_is_drawn(scene, camera):
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    sphere = add_field(bpy.context.object, kind="axis")
+    aim(camera, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    (baked,) = bake(scene)
+    assert baked.picture.rgba[..., 3].min() == 1
+    assert baked.objects == (sphere,)
+
+
+def test_panoramic(scene, camera, monkey):
+    camera.data.type = "PANO"
+    refused("camera 'Camera' is panoramic")
+
+
+def test_no_camera(scene, monkey):
+    refused("scene 'Scene' has no active camera")
+    refused("'Suzanne'", "not a camera", cameras=[monkey])
+
+
+def test_mirrored_camera(scene, camera, monkey):
+    camera.scale = (-1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    try:
+        assert bake(scene)
+    except RosyError as error:
+        assert "'Camera'" in str(error)
+
+
+@pytest.mark.parametrize("size", [(0, 10), (10, -1), (100_000, 10)])
+def test_size(scene, camera, monkey, size):
+    refused(f"size {size[0]}x{size[1]}", size=size)
+    # As many pixels by supersampling.
+    refused("size 40000x40", size=(10_000, 10), look=Look(supersampling=4))
+
+
+@pytest.mark.parametrize("degree", [0, -1, 1000])
+def test_degree(scene, monkey, degree):
+    with pytest.raises(RosyError, match=f"degree {degree} is not"):
+        read_mesh_field(monkey.data, degree=degree)
+    monkey.data.rosy.degree = degree
+    assert 1 <= monkey.data.rosy.degree <= 12
+
+
+def test_writing(scene, monkey):
+    surface = mesh_surface(monkey.data)
+    field = generate(surface, "axis", 4)
+    before = contents()
+    with pytest.raises(RosyError, match="'Suzanne' has 500 faces, but the field has 499"):
+        write_mesh_field(monkey.data, RosyField(4, field.vectors[1:]))
+    with pytest.raises(RosyError, match="'UVMap' of another kind, FLOAT2 on CORNER"):
+        write_mesh_field(monkey.data, field, "UVMap")
+    with pytest.raises(RosyError, match="'position' of another kind"):
+        write_mesh_field(monkey.data, field, "position")
+    bpy.context.view_layer.objects.active = monkey
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RosyError, match="'Suzanne' is in edit mode"):
+        write_mesh_field(monkey.data, field)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert contents() == before
+
+
+def test_edit_mode_bakes_and_loses_nothing(scene, camera, monkey):
+    bpy.context.view_layer.objects.active = monkey
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0.3, 0, 0))
+    assert bake(scene)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.mean([vertex.co.x for vertex in monkey.data.vertices]) > 0.2
+    assert "rosy" in monkey.data.attributes
+
+
+@pytest.fixture
+def library(scene, tmp_path):
+    """A .blend file with Suzanne, her field and an empty file to link it into."""
+    bpy.ops.mesh.primitive_monkey_add()
+    add_field(bpy.context.object)
+    collection = bpy.data.collections.new("Monkeys")
+    scene.collection.children.link(collection)
+    collection.objects.link(bpy.context.object)
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.camera = add_camera()
+    return path
+
+
+def linked(path, kind, name):
+    with bpy.data.libraries.load(str(path), link=True) as (_, to):
+        setattr(to, kind, [name])
+    return getattr(to, kind)[0]
+
+
+def test_linked_object(library):
+    link(linked(library, "objects", "Suzanne"))
+    refused("object 'Suzanne' is linked from", "library.blend")
+
+
+def test_linked_collection(library):
+    empty = link(bpy.data.objects.new("Instance", None))
+    empty.instance_type = "COLLECTION"
+    empty.instance_collection = linked(library, "collections", "Monkeys")
+    refused("object 'Suzanne' is linked from", "library.blend")
+
+
+def test_linked_mesh_can_be_drawn_but_not_written(library):
+    mesh = linked(library, "meshes", "Suzanne")
+    thing = link(bpy.data.objects.new("Local", mesh))
+    (baked,) = bake(bpy.context.scene)
+    assert baked.objects == (thing,)
+    field = read_mesh_field(mesh)
+    with pytest.raises(RosyError, match=r"mesh 'Suzanne' is linked from .*library\.blend"):
+        write_mesh_field(mesh, field)
+
+
+def test_override_can_be_drawn(library):
+    thing = link(linked(library, "objects", "Suzanne"))
+    local = thing.override_create(remap_local_usages=True)
+    (baked,) = bake(bpy.context.scene)
+    assert baked.objects == (local,)
+
+
+@pytest.mark.parametrize("as_float", [False, True])
+def test_unwritable_folder(scene, camera, monkey, tmp_path, as_float):
+    scene.rosy.store = "SAVED"
+    scene.rosy.image_format = "FLOAT" if as_float else "BYTE"
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    scene.rosy.directory = str(blocked)
+    refused(str(blocked))
+    scene.rosy.directory = str(blocked / "below")
+    refused(str(blocked))
+    scene.rosy.directory = "//pictures"
+    refused("save the .blend file first")
+
+
+def test_camera_of_a_scene_without_pixels_is_at_least_one(scene, camera):
+    scene.render.resolution_percentage = 1
+    scene.render.resolution_x = scene.render.resolution_y = 10
+    view = camera_of_object(scene, bpy.context.evaluated_depsgraph_get(), camera)
+    assert (view.width, view.height) == (1, 1)

@@ -64,7 +64,7 @@ def member_images(
     """
     count, channels = noise.shape
     full = 2 * look.length + 1
-    limit = _limits(flow, look)
+    limit = limits(flow, look)
     ended = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(walkers), count, channels), dtype=np.float32)
     samples = np.zeros(count, dtype=np.float32)
@@ -85,7 +85,7 @@ def member_images(
     return Images(members, members.mean(axis=0), samples, np.ones(count, dtype=np.float32))
 
 
-def _limits(flow: Flow, look: Look) -> np.ndarray | None:
+def limits(flow: Flow, look: Look) -> np.ndarray | None:
     """(P,) steps each way where the magnitude drives the length; None where it does not."""
     if look.magnitude not in ("length", "both"):
         return None

@@ -18,11 +18,11 @@ BPY42  = .venv-bpy42/bin/python
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: demo test test-all test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check format zip gallery clean distclean
+.PHONY: demo test test-all test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
-	$(BPY42) tools/demo.py demo.png
+	$(BPY42) examples/demo.py demo.png
 
 test: test-unit test-numpy1 test-bpy42
 
@@ -37,10 +37,12 @@ test-numpy1: .venv-numpy1/ready
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/bin/python $(PYTEST) tests/bpy
 
-check: .venv/ready
+check: lint
+	$(UNIT) $(PYTEST) -m "not slow" tests/unit
+
+lint: .venv/ready
 	.venv/bin/ruff format --check .
 	.venv/bin/ruff check .
-	$(UNIT) $(PYTEST) -m "not slow" tests/unit
 
 format: .venv/ready
 	.venv/bin/ruff format .

@@ -10,6 +10,16 @@ from rosy_addon.errors import RosyError
 
 ROOT = Path(__file__).resolve().parents[2]
 
+#: Modules that draw many pictures and measure them; `make check` leaves them out.
+SLOW = {"test_compositor", "test_pictures"}
+
+
+def pytest_collection_modifyitems(items):
+    """Mark the tests of slow modules."""
+    for item in items:
+        if item.path.stem in SLOW:
+            item.add_marker(pytest.mark.slow)
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:

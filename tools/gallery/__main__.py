@@ -1,0 +1,58 @@
+"""Draw the gallery: every figure, or those named."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+
+from .page import FOLDER, SOURCE
+
+#: Pages, by the names of their modules, and what they are about.
+PAGES = {
+    "figure-02": ("Figure 2", "One direction is not enough", "one of six directions, and all six"),
+    "figure-05": ("Figure 5", "From a field to a picture", "a 3-RoSy field, step by step"),
+    "figure-06": ("Figure 6", "Contrast", "its loss by blending, and its correction"),
+    "figure-07": ("Figures 7, 8", "Tilted surfaces", "members in the view plane, and artefacts"),
+    "figure-09": ("Figure 9", "Magnitude", "as colour, as length of streaks, as both"),
+    "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how well N can be read"),
+    "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
+}
+HERO = "hero"
+
+
+def main() -> int:
+    """Draw what the arguments name."""
+    parser = argparse.ArgumentParser(prog="python -m tools.gallery", description=__doc__)
+    parser.add_argument("figure", nargs="*", help=", ".join([*PAGES, HERO]))
+    known = [*PAGES, HERO]
+    names = parser.parse_args().figure or known
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        parser.error(f"there is no '{unknown[0]}', only {', '.join(known)}")
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        print(f"drawing {name}", flush=True)
+        importlib.import_module(f".{name.replace('-', '_')}", __package__).write()
+    _write_index()
+    return 0
+
+
+def _write_index() -> None:
+    pieces = [
+        "# Gallery",
+        f"The figures of {SOURCE}, redrawn by RoSy: the same kinds of fields and the same "
+        "comparisons, with what was measured in the pictures beside them. `make gallery` draws "
+        "the pictures, measures them and writes these pages; nothing in the tables is typed by "
+        "hand. Look at the pictures at their own size: scaled by anything but a whole number, "
+        "streaks beat with the pixels of the screen.",
+        "\n".join(
+            f"- [{figure}: {title}]({name}.md): {about}"
+            for name, (figure, title, about) in PAGES.items()
+        ),
+    ]
+    (FOLDER / "README.md").write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

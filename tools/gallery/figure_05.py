@@ -1,0 +1,152 @@
+"""Figure 5: the whole way from a 3-RoSy field to a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.flow import blend_weights, planar_flow
+from rosy_addon.compositor.picture import Layers
+
+from .looks import MEASURED, RED
+from .measure import correlation
+from .page import Page
+from .plane import averaged, enlarged, points, singularity
+from .sheet import Panel, grey, inset, magnified, outlined
+
+DEGREE, FINER = 3, 2
+#: Drawn larger than shown, so that no streamline ends at a border that is seen.
+WHOLE, LARGE, SMALL = 480, 400, 256
+LOOK = enlarged(MEASURED, FINER)
+#: Contrast of everything but the uncorrected blend, so that streaks can be seen.
+GAIN = 2.2
+CLOSEUP, TIMES = 52, 3
+
+
+def write() -> None:
+    """Draw and write the page."""
+    page = Page("figure-05", "From a 3-RoSy field to a picture, step by step")
+    angles = np.angle(singularity(1)(points(WHOLE, FINER))) / DEGREE
+    first, second = _set(angles, 0.0), _set(angles, np.pi / DEGREE)
+    blend = compose_planar(angles, DEGREE, LOOK).layers[0]
+    brute = compose_planar(angles, DEGREE, LOOK.with_settings({"method": "brute"})).layers[0]
+
+    page.text(
+        """A 3-RoSy field with a singularity of index +1/3 in the middle becomes three vector
+        fields: V₀ takes at each point the member nearest to the guiding angle 0°, V₁ and V₂
+        those nearest to 120° and 240°. Their LIC images I₀, I₁, I₂ together have every streak,
+        but all break along the line to the left of the middle, where two members are equally
+        near to the guiding angle. The second set, I′₀, I′₁, I′₂, is guided by 60°, 180° and 300°, and
+        breaks along the line to the right."""
+    )
+    page.picture(
+        [_members(first, "I", 0), _members(second, "I′", 60)],
+        "LIC images of the three members, for both sets of guiding angles",
+        "members",
+    )
+    page.text(
+        """The mean of either set has every streak, and streaks that break off where all of its images
+        do, as in the marked squares."""
+    )
+    means = [
+        Panel(_with_closeup(first, -1), "I, the mean of I₀, I₁, I₂, corrected; closeup 3 times"),
+        Panel(
+            _with_closeup(second, 1), "I′, the mean of I′₀, I′₁, I′₂, corrected; closeup 3 times"
+        ),
+    ]
+    page.picture([means], "The means of both sets, with closeups of the breaking points", "means")
+    page.text(
+        """The blend takes I by the weight cos²(3θ/2) and I′ by sin²(3θ/2), θ being the angle of any member: each where it does not
+        break. A mean of three images is pale; its contrast is corrected as on the page of
+        [Figure 6](figure-06.md)."""
+    )
+    weight = blend_weights(planar_flow(angles, DEGREE), 0.0)[:, None]
+    page.picture(
+        [
+            [
+                Panel(grey(_shown(weight, SMALL)), "cos²(3θ/2), the share of I"),
+                Panel(grey(_shown(1 - weight, SMALL)), "sin²(3θ/2), the share of I′"),
+                Panel(grey(_shown(blend.images.blend, SMALL)), "the blend, not corrected"),
+            ]
+        ],
+        "The weights, and the blend before its contrast is corrected",
+        "weights",
+    )
+    page.text(
+        """The result, beside brute force, which follows the best of the three members at every
+        step and so has no breaking points."""
+    )
+    result = [
+        Panel(_contrasted(blend.tone, LARGE), "the blend, corrected"),
+        Panel(_contrasted(brute.tone, LARGE), "brute force, corrected"),
+    ]
+    page.picture([result], "The result, and brute force", "result")
+    _measure(page, first, second, blend, brute)
+    page.write("Figure 5")
+
+
+def _measure(page: Page, first: Layers, second: Layers, blend: Layers, brute: Layers) -> None:
+    page.text("## Measured")
+    page.text(
+        """Correlation with brute force in strips 17 pixels high along the line to the left and
+        to the right of the singularity, from 24 pixels away from it, and in the rest of the
+        picture."""
+    )
+    place = points(WHOLE)
+    shown = np.maximum(np.abs(place.real), np.abs(place.imag)) < LARGE / 2
+    strip = shown & (np.abs(place.imag) < 8.5)
+    left, right = strip & (place.real < -24), strip & (place.real > 24)
+    rest = shown & (np.abs(place.imag) > 40)
+    tones = {
+        name: averaged(layers.images.blend, WHOLE, FINER)
+        for name, layers in (("I", first), ("I′", second), ("blend", blend), ("brute", brute))
+    }
+    rows = [
+        [
+            name,
+            *(correlation(tones[name][part], tones["brute"][part]) for part in (left, right, rest)),
+        ]
+        for name in ("I", "I′", "blend")
+    ]
+    page.table(["Picture", "Left, where I breaks", "Right, where I′ breaks", "Rest"], rows)
+    same = correlation(tones["I"][rest], tones["I′"][rest])
+    page.text(
+        f"""I and I′ have a correlation of {same:.4f} with each other in the rest of the picture:
+        they are almost one image, which is why their blend needs no correction of its own."""
+    )
+
+
+def _set(angles: np.ndarray, guiding_angle: float) -> Layers:
+    """One set of member images alone."""
+    look = LOOK.with_settings({"weights": "none", "guiding_angle": guiding_angle})
+    return compose_planar(angles, DEGREE, look).layers[0]
+
+
+def _shown(values: np.ndarray, size: int) -> np.ndarray:
+    """(size, size) middle of the (P, 1) values of a picture."""
+    margin = (WHOLE - size) // 2
+    return averaged(values, WHOLE, FINER)[margin : margin + size, margin : margin + size]
+
+
+def _contrasted(values: np.ndarray, size: int) -> np.ndarray:
+    return grey(0.5 + GAIN * (_shown(values, size) - 0.5))
+
+
+def _members(layers: Layers, name: str, guide: int) -> list[Panel]:
+    return [
+        Panel(
+            _contrasted(image, SMALL),
+            f"{name}{'₀₁₂'[number]}, guided by {guide + 120 * number}°",
+        )
+        for number, image in enumerate(layers.images.members)
+    ]
+
+
+def _with_closeup(layers: Layers, side: int) -> np.ndarray:
+    """A set's mean, with a part of its breaking points, on its left or right, enlarged."""
+    picture = _contrasted(layers.tone, LARGE)
+    left, top = LARGE // 2 + side * 110 - CLOSEUP // 2, LARGE // 2 - CLOSEUP // 2
+    small = magnified(picture[top : top + CLOSEUP, left : left + CLOSEUP], TIMES)
+    picture = outlined(picture, (left, top, left + CLOSEUP, top + CLOSEUP), RED)
+    far = LARGE - CLOSEUP * TIMES - 6
+    return inset(picture, small, far if side < 0 else 6, far, RED)

@@ -1,0 +1,155 @@
+"""Figures 7 and 8: members on surfaces that are tilted against the view."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from rosy_addon.compositor.picture import Layers
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import singularities
+
+from .looks import RED, SOLID
+from .measure import correlation, local_correlation, orientation_spectrum, peaks
+from .page import Page, listed
+from .shapes import plane, sphere
+from .sheet import Panel, display, magnified, outlined
+from .solid import compose_view, frame_of, harmonic_field, view
+
+SIZE = 402
+TILTS, TILTED_SIZE = (0, 60, 78), 262
+MEMBER = np.radians(30)
+
+#: From where a corner of the cube is in the middle.
+VIEW = (45, 35)
+_FIXED = SOLID.with_settings({"gain": 3.0})
+#: Side of the closeup, how many times it is magnified, and how far it stays from the silhouette.
+CLOSEUP, TIMES, MARGIN = 52, 5, 28
+WAYS = {
+    "off": _FIXED.with_settings({"view_plane": False}),
+    "on": _FIXED,
+    "brute": _FIXED.with_settings({"method": "brute"}),
+}
+NAMES = {"off": "among projections", "on": "in the view plane", "brute": "brute force"}
+
+
+def write() -> None:
+    """Draw and write the page."""
+    page = Page("figure-07", "Members on tilted surfaces")
+    _write_plane(page)
+    _write_sphere(page)
+    page.write("Figures 7 and 8")
+
+
+def _write_plane(page: Page) -> None:
+    page.text(
+        """A constant 4-RoSy field on a plane. Where the plane is parallel to the view its members
+        are at right angles in the picture too. The more it is tilted, the less they are."""
+    )
+    surface = plane()
+    member = [np.cos(MEMBER), np.sin(MEMBER), 0.0]
+    field = RosyField(4, np.tile(member, (surface.face_count, 1)))
+    look = SOLID.with_settings({"shading": 0.0})
+    panels, rows = [], []
+    for tilt in TILTS:
+        camera = view(surface, (0, 90 - tilt), (TILTED_SIZE,) * 2, look.supersampling, False)
+        picture = compose_view(surface, field, look, camera)
+        panels.append(Panel(display(picture.rgba), f"tilted by {tilt}°"))
+        layers = picture.layers[0]
+        side = look.supersampling * TILTED_SIZE
+        tone = frame_of(layers.tone[:, 0], layers.pixel, (side, side))
+        half = 0.45 * side * np.array([np.cos(np.radians(tilt)), 1.0])
+        down, across = np.rint(half).astype(int)
+        middle = side // 2
+        patch = tone[middle - down : middle + down, middle - across : middle + across]
+        # Drawn at twice the size: two by two pixels are one of the picture.
+        found = peaks(orientation_spectrum(_halved(patch), 720))
+        angles = MEMBER + np.array([0, np.pi / 2])
+        there = np.degrees(np.arctan2(np.sin(angles) * np.cos(np.radians(tilt)), np.cos(angles)))
+        there = sorted(there % 180)
+        rows.append([f"{tilt}°", listed(there), listed(found)])
+    page.picture([panels], "A 4-RoSy field on a plane at three tilts", "plane")
+    page.text(
+        """Measured: the orientations at which the power of streaks peaks, beside those of
+        the projected members, in degrees."""
+    )
+    page.table(["Tilt", "Projected members", "Found in the picture"], rows)
+
+
+def _write_sphere(page: Page) -> None:
+    surface = sphere(64)
+    field = harmonic_field(surface, 4, np.eye(3))
+    _, index = singularities(surface, field)
+    page.text("## Choosing members where they are at equal angles")
+    page.text(
+        f"""A 4-RoSy field on a sphere that forms a cube: {len(index)} singularities of index +1/4
+        at the corners. If members are chosen among their projections, as in the plane, the two
+        sets of images break at lines that come close to each other where the surface turns away,
+        and the weights do not know it: streaks break off (left). If the members are
+        first rotated into the view plane, where they are at equal angles, and rotated back once
+        chosen, nothing breaks (right)."""
+    )
+    camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
+    pictures = {name: compose_view(surface, field, look, camera) for name, look in WAYS.items()}
+    tones = {name: _frame(picture.layers[0], 0) for name, picture in pictures.items()}
+    seen = _frame(pictures["on"].layers[0], None)
+    near = {
+        name: local_correlation(tones[name], tones["brute"], seen, 3.0 * SOLID.supersampling)
+        for name in ("off", "on")
+    }
+    left, top, right, bottom = box = _worst(near["on"] - near["off"], seen)
+    shown = {name: display(picture.rgba) for name, picture in pictures.items()}
+    spheres = [
+        Panel(outlined(shown[name], box, RED), f"members chosen {NAMES[name]}")
+        for name in ("off", "on")
+    ]
+    page.picture([spheres], "A sphere with the field of a cube, drawn in both ways", "sphere")
+    closeups = [
+        Panel(magnified(shown[name][top:bottom, left:right], TIMES), f"{label}, {TIMES} times")
+        for name, label in NAMES.items()
+    ]
+    page.picture([closeups], "Closeups of the marked square, and brute force", "closeup")
+    page.text(
+        """Measured: correlation with brute force, over the sphere, in the marked square, and
+        around each pixel (Gaussian window with a deviation of 3 pixels): its lowest hundredth,
+        and the part of the sphere where it is below 0.9."""
+    )
+    covered, square = seen > 0, np.zeros(seen.shape, dtype=bool)
+    square[_fine(SIZE - bottom, SIZE - top), _fine(left, right)] = True
+    rows = []
+    for name, local in near.items():
+        row = [NAMES[name]]
+        row += [correlation(tones[name][part], tones["brute"][part]) for part in (covered, square)]
+        local = local[covered]
+        row += [float(np.nanquantile(local, 0.01)), f"{100 * np.mean(local < 0.9):.2f} %"]
+        rows.append(row)
+    page.table(
+        ["Members chosen", "Whole sphere", "Marked square", "Lowest hundredth", "Below 0.9"], rows
+    )
+
+
+def _frame(layers: Layers, channel: int | None) -> np.ndarray:
+    """(H, W) one channel of the uncorrected blend, or 1 where there is any."""
+    values = 1.0 if channel is None else layers.images.blend[:, channel]
+    return frame_of(values, layers.pixel, (SIZE * SOLID.supersampling,) * 2)
+
+
+def _fine(start: int, stop: int) -> slice:
+    """Pixels of the finished picture as pixels of the supersampled one."""
+    return slice(start * SOLID.supersampling, stop * SOLID.supersampling)
+
+
+def _worst(lost: np.ndarray, seen: np.ndarray, side: int = CLOSEUP) -> tuple[int, int, int, int]:
+    """The box (left, top, right, bottom), in the finished picture, where most is lost."""
+    finer = SOLID.supersampling
+    inside = ndimage.binary_erosion(seen > 0, iterations=finer * MARGIN)
+    spread = ndimage.uniform_filter(np.where(inside, np.nan_to_num(lost), 0), finer * side)
+    row, column = np.unravel_index(np.argmax(spread), spread.shape)
+    left = int(np.clip(column // finer - side // 2, 0, SIZE - side))
+    top = int(np.clip(SIZE - 1 - row // finer - side // 2, 0, SIZE - side))
+    return left, top, left + side, top + side
+
+
+def _halved(patch: np.ndarray) -> np.ndarray:
+    height, width = (side // 2 for side in patch.shape)
+    return patch[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))

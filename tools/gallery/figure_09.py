@@ -1,0 +1,111 @@
+"""Figure 9: the magnitude of a field as colour, as length of its streaks, and as both."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from .looks import MEASURED, PLANE
+from .measure import persistence
+from .page import Page
+from .plane import compose_field, draw_field, points
+from .sheet import Panel
+
+DEGREE, SIZE = 4, 400
+#: With few bright cells, the shortest streaks would be single dots.
+LOOK = PLANE.with_settings({"density": 0.5, "gain": 2.5})
+#: Where the field is zero, in pixels from the middle, and the sense in which it turns there.
+ZEROS = ((-95 + 70j, 1), (80 + 95j, -1), (20 - 20j, 1), (-70 - 110j, -1), (120 - 90j, 1))
+#: How far from a zero, in pixels, the field has most of its magnitude.
+REACH = 90.0
+
+
+def field(p: np.ndarray) -> np.ndarray:
+    """A 4-RoSy field with three singularities of index +1/4 and two of −1/4."""
+    z = np.ones(p.shape, dtype=complex)
+    for place, index in ZEROS:
+        away = p - place
+        z *= (away if index > 0 else away.conj()) / np.sqrt(np.abs(away) ** 2 + REACH**2)
+    return z
+
+
+def write() -> None:
+    """Draw and write the page."""
+    page = Page("figure-09", "Magnitude")
+    page.text(
+        """A 4-RoSy field with five singularities, at which its magnitude falls to zero. With
+        nothing driven by it (a), the magnitude cannot be seen; it can be mapped to colour (b), to
+        the length of the streaks (c), or to both (d). Where streaks are short their contrast is lowered,
+        or the mean of a few samples would glare."""
+    )
+    names = {
+        "none": "(a) magnitude not shown",
+        "colour": "(b) as colour",
+        "length": "(c) as length of the streaks",
+        "both": "(d) as both",
+    }
+    panels = [
+        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings({"magnitude": way})), label)
+        for way, label in names.items()
+    ]
+    page.picture([panels[:2], panels[2:]], "The magnitude of a 4-RoSy field shown in three ways")
+    _measure(page)
+    page.write("Figure 9")
+
+
+def _measure(page: Page) -> None:
+    page.text("## Measured")
+    z = field(points(SIZE))
+    rho = np.abs(z) / np.abs(z).max()
+    page.text(
+        """Colour: rank correlation of the magnitude with the luminance of the picture, averaged
+        over squares of 10 pixels so that streaks do not count. Length: how many pixels ahead along a member the
+        image of that member has a correlation of one half with itself; near zeros it is shorter even
+        for streaks of full length, since they bend."""
+    )
+    cells = (SIZE // 10, 10, SIZE // 10, 10)
+    luminance = {}
+    for way in ("none", "colour", "length", "both"):
+        rgba = compose_field(field, DEGREE, SIZE, MEASURED.with_settings({"magnitude": way})).rgba
+        luminance[way] = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    ranks = {
+        way: float(
+            spearmanr(
+                rho.reshape(cells).mean(axis=(1, 3)).ravel(),
+                values.reshape(cells).mean(axis=(1, 3)).ravel(),
+            ).statistic
+        )
+        for way, values in luminance.items()
+    }
+    edges = (0.0, 0.25, 0.5, 0.75, 1.0)
+    heads = [f"Half-length, ρ {low:g} to {high:g}" for low, high in pairwise(edges)]
+    rows = []
+    for way, label in (
+        ("none", "not shown"),
+        ("colour", "colour"),
+        ("length", "length"),
+        ("both", "both"),
+    ):
+        rows.append([label, ranks[way], *_half_lengths(way, z, rho, edges)])
+    page.table(["Magnitude as", "Luminance", *heads], rows)
+
+
+def _half_lengths(way: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]) -> list[str]:
+    """For each range of magnitudes, the distance at which streaks have lost half of themselves."""
+    look = MEASURED.with_settings({"magnitude": way, "weights": "none"})
+    image = compose_field(field, DEGREE, SIZE, look).layers[0].images.members[0, :, 0]
+    image = image.reshape(SIZE, SIZE)
+    angle = np.angle(z) / DEGREE
+    # Away from the borders and from the breaking points of the one image that is measured.
+    chosen = np.abs(DEGREE * angle) < 2.0
+    margin = 45
+    chosen[:margin] = chosen[-margin:] = chosen[:, :margin] = chosen[:, -margin:] = False
+    lengths = []
+    for low, high in pairwise(edges):
+        kept = persistence(image, np.exp(1j * angle), chosen & (rho >= low) & (rho < high), 60)
+        past = int(np.argmax(kept < 0.5))
+        share = (kept[past - 1] - 0.5) / (kept[past - 1] - kept[past])
+        lengths.append(f"{past - 1 + share:.1f} px")
+    return lengths

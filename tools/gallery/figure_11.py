@@ -1,0 +1,133 @@
+"""Figure 11: fields on surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosy_addon.compositor.contrast import expected_deviation
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.picture import Picture
+from rosy_addon.field.generate import curvature_field
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import euler_characteristic, singularities
+from rosy_addon.field.surface import Surface
+from rosy_addon.projection.camera import Camera
+
+from .looks import RED, SOLID
+from .page import Page, signed
+from .plane import enlarged
+from .shapes import knot, sphere, suzanne, torus, triple_torus
+from .sheet import Panel, display, dotted
+from .solid import (
+    around_field,
+    compose_view,
+    harmonic_field,
+    icosahedron_axes,
+    seen_points,
+    smoothed,
+    view,
+)
+
+WIDTH = 402
+PLAID = SOLID.with_settings({"noise": "colour", "grain": 3.0, "gain": 3.0, "length": 60})
+MAGNITUDE = SOLID.with_settings({"magnitude": "colour", "gain": 2.0})
+
+
+def write() -> None:
+    """Draw and write the page."""
+    page = Page("figure-11", "Surfaces")
+    page.text(
+        """4-RoSy fields along the principal curvatures of Suzanne (a, b) and of a triple torus (c, d),
+        in grey and in coloured noise, which makes a plaid; a trefoil knot with the confidence of its
+        curvature as colour (e); and 6-RoSy fields on a sphere, singular at the twelve
+        vertices of an icosahedron (f), and on a torus, singular nowhere (g, h). The light comes from the eye.
+        All of the meshes are made by Blender or by this page's own script."""
+    )
+    monkey, rings, ring, ball, trefoil = suzanne(), triple_torus(), torus(), sphere(64), knot()
+    fields = {
+        "Suzanne": (monkey, smoothed_a_little(monkey, curvature_field(monkey, 4))),
+        "triple torus": (rings, smoothed(rings, curvature_field(rings, 4), 200)),
+        "knot": (trefoil, curvature_field(trefoil, 4)),
+        "sphere": (ball, harmonic_field(ball, 6, icosahedron_axes())),
+        "torus": (ring, around_field(ring, 6)),
+    }
+    shots = (
+        ("Suzanne", SOLID, (-28, 8), 380, "(a) Suzanne, 4-RoSy"),
+        ("Suzanne", PLAID, (-28, 8), 380, "(b) the same, coloured noise"),
+        ("triple torus", SOLID, (14, 52), 330, "(c) triple torus, 4-RoSy"),
+        ("triple torus", PLAID, (14, 52), 330, "(d) the same, coloured noise"),
+        ("knot", MAGNITUDE, (0, 74), 402, "(e) trefoil knot, 4-RoSy, magnitude as colour"),
+        ("sphere", SOLID, (20, 20), 402, "(f) sphere, 6-RoSy with twelve singularities"),
+        ("torus", SOLID, (20, 42), 290, "(g) torus, 6-RoSy"),
+        ("torus", PLAID, (20, 42), 290, "(h) the same, coloured noise"),
+    )
+    panels, rows = [], []
+    for name, look, angles, height, label in shots:
+        camera = view(fields[name][0], angles, (WIDTH, height), look.supersampling)
+        picture = compose_view(*fields[name], look, camera)
+        shown = display(picture.rgba)
+        if name == "sphere":
+            shown = _marked(shown, *fields[name], camera, look.supersampling)
+        panels.append(Panel(shown, label))
+        rows.append([label, *_spread(picture, look)])
+    abouts = (
+        "Suzanne with a 4-RoSy field",
+        "A triple torus with a 4-RoSy field",
+        "A knot and a sphere",
+        "A torus with a 6-RoSy field",
+    )
+    for number, about in enumerate(abouts):
+        page.picture([panels[2 * number : 2 * number + 2]], about, "abcd"[number])
+    page.text("## Measured")
+    page.text(
+        """Singularities, with their indices in units of 1/N. By the theorem of Poincaré and Hopf
+        the indices sum to N times the Euler characteristic."""
+    )
+    page.table(
+        [
+            "Surface",
+            "Faces",
+            "N",
+            "Singularities",
+            "Sum of indices",
+            "N times Euler characteristic",
+        ],
+        [_census(name, surface, field) for name, (surface, field) in fields.items()],
+    )
+    page.text(
+        """The pixels' standard deviation after correction, over all that is seen, beside that expected of one
+        member image with whole streamlines times the gain; drawn at twice the size, before light and averaging."""
+    )
+    page.table(["Picture", "Mean", "Standard deviation", "Theory"], rows)
+    page.write("Figure 11")
+
+
+def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
+    """A curvature field with the jitter of small faces taken out."""
+    return smoothed(surface, field, 6)
+
+
+def _marked(
+    shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, finer: int
+) -> np.ndarray:
+    """A picture of the unit sphere with dots at the singularities."""
+    at = surface.vertices[singularities(surface, field)[0]]
+    for x, y in seen_points(at, at, camera, finer):
+        shown = dotted(shown, x, y, RED)
+    return shown
+
+
+def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
+    _, index = singularities(surface, field)
+    kinds, counts = np.unique(index, return_counts=True)
+    shown = ", ".join(
+        f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)
+    )
+    expected = field.degree * euler_characteristic(surface)
+    return [name, surface.face_count, field.degree, shown or "none", int(index.sum()), expected]
+
+
+def _spread(picture: Picture, look: Look) -> list[object]:
+    tone = picture.layers[0].tone
+    theory = look.gain * expected_deviation(enlarged(look, look.supersampling))
+    return [float(tone.mean()), float(tone.std()), theory]

@@ -1,0 +1,60 @@
+"""A page of the gallery: its words, its pictures, and the figures measured for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from .sheet import Panel, save, sheet
+
+#: Of the repository.
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "docs" / "gallery"
+
+SOURCE = (
+    "J. Palacios and E. Zhang, “Interactive Visualization of Rotational Symmetry Fields on "
+    "Surfaces”, IEEE Transactions on Visualization and Computer Graphics 17(7), 2011"
+)
+
+
+class Page:
+    """Markdown, written piece by piece."""
+
+    def __init__(self, name: str, title: str) -> None:
+        self.name, self.title = name, title
+        self._pieces = [f"# {title}"]
+
+    def text(self, words: str) -> None:
+        """Add a paragraph; line breaks in it do not count."""
+        self._pieces.append(" ".join(words.split()))
+
+    def picture(self, rows: Sequence[Sequence[Panel]], about: str, part: str = "") -> None:
+        """Add a sheet of panels, saved beside the page."""
+        path = FOLDER / f"{self.name}{part and '-' + part}.png"
+        save(sheet(rows), path)
+        self._pieces.append(f"![{about}]({path.name})")
+
+    def table(self, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+        """Add a table; floats are shown with three decimals."""
+        lines = [head, ["---"] + ["---:"] * (len(head) - 1)]
+        lines += [[_shown(value) for value in row] for row in rows]
+        self._pieces.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
+
+    def write(self, figure: str) -> None:
+        """Write the page, with its source below: which `figure` of the paper it redraws."""
+        self._pieces += ["---", f"Redrawn after {figure} of {SOURCE}. [All figures](README.md)"]
+        (FOLDER / f"{self.name}.md").write_text("\n\n".join(self._pieces) + "\n", encoding="utf-8")
+
+
+def _shown(value: object) -> str:
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
+
+
+def listed(angles: Sequence[float]) -> str:
+    """Angles in degrees, with one decimal."""
+    return ", ".join(f"{angle:.1f}" for angle in angles)
+
+
+def signed(index: int) -> str:
+    """An index with its sign."""
+    return f"{index:+d}".replace("-", "−")

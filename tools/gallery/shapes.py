@@ -1,0 +1,153 @@
+"""Meshes that anyone may pass on: made here, or Blender's own."""
+
+from __future__ import annotations
+
+import numpy as np
+from skimage.measure import marching_cubes
+
+from rosy_addon.field.surface import Surface, build_surface
+
+
+def plane(cells: int = 8) -> Surface:
+    """The square from -1 to 1 in x and y, facing up."""
+    along = np.linspace(-1, 1, cells + 1)
+    x, y = np.meshgrid(along, along, indexing="ij")
+    return _grid("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
+
+
+def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: int = 72) -> Surface:
+    """A torus about the z axis."""
+    u = np.arange(around)[:, None] * (2 * np.pi / around)
+    v = np.arange(across) * (2 * np.pi / across)
+    out = radius + tube * np.cos(v)
+    point = np.stack(np.broadcast_arrays(out * np.cos(u), out * np.sin(u), tube * np.sin(v)), -1)
+    return _grid("torus", point, closed=(True, True))
+
+
+def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
+    """A tube about a trefoil knot."""
+    t = np.arange(around) * (2 * np.pi / around)
+    curve, ahead = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    # The knot winds about a torus: the way out of that torus is never along the knot.
+    middle = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
+    out = curve - middle
+    out -= np.sum(out * ahead, axis=1)[:, None] * ahead
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    side = np.cross(ahead, out)
+    v = np.arange(across)[:, None] * (2 * np.pi / across)
+    ring = np.cos(v)[None] * out[:, None] + np.sin(v)[None] * side[:, None]
+    return _grid("knot", curve[:, None] + tube * ring, closed=(True, True))
+
+
+def _trefoil(t: np.ndarray) -> np.ndarray:
+    out = 2 + np.cos(3 * t)
+    return np.stack([out * np.cos(2 * t), out * np.sin(2 * t), np.sin(3 * t)], axis=1)
+
+
+def sphere(cells: int = 48) -> Surface:
+    """The unit sphere, as a cube whose faces have been cut into even angles."""
+    along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
+    u, v = np.meshgrid(along, along, indexing="ij")
+    sides = []
+    for axis in range(3):
+        for sign in (1, -1):
+            side = np.empty((cells + 1, cells + 1, 3))
+            side[..., axis], side[..., axis - 2], side[..., axis - 1] = sign, u, sign * v
+            sides.append(side)
+    vertices = np.concatenate([side.reshape(-1, 3) for side in sides])
+    cell = _cells(cells + 1, cells + 1, (False, False))
+    faces = np.concatenate([cell + number * (cells + 1) ** 2 for number in range(6)])
+    # Sides share the vertices of their common edges.
+    _, first, same = np.unique(
+        np.rint(vertices * 1e6), axis=0, return_index=True, return_inverse=True
+    )
+    vertices = vertices[first] / np.linalg.norm(vertices[first], axis=1)[:, None]
+    return _polygons("sphere", vertices, same.ravel()[faces])
+
+
+def triple_torus(cells: int = 110) -> Surface:
+    """Three rings that have grown together, a level set of a smooth function."""
+    low, high = np.array([-2.8, -2.8, -0.8]), np.array([2.8, 2.8, 0.8])
+    spacing = (high[0] - low[0]) / cells
+    counts = np.rint((high - low) / spacing).astype(int) + 1
+    grid = np.stack(np.meshgrid(*(np.arange(n) * spacing for n in counts), indexing="ij"), axis=-1)
+    level = _rings((grid + low).reshape(-1, 3)).reshape(counts)
+    vertices, faces, _, _ = marching_cubes(level, 0.0, spacing=(spacing,) * 3)
+    vertices = vertices.astype(np.float64) + low
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    count = np.bincount(ends[:, 0], minlength=len(vertices))[:, None]
+    # Marching cubes leave slivers: vertices drift to the middle of their neighbours, and back.
+    for _ in range(12):
+        middle = np.zeros_like(vertices)
+        np.add.at(middle, ends[:, 0], vertices[ends[:, 1]])
+        vertices = _onto_level(0.5 * vertices + 0.5 * middle / count)
+    surface = _polygons("triple torus", vertices, faces)
+    outward = np.sum(surface.face_normal * _gradient(surface.face_centre)) > 0
+    return surface if outward else _polygons("triple torus", vertices, faces[:, ::-1])
+
+
+def _rings(points: np.ndarray, tube: float = 0.43, blend: float = 0.16) -> np.ndarray:
+    """(P,) how far points are from three rings of radius 1, smoothly joined; 0 on the surface."""
+    total = np.zeros(len(points))
+    for turn in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
+        centre = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
+        away = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1]) - 1
+        total += np.exp(-np.hypot(away, points[:, 2]) / blend)
+    return -blend * np.log(total) - tube
+
+
+def _gradient(points: np.ndarray) -> np.ndarray:
+    small = 1e-5
+    return np.stack(
+        [
+            (_rings(points + step) - _rings(points - step)) / (2 * small)
+            for step in small * np.eye(3)
+        ],
+        axis=1,
+    )
+
+
+def _onto_level(points: np.ndarray) -> np.ndarray:
+    for _ in range(2):
+        slope = _gradient(points)
+        points = points - (_rings(points) / np.sum(slope * slope, axis=1))[:, None] * slope
+    return points
+
+
+def suzanne(subdivisions: int = 3) -> Surface:
+    """Blender's monkey, subdivided."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.context.object
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = subdivisions
+    mesh = monkey.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    start = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", start)
+    return build_surface(vertices, corners, np.append(start, len(corners)), name="Suzanne")
+
+
+def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray) -> Surface:
+    """A surface whose faces all have as many corners."""
+    start = np.arange(len(faces) + 1) * faces.shape[1]
+    return build_surface(vertices, faces.ravel(), start, name=name)
+
+
+def _grid(name: str, point: np.ndarray, closed: tuple[bool, bool]) -> Surface:
+    """Quads over an (A, B, 3) grid of points."""
+    return _polygons(name, point.reshape(-1, 3), _cells(*point.shape[:2], closed))
+
+
+def _cells(a: int, b: int, closed: tuple[bool, bool]) -> np.ndarray:
+    """(cells, 4) indices of the corners of the cells of an a x b grid, closed to a ring or not."""
+    number = np.arange(a * b).reshape(a, b)
+    right, up = np.roll(number, -1, axis=0), np.roll(number, -1, axis=1)
+    corners = np.stack([number, right, np.roll(right, -1, axis=1), up], axis=-1)
+    return corners[: a if closed[0] else a - 1, : b if closed[1] else b - 1].reshape(-1, 4)

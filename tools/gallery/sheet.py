@@ -1,0 +1,149 @@
+"""Pictures side by side with a label under each, never scaled but by whole factors."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import font_manager
+from PIL import Image, ImageDraw, ImageFont
+
+from rosy_addon.compositor.colour import to_display
+
+#: The widest sheet that is shown unscaled beside the text of a page.
+WIDEST = 820
+
+GAP, LABEL_SIZE, LINE = 16, 13, 18
+INK, PAPER = (40, 40, 40), (255, 255, 255)
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A picture (H, W, 3) uint8, rows from the top, and what is written under it."""
+
+    picture: np.ndarray
+    label: str = ""
+
+
+def font(size: int = LABEL_SIZE) -> ImageFont.FreeTypeFont:
+    """The labels' font, which comes with matplotlib."""
+    return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)
+
+
+def display(rgba: np.ndarray) -> np.ndarray:
+    """(H, W, 3) uint8 from the top, on white paper, of a (H, W, 4) `Picture.rgba`."""
+    alpha = rgba[..., 3:]
+    shown = to_display(rgba[..., :3] * alpha + (1 - alpha))
+    return np.rint(shown[::-1] * 255).astype(np.uint8)
+
+
+def grey(tone: np.ndarray) -> np.ndarray:
+    """(H, W, 3) uint8 from the top, of (H, W) or (H, W, K) display values from the bottom."""
+    tone = tone[..., None] if tone.ndim == 2 else tone
+    shown = np.rint(np.clip(tone[::-1], 0, 1) * 255).astype(np.uint8)
+    return np.repeat(shown, 3 // shown.shape[2], axis=2)
+
+
+def magnified(picture: np.ndarray, factor: int) -> np.ndarray:
+    """A picture a whole number of times as large."""
+    height, width = picture.shape[:2]
+    large = (width * factor, height * factor)
+    return np.asarray(Image.fromarray(picture).resize(large, Image.Resampling.BICUBIC))
+
+
+def outlined(
+    picture: np.ndarray, box: tuple[int, int, int, int], colour: tuple[int, int, int]
+) -> np.ndarray:
+    """A picture with a rectangle (left, top, right, bottom) drawn around some pixels."""
+    image = Image.fromarray(picture)
+    left, top, right, bottom = box
+    outline = (left - 2, top - 2, right + 1, bottom + 1)
+    ImageDraw.Draw(image).rectangle(outline, outline=colour, width=2)
+    return np.array(image)
+
+
+def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, colour) -> np.ndarray:
+    """A picture with a small framed one in it."""
+    picture = picture.copy()
+    height, width = small.shape[:2]
+    picture[top : top + height, left : left + width] = small
+    return outlined(picture, (left, top, left + width, top + height), colour)
+
+
+def dotted(picture: np.ndarray, x: float, y: float, colour: tuple[int, int, int]) -> np.ndarray:
+    """A picture with a dot at some pixels from the upper left."""
+    size = 4
+    disc = Image.new("L", (2 * size + 3,) * 2)
+    disc = disc.resize((disc.width * 8,) * 2)
+    ImageDraw.Draw(disc).ellipse((8, 8, disc.width - 9, disc.height - 9), fill=255)
+    disc = disc.resize((2 * size + 3,) * 2, Image.Resampling.BOX)
+    image = Image.fromarray(picture)
+    place = (round(x) - size - 1, round(y) - size - 1)
+    image.paste(Image.new("RGB", disc.size, colour), place, disc)
+    return np.array(image)
+
+
+def sheet(rows: Sequence[Sequence[Panel]]) -> Image.Image:
+    """Rows of panels with their labels, as one image.
+
+    Raises
+    ------
+    ValueError
+        If a row is wider than `WIDEST`.
+    """
+    images, top = [], 0
+    widest = 0
+    for row in rows:
+        left = 0
+        height = max(panel.picture.shape[0] for panel in row)
+        lines = 1
+        for panel in row:
+            width = panel.picture.shape[1]
+            text = _wrapped(panel.label, width)
+            lines = max(lines, len(text))
+            images.append((panel.picture, text, left, top, top + height + 4))
+            left += width + GAP
+        widest = max(widest, left - GAP)
+        top += height + 4 + lines * LINE + GAP
+    if widest > WIDEST:
+        raise ValueError(f"a row of panels is {widest} pixels wide, {WIDEST} at most")
+    image = Image.new("RGB", (widest, top - GAP + 4), PAPER)
+    pen = ImageDraw.Draw(image)
+    for picture, text, left, upper, below in images:
+        image.paste(Image.fromarray(picture), (left, upper))
+        for number, line in enumerate(text):
+            pen.text((left, below + number * LINE), line, INK, font())
+    return image
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Lines of text no wider than a picture."""
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and font().getlength(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines or [""]
+
+
+def save(image: Image.Image, path: Path) -> None:
+    """Write a .png, in grey where it has no colour and with 256 colours where it has."""
+    pixels = np.asarray(image)
+    if (pixels == pixels[..., :1]).all():
+        image = image.convert("L")
+    else:
+        image = image.quantize(256, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE)
+    image.save(path, optimize=True)
+
+
+def chart(figure, width: int, height: int) -> np.ndarray:
+    """A matplotlib figure as (height, width, 3) uint8, drawn at that size."""
+    figure.set_size_inches(width / 100, height / 100)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, dpi=100, format="png", metadata={"Software": None})
+    return np.asarray(Image.open(buffer).convert("RGB"))

@@ -1,0 +1,102 @@
+"""Fields on surfaces, and pictures of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.picture import Picture
+from rosy_addon.field.corners import corner_angles, corner_rotations, smooth_faces
+from rosy_addon.field.frames import unit
+from rosy_addon.field.representation import (
+    face_frames,
+    face_representation,
+    from_representation,
+    power,
+)
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface
+from rosy_addon.projection.camera import Camera, orbit_camera
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.project import project
+
+
+def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField:
+    """The RoSy of degree N in which axes through the origin project to z = sum of (a.x + i a.y)^N.
+
+    On the sphere, the three axes of a cube and N = 4 give the pattern of a cube, singular at its
+    eight corners; the six axes of an icosahedron and N = 6 one that is singular at twelve points.
+    """
+    x, y = face_frames(surface)
+    z = power((x + 1j * y) @ axes.T, degree).sum(axis=1)
+    return RosyField(degree, from_representation(z, x, y, degree))
+
+
+def icosahedron_axes() -> np.ndarray:
+    """(6, 3) unit directions to the vertices of an icosahedron, one of each opposite pair."""
+    golden = (1 + np.sqrt(5)) / 2
+    axes = [np.roll([0, sign, golden], turn) for turn in range(3) for sign in (1, -1)]
+    return unit(np.array(axes, dtype=np.float64))
+
+
+def around_field(surface: Surface, degree: int) -> RosyField:
+    """One member around the z axis."""
+    ahead = np.cross([0.0, 0.0, 1.0], surface.face_centre)
+    ahead -= np.sum(ahead * surface.face_normal, axis=1)[:, None] * surface.face_normal
+    return RosyField(degree, unit(ahead))
+
+
+def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
+    """A field of magnitude 1 averaged with its surroundings many times over.
+
+    Singularities of opposite signs meet and vanish.
+    """
+    x, y = face_frames(surface)
+    turn = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
+    weights, z = corner_angles(surface), face_representation(surface, field)
+    for _ in range(rounds):
+        z = smooth_faces(surface, z, turn, field.degree, weights)
+        z /= np.maximum(np.abs(z), 1e-12)
+    return RosyField(field.degree, from_representation(z, x, y, field.degree))
+
+
+def view(
+    surface: Surface,
+    angles: tuple[float, float],
+    size: tuple[int, int],
+    finer: int,
+    perspective: bool = True,
+) -> Camera:
+    """A camera at an azimuth and elevation with a surface in its frame, `finer` times `size`."""
+    width, height = (finer * side for side in size)
+    return orbit_camera(surface, *angles, width, height, perspective=perspective, margin=0.006)
+
+
+def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:
+    """What a camera sees of a field; the camera is as fine as the look's supersampling."""
+    return compose(project([Body(surface, np.eye(4), field)], camera, look.display), look)
+
+
+def seen_points(
+    points: np.ndarray, normals: np.ndarray, camera: Camera, finer: int
+) -> list[tuple[float, float]]:
+    """(x, y) in pixels from the upper left of those points of a convex surface that face the eye.
+
+    `finer` is how many pixels of the camera one of the picture has.
+    """
+    place = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+    facing = np.sum(place * (normals @ camera.view[:3, :3].T), axis=1) < 0
+    clip = np.append(place[facing], np.ones((facing.sum(), 1)), axis=1) @ camera.projection.T
+    across, upward = (clip[:, :2] / clip[:, 3:] / 2 + 0.5).T
+    width, height = camera.width / finer, camera.height / finer
+    return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
+
+
+def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:
+    """(H, W) values at their pixels, 0 elsewhere."""
+    frame = np.zeros(int(np.prod(shape)), dtype=np.float64)
+    frame[pixel] = values
+    return frame.reshape(shape)

@@ -33,11 +33,11 @@ def write() -> None:
 
     page.text(
         """A 3-RoSy field with a singularity of index +1/3 in the middle becomes three vector
-        fields: V₀ takes at each point the member nearest to the guiding angle 0°, V₁ and V₂
-        those nearest to 120° and 240°. Their LIC images I₀, I₁, I₂ together have every streak,
-        but all break along the line to the left of the middle, where two members are equally
-        near to the guiding angle. The second set, I′₀, I′₁, I′₂, is guided by 60°, 180° and 300°, and
-        breaks along the line to the right."""
+        fields: V₀ takes at each point the member nearest to the guiding angle 0°, V₁ and V₂ those
+        nearest to 120° and 240°. Their LIC images I₀, I₁, I₂ together have every streak, but all
+        break along the line to the left of the middle, where two members are equally near to the
+        guiding angle. The second set, I′₀, I′₁, I′₂, is guided by 60°, 180° and 300°, and breaks
+        along the line to the right."""
     )
     page.picture(
         [_members(first, "I", 0), _members(second, "I′", 60)],
@@ -45,8 +45,8 @@ def write() -> None:
         "members",
     )
     page.text(
-        """The mean of either set has every streak, and streaks that break off where all of its images
-        do, as in the marked squares."""
+        """The mean of either set has every streak, and streaks that break off where all of its
+        images do, as in the marked squares."""
     )
     means = [
         Panel(_with_closeup(first, -1), "I, the mean of I₀, I₁, I₂, corrected; closeup 3 times"),
@@ -56,9 +56,9 @@ def write() -> None:
     ]
     page.picture([means], "The means of both sets, with closeups of the breaking points", "means")
     page.text(
-        """The blend takes I by the weight cos²(3θ/2) and I′ by sin²(3θ/2), θ being the angle of any member: each where it does not
-        break. A mean of three images is pale; its contrast is corrected as on the page of
-        [Figure 6](figure-06.md)."""
+        """The blend takes I by the weight cos²(3θ/2) and I′ by sin²(3θ/2), θ being the angle of
+        any member: each where it does not break. A mean of three images is pale; its contrast is
+        corrected as on the page of [Figure 6](figure-06.md)."""
     )
     weight = blend_weights(planar_flow(angles, DEGREE), 0.0)[:, None]
     page.picture(
@@ -88,8 +88,8 @@ def write() -> None:
 def _measure(page: Page, first: Layers, second: Layers, blend: Layers, brute: Layers) -> None:
     page.text("## Measured")
     page.text(
-        """Correlation with brute force in strips 17 pixels high along the line to the left and
-        to the right of the singularity, from 24 pixels away from it, and in the rest of the
+        """Correlation with brute force in strips 17 pixels high along the line to the left and to
+        the right of the singularity, from 24 pixels away from it, and in the rest of the
         picture."""
     )
     place = points(WHOLE)

@@ -43,12 +43,12 @@ def write() -> None:
         (f"expanded {EXPANDED} times", scale_contrast(layers.tone, EXPANDED), expected * EXPANDED),
     ]
     page.text(
-        """A constant 6-RoSy field with coloured noise, half of whose cells are bright. Each pixel of a member's LIC image is the
-        mean of many samples of noise, and so nearly normally distributed. Blending the three
-        members makes their spread smaller: the picture turns grey. It is known beforehand by
-        how much, so that no image has to be analysed to set it right: differences from
-        0.5 are multiplied by a factor. The histograms are those of the red channel; the line is the
-        normal distribution expected from theory, not a fit."""
+        """A constant 6-RoSy field with coloured noise, half of whose cells are bright. Each pixel
+        of a member's LIC image is the mean of many samples of noise, and so nearly normally
+        distributed. Blending the three members makes their spread smaller: the picture turns grey.
+        It is known beforehand by how much, so that no image has to be analysed to set it right:
+        differences from 0.5 are multiplied by a factor. The histograms are those of the red
+        channel; the line is the normal distribution expected from theory, not a fit."""
     )
     images = [_cut(channel_wise) for _, channel_wise, _ in shown]
     panels = [
@@ -78,11 +78,12 @@ def write() -> None:
     page.table(["Image", "Mean", "Standard deviation", "Theory", "Difference"], rows)
     page.text(
         f"""The paper takes the M streamlines through a pixel for independent, and multiplies by
-        √M. They cross at that pixel and share the noise around it. In white noise, which the paper uses, they
-        have enough in common for √M to be too much; here variations broader than {LOOK.high_pass:.0f} pixels
-        are taken out of the noise before, and little is left in common. Below, for grey pictures of constant fields: the factor
-        used, and the standard deviation after correction over that of one member image in theory
-        (mean of {SEEDS} noises)."""
+        √M. They cross at that pixel and share the noise around it. In white noise, which the paper
+        uses, they have enough in common for √M to be too much; here variations broader than
+        {LOOK.high_pass:.0f} pixels are taken out of the noise before, and little is left in
+        common. Below, for grey pictures of constant fields: the factor used, and the standard
+        deviation after correction over that of one member image in theory (mean of {SEEDS}
+        noises)."""
     )
     rows = []
     for degree in range(2, 8):

@@ -70,8 +70,8 @@ def _write_plane(page: Page) -> None:
         rows.append([f"{tilt}°", listed(there), listed(found)])
     page.picture([panels], "A 4-RoSy field on a plane at three tilts", "plane")
     page.text(
-        """Measured: the orientations at which the power of streaks peaks, beside those of
-        the projected members, in degrees."""
+        """Measured: the orientations at which the power of streaks peaks, beside those of the
+        projected members, in degrees."""
     )
     page.table(["Tilt", "Projected members", "Found in the picture"], rows)
 
@@ -85,9 +85,9 @@ def _write_sphere(page: Page) -> None:
         f"""A 4-RoSy field on a sphere that forms a cube: {len(index)} singularities of index +1/4
         at the corners. If members are chosen among their projections, as in the plane, the two
         sets of images break at lines that come close to each other where the surface turns away,
-        and the weights do not know it: streaks break off (left). If the members are
-        first rotated into the view plane, where they are at equal angles, and rotated back once
-        chosen, nothing breaks (right)."""
+        and the weights do not know it: streaks break off (left). If the members are first rotated
+        into the view plane, where they are at equal angles, and rotated back once chosen, nothing
+        breaks (right)."""
     )
     camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
     pictures = {name: compose_view(surface, field, look, camera) for name, look in WAYS.items()}
@@ -111,8 +111,8 @@ def _write_sphere(page: Page) -> None:
     page.picture([closeups], "Closeups of the marked square, and brute force", "closeup")
     page.text(
         """Measured: correlation with brute force, over the sphere, in the marked square, and
-        around each pixel (Gaussian window with a deviation of 3 pixels): its lowest hundredth,
-        and the part of the sphere where it is below 0.9."""
+        around each pixel (Gaussian window with a deviation of 3 pixels): its lowest hundredth, and
+        the part of the sphere where it is below 0.9."""
     )
     covered, square = seen > 0, np.zeros(seen.shape, dtype=bool)
     square[_fine(SIZE - bottom, SIZE - top), _fine(left, right)] = True

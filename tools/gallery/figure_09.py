@@ -37,8 +37,8 @@ def write() -> None:
     page.text(
         """A 4-RoSy field with five singularities, at which its magnitude falls to zero. With
         nothing driven by it (a), the magnitude cannot be seen; it can be mapped to colour (b), to
-        the length of the streaks (c), or to both (d). Where streaks are short their contrast is lowered,
-        or the mean of a few samples would glare."""
+        the length of the streaks (c), or to both (d). Where streaks are short their contrast is
+        lowered, or the mean of a few samples would glare."""
     )
     names = {
         "none": "(a) magnitude not shown",
@@ -61,9 +61,9 @@ def _measure(page: Page) -> None:
     rho = np.abs(z) / np.abs(z).max()
     page.text(
         """Colour: rank correlation of the magnitude with the luminance of the picture, averaged
-        over squares of 10 pixels so that streaks do not count. Length: how many pixels ahead along a member the
-        image of that member has a correlation of one half with itself; near zeros it is shorter even
-        for streaks of full length, since they bend."""
+        over squares of 10 pixels so that streaks do not count. Length: how many pixels ahead along
+        a member the image of that member has a correlation of one half with itself; near zeros it
+        is shorter even for streaks of full length, since they bend."""
     )
     cells = (SIZE // 10, 10, SIZE // 10, 10)
     luminance = {}

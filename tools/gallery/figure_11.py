@@ -37,11 +37,11 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-11", "Surfaces")
     page.text(
-        """4-RoSy fields along the principal curvatures of Suzanne (a, b) and of a triple torus (c, d),
-        in grey and in coloured noise, which makes a plaid; a trefoil knot with the confidence of its
-        curvature as colour (e); and 6-RoSy fields on a sphere, singular at the twelve
-        vertices of an icosahedron (f), and on a torus, singular nowhere (g, h). The light comes from the eye.
-        All of the meshes are made by Blender or by this page's own script."""
+        """4-RoSy fields along the principal curvatures of Suzanne (a, b) and of a triple torus (c,
+        d), in grey and in coloured noise, which makes a plaid; a trefoil knot with the confidence
+        of its curvature as colour (e); and 6-RoSy fields on a sphere, singular at the twelve
+        vertices of an icosahedron (f), and on a torus, singular nowhere (g, h). The light comes
+        from the eye. All of the meshes are made by Blender or by this page's own script."""
     )
     monkey, rings, ring, ball, trefoil = suzanne(), triple_torus(), torus(), sphere(64), knot()
     fields = {
@@ -95,8 +95,9 @@ def write() -> None:
         [_census(name, surface, field) for name, (surface, field) in fields.items()],
     )
     page.text(
-        """The pixels' standard deviation after correction, over all that is seen, beside that expected of one
-        member image with whole streamlines times the gain; drawn at twice the size, before light and averaging."""
+        """The pixels' standard deviation after correction, over all that is seen, beside that
+        expected of one member image with whole streamlines times the gain; drawn at twice the
+        size, before light and averaging."""
     )
     page.table(["Picture", "Mean", "Standard deviation", "Theory"], rows)
     page.write("Figure 11")

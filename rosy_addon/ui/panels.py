@@ -16,7 +16,17 @@ from . import status
 
 #: Settings of a look, in the groups in which a user looks for them.
 GROUPS = {
-    "Streaks": ("length", "step", "grain", "gain", "foreshorten", "cross_creases", "crease_angle"),
+    "Streaks": (
+        "length",
+        "step",
+        "grain",
+        "density",
+        "gain",
+        "high_pass",
+        "foreshorten",
+        "cross_creases",
+        "crease_angle",
+    ),
     "Colour": ("noise", "magnitude", "magnitude_range", "colour_map"),
     "Light": ("shading", "light"),
     "Quality": ("supersampling", "display", "method", "seed"),
@@ -31,6 +41,10 @@ OTHERS = tuple(
 
 #: Settings of where the picture goes and how it shines there.
 OUTPUT = ("percentage", "placement", "emission", "diffuse", "store", "directory", "image_format")
+
+
+#: Where a property's own name does not fit beside its value in a sidebar of usual width.
+SHORT_NAMES = {"magnitude_range": "Top Value", "undefined": "Skip Bad Vectors"}
 
 
 class _Sidebar:
@@ -129,11 +143,11 @@ def _draw_picture(
 
 def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:
     box = layout.box().column(align=True)
+    box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
     row = box.row()
-    row.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
+    row.label(text=f"{bake.width} x {bake.height} pixels")
     if several:
         row.operator("rosy.show", text="Show").camera = bake.camera
-    box.label(text=f"{bake.width} x {bake.height} pixels")
     if bake.stale:
         box.label(text="Out of date:", icon="ERROR")
         box.label(text=bake.stale)
@@ -205,7 +219,7 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
             inside = settings.look if hasattr(settings.look, name) else settings
             row = column.row()
             row.active = _matters(settings, name)
-            row.prop(inside, name)
+            row.prop(inside, name, text=SHORT_NAMES.get(name))
 
     members = {
         "__doc__": f"{label}: settings of the picture.",

@@ -168,12 +168,15 @@ def all_is_quiet():
             assert "rosy" not in getattr(handler, "__module__", ""), name
 
 
-def broken_off(interrupt, *, unchanged=True):
+def broken_off(interrupt, *, unchanged=True, photographed=None):
     """Start a long bake, do `interrupt`, and see that it ends and leaves the scene as it was."""
     yield from fresh_scene(size=(1600, 1200))
     make_field()
     before = contents()
     yield from start_bake()
+    if photographed is not None:
+        yield from photograph(photographed, 360)
+        assert status().now is not None, "the bake was over before its picture was taken"
     interrupt()
     yield from until(lambda: status().now is None)
     yield 0.5
@@ -182,15 +185,17 @@ def broken_off(interrupt, *, unchanged=True):
         assert contents() == before
 
 
-def photograph(name):
-    """Save the sidebar, down to where its panels end, as NAME.png."""
-    yield 0.5
-    window, _, _, sidebar = view()
+def photograph(name, height=10_000):
+    """Save the upper part of the sidebar as NAME.png, and the window as window-NAME.png."""
+    window, area, _, sidebar = view()
+    for _ in range(10):  # panels that were opened or have grown glide into place
+        area.tag_redraw()
+        yield 0.1
     # Blender's own screenshot is black on software OpenGL; the X server knows better.
     whole = SHOTS / f"window-{name}.png"
     subprocess.run(["import", "-window", "root", str(whole)], check=True, timeout=20)
     left, top = sidebar.x, window.height - sidebar.y - sidebar.height
-    part = f"{sidebar.width}x{sidebar.height}+{left}+{top}"
+    part = f"{sidebar.width}x{min(height, sidebar.height)}+{left}+{top}"
     path = SHOTS / f"{name}.png"
     subprocess.run(
         ["convert", str(whole), "-crop", part, "+repage", str(path)], check=True, timeout=20
@@ -203,27 +208,24 @@ def photograph(name):
 
 def panel_without_field():
     yield from fresh_scene()
-    yield from photograph("panel-1-no-field")
+    yield from photograph("panel-1-no-field", 390)
 
 
 def panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
-    yield from photograph("panel-2-field")
+    yield from photograph("panel-2-field", 430)
 
 
 def bake_with_progress():
-    yield from fresh_scene(size=(640, 480))
+    yield from fresh_scene(size=(800, 600))
     make_field()
     yield from start_bake()
     seen, longest, last = [], 0.0, time.monotonic()
     while status().now is not None:
-        longest, last = max(longest, time.monotonic() - last), time.monotonic()
         seen.append(status().now.fraction)
-        if len(seen) == 3:
-            yield from photograph("baking")
-            last = time.monotonic()
         yield
+        longest, last = max(longest, time.monotonic() - last), time.monotonic()
     assert len(set(seen)) >= 3, seen
     assert seen == sorted(seen), seen
     assert longest < 2.0, f"Blender did not respond for {longest:.1f} s"
@@ -234,7 +236,7 @@ def bake_with_progress():
 def panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
-    yield from photograph("panel-3-baked")
+    yield from photograph("panel-3-baked", 560)
 
 
 def panel_out_of_date():
@@ -303,7 +305,7 @@ def stop_with_escape():
         window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
         window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
 
-    yield from broken_off(press)
+    yield from broken_off(press, photographed="baking")
 
 
 def stop_when_an_object_is_deleted():

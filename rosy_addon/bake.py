@@ -89,7 +89,7 @@ def baking(
             projecting(reading.bodies, fine[number], look.display), start, middle
         )
         picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
-        shots.append(Shot(picture, views[number], look, _camera_object(scene, source)))
+        shots.append(Shot(picture, views[number], _camera_object(scene, source)))
     yield Progress(0.97, "putting the picture on")
     return [apply_picture(scene, reading, shot, settings) for shot in shots]
 

@@ -132,14 +132,12 @@ class Shot:
     ----------
     picture : Picture
     camera : Camera
-    look : Look
     camera_object : bpy.types.Object or None
         None for a view.
     """
 
     picture: Picture
     camera: Camera
-    look: Look
     camera_object: bpy.types.Object | None = None
 
 
@@ -385,7 +383,7 @@ def _remember(
             _delete(before)
             after.name = f"RoSy {name}"
     record.height, record.width = shot.picture.rgba.shape[:2]
-    record.look = _look_state(shot.look)
+    record.look = _look_state(look_of(scene.rosy))
     record.camera_state = (
         _camera_state(scene, shot.camera_object) if shot.camera_object is not None else ""
     )

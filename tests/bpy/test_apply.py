@@ -282,3 +282,33 @@ def test_lit_by_the_scene(scene, camera, monkey):
     brightness = (rgba[..., 0] * rgba[..., 3]).sum(axis=0)
     middle = (rgba[..., 3].sum(axis=0) * columns).sum() / rgba[..., 3].sum()
     assert brightness[columns > middle].sum() > 2 * brightness[columns < middle].sum()
+
+
+def test_undo_brings_back_the_former_picture(scene, camera, monkey):
+    bake(scene)
+    former = pixels(bpy.data.images["RoSy Camera"])
+    bpy.ops.ed.undo_push(message="first")
+    bake(scene, look=Look(seed=3))
+    latter = pixels(bpy.data.images["RoSy Camera"])
+    assert np.abs(former - latter).max() > 0.1
+    bpy.ops.ed.undo_push(message="second")
+    bpy.ops.ed.undo()
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), former)
+    bpy.ops.ed.redo()
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), latter)
+
+
+def test_a_look_given_does_not_make_it_stale(scene, camera, monkey):
+    bake(scene, look=Look(seed=3))
+    assert bakes(scene)[0].stale == ""
+
+
+def test_a_view(scene, monkey):
+    """From a 3D view: a camera that is not in the scene."""
+    from rosy.rosy_addon.projection.camera import look_at, perspective_camera
+    from rosy.rosy_addon.scene.cameras import VIEW_NAME
+
+    view = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 80, 60, name=VIEW_NAME)
+    (baked,) = bake(scene, cameras=[view])
+    assert tuple(baked.image.size) == (80, 60)
+    assert [(entry.camera, entry.stale) for entry in bakes(scene)] == [("3D View", "")]

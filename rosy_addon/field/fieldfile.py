@@ -88,7 +88,7 @@ def _read_rawfield(rows: Rows, surface: Surface) -> tuple[int, np.ndarray]:
     degree, count, numbers = _header(rows, "degree", "count")
     degree = _degree(rows, 0, degree)
     members = _table(rows, numbers, 3 * degree, count, surface).reshape(-1, degree, 3)
-    check_members(rows.path, members, surface)
+    check_members(str(rows.path), members, surface)
     vectors = members[:, 0].copy()
     vectors[~np.isfinite(members).all(axis=(1, 2))] = np.nan
     return degree, vectors
@@ -138,10 +138,23 @@ def _table(rows: Rows, numbers: int, columns: int, count: int, surface: Surface)
     return rows.floats("part of a vector")[2:].reshape(found, columns)
 
 
-def check_members(path: Path, members: np.ndarray, surface: Surface) -> None:
-    """Raise an error unless the members of each row are a RoSy, in whatever order.
+def check_members(source: str, members: np.ndarray, surface: Surface) -> None:
+    """Make sure that vectors given together are a RoSy, in whatever order.
 
-    `members` is (n, N, 3). Rows that hold zeros alone, or anything not finite, are left out.
+    Parameters
+    ----------
+    source : str
+        File or attributes, for messages.
+    members : (n, N, 3) ndarray
+        N vectors on each face or each vertex. Rows of zeros, and those that hold anything not
+        finite, are left out.
+    surface : Surface
+
+    Raises
+    ------
+    RosyError
+        If angles between neighbours or lengths differ by more than `ANGLE_TOLERANCE` and
+        `LENGTH_TOLERANCE`, with the largest deviations.
     """
     count, degree = members.shape[:2]
     length = np.sqrt(dot(members, members))
@@ -164,7 +177,7 @@ def check_members(path: Path, members: np.ndarray, surface: Surface) -> None:
         shorter, longer = length[usable].min(), length[usable].max()
         worst = rows[usable][np.argmax(off)]
         raise RosyError(
-            f"{path}: its vectors are not a RoSy of degree {degree}: the angles between neighbours "
+            f"{source}: its vectors are not a RoSy of degree {degree}: the angles between neighbours "
             f"deviate from {360 / degree:.4g} degrees by up to {off.max():.1f} (row {worst}) and "
             f"lengths within a row by up to {100 * spread.max():.0f} % (all are {shorter:.2g} to "
             f"{longer:.2g}); {ANGLE_TOLERANCE:g} degree and {100 * LENGTH_TOLERANCE:g} % are allowed"

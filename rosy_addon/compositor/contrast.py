@@ -9,11 +9,12 @@ from .look import Look
 from .noise import MEAN, streak_statistics
 
 
-def even_out(mean: np.ndarray, samples: np.ndarray, full: int) -> np.ndarray:
+def even_out(mean: np.ndarray, samples: np.ndarray, look: Look) -> np.ndarray:
     """Give streamlines that ended early the spread of whole ones.
 
     The mean of n samples has full / n times the variance of that of all of them; without this,
-    borders and the surroundings of zeros glare.
+    borders and the surroundings of zeros glare. Means over less than two cells of the noise are
+    hardly means at all, but bright and dark dots: these fade to grey.
 
     Parameters
     ----------
@@ -21,10 +22,13 @@ def even_out(mean: np.ndarray, samples: np.ndarray, full: int) -> np.ndarray:
         Mean noise along each streamline.
     samples : (P,) float32 ndarray
         n, at least 1.
-    full : int
-        Samples of a whole streamline.
+    look : Look
+        Its `length`, `step` and `grain` count.
     """
-    return MEAN + (mean - MEAN) * np.sqrt(samples / np.float32(full))[:, None]
+    full = np.float32(2 * look.length + 1)
+    cells = samples * np.float32(look.step / look.grain)
+    factor = np.sqrt(samples / full) * np.minimum(cells / 2, 1)
+    return MEAN + (mean - MEAN) * factor[:, None]
 
 
 def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:

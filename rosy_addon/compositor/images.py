@@ -63,7 +63,6 @@ def member_images(
         One a member.
     """
     count, channels = noise.shape
-    full = 2 * look.length + 1
     limit = limits(flow, look)
     ended = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(walkers), count, channels), dtype=np.float32)
@@ -77,7 +76,7 @@ def member_images(
                 half, more = gather(flow, block, follow, ended, look.length, look.step, steps)
                 total += half
                 found += more
-            members[member, block] = even_out(total / found[:, None], found, full)
+            members[member, block] = even_out(total / found[:, None], found, look)
             samples[block] += found
             fraction = (member + block.stop / count) / len(walkers)
             yield Progress(fraction, "Following streamlines")

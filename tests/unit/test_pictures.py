@@ -18,7 +18,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 from rosy_addon.projection.gbuffer import Body
 from rosy_addon.projection.project import project
 
-PLAIN = Look(gain=1.0, density=0.5, high_pass=0.0, shading=0.0)
+PLAIN = Look(gain=1.0, grain=1.5, density=0.5, high_pass=0.0, shading=0.0)
 
 
 def plain(**settings):

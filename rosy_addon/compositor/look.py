@@ -12,6 +12,11 @@ def _number(default: float, low: float, high: float, text: str) -> Any:
     return field(default=default, metadata={"low": low, "high": high, "text": text})
 
 
+def _angle(default: float, low: float, high: float, text: str) -> Any:
+    """Radians here; the panel may show degrees."""
+    return field(default=default, metadata={"low": low, "high": high, "text": text, "unit": "angle"})
+
+
 def _choice(default: str, text: str, **options: str) -> Any:
     return field(default=default, metadata={"options": options, "text": text})
 
@@ -76,14 +81,14 @@ class Look:
     )
     seed: int = _number(0, 0, 2**31 - 1, "Which noise")
     gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
-    guiding_angle: float = _number(
+    guiding_angle: float = _angle(
         0.0, -3.1416, 3.1416, "Direction in the picture nearest to which the first member is chosen"
     )
     foreshorten: bool = _switch(
         False, "Let streaks shorten where the surface turns away, instead of keeping their length"
     )
     cross_creases: bool = _switch(False, "Let streaks run across sharp creases")
-    crease_angle: float = _number(
+    crease_angle: float = _angle(
         0.7, 0.0, 3.1416, "Angle between neighbouring pixels' normals that is a sharp crease"
     )
     magnitude: str = _choice(

@@ -54,8 +54,10 @@ def _look_property(entry: Any) -> Any:
         return bpy.props.EnumProperty(items=items, **what)
     if isinstance(entry.default, bool):
         return bpy.props.BoolProperty(**what)
-    kind = bpy.props.IntProperty if isinstance(entry.default, int) else bpy.props.FloatProperty
-    return kind(min=rules["low"], max=rules["high"], **what)
+    what |= {"min": rules["low"], "max": rules["high"]}
+    if isinstance(entry.default, int):
+        return bpy.props.IntProperty(**what)
+    return bpy.props.FloatProperty(subtype="ANGLE" if "unit" in rules else "NONE", **what)
 
 
 class RosyLook(bpy.types.PropertyGroup):

@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
 def render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file."""
     check_writable(options.output)
-    look = _look(options, Look())
+    look = _look(options, Look(supersampling=2))  # for smooth edges: nothing draws over them later
     surface, field = _mesh_and_field(options)
     matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
     camera = _camera(options, surface.vertices @ matrix[:3, :3].T, look.supersampling)

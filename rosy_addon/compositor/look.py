@@ -58,7 +58,7 @@ class Look:
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
-    grain: float = _number(2.0, 0.5, 256.0, "Size of a cell of the noise, in pixels")
+    grain: float = _number(1.5, 0.5, 256.0, "Size of a cell of the noise, in pixels")
     density: float = _number(
         0.1,
         0.001,

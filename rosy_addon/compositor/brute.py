@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Work
-from .flow import Flow, image_count, nearest_member, rotations
+from .flow import Flow, all_members, image_count
 from .images import Images, Walker, member_images
 from .look import Look
 from .streamlines import Direction, direction_table, interpolate
@@ -23,13 +23,12 @@ def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     look : Look
     noise : (P, K) float32 ndarray
     """
-    nearest = nearest_member(flow, look.guiding_angle)
     fan = np.zeros((len(flow.pixel) + 1, flow.degree), dtype=np.complex64)
     screen = np.zeros((len(flow.pixel) + 1, flow.degree, 4), dtype=np.float32)
-    for member, turn in enumerate(rotations(flow.degree)):
-        fan[:-1, member] = nearest * turn
-        directions = flow.on_screen(nearest * turn, look.foreshorten)
-        screen[:, member] = direction_table(flow, directions, fan[:-1, member])
+    for number, member in enumerate(all_members(flow, look.guiding_angle)):
+        fan[:-1, number] = member
+        directions = flow.on_screen(member, look.foreshorten)
+        screen[:, number] = direction_table(flow, directions, member)
     walkers = [_best_of(fan, screen, member) for member in range(image_count(flow.degree))]
     return (yield from member_images(flow, look, noise, walkers))
 

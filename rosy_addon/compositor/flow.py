@@ -186,8 +186,8 @@ def blend_weights(flow: Flow, guiding_angle: float) -> np.ndarray:
 
     Equal to 0 at the breaking points of that set and to 1 at those of the other.
     """
-    turned = phase(flow.representation) * np.exp(-1j * flow.degree * guiding_angle)
-    return (0.5 + 0.5 * turned.real).astype(np.float32)
+    toward = turned(phase(flow.representation), -flow.degree * guiding_angle)
+    return (0.5 + 0.5 * toward.real).astype(np.float32)
 
 
 def nearest_member(flow: Flow, guiding_angle: float) -> np.ndarray:
@@ -195,16 +195,22 @@ def nearest_member(flow: Flow, guiding_angle: float) -> np.ndarray:
 
     Of two equally near ones it is the one on the counter-clockwise side, as in the paper.
     """
-    turned = flow.representation.astype(np.complex128)
-    turned *= np.exp(-1j * flow.degree * guiding_angle)
-    member = np.exp(1j * (np.angle(turned) / flow.degree + guiding_angle))
+    toward = flow.representation.astype(np.complex128)
+    toward *= np.exp(-1j * flow.degree * guiding_angle)
+    member = np.exp(1j * (np.angle(toward) / flow.degree + guiding_angle))
     member[flow.representation == 0] = 0
     return member.astype(np.complex64)
 
 
-def rotations(degree: int) -> np.ndarray:
-    """(N,) complex128 roots of unity: the turns from one member to the others."""
-    return np.exp(2j * np.pi * np.arange(degree) / degree)
+def turned(numbers: np.ndarray, angle: float) -> np.ndarray:
+    """complex64 numbers rotated by an angle; the product is rounded once, by every numpy alike."""
+    return (numbers.astype(np.complex128) * np.complex128(np.exp(1j * angle))).astype(np.complex64)
+
+
+def all_members(flow: Flow, guiding_angle: float) -> list[np.ndarray]:
+    """N times (P,) complex64: the member nearest to a guiding angle, and its rotations."""
+    nearest = nearest_member(flow, guiding_angle)
+    return [turned(nearest, 2 * np.pi * k / flow.degree) for k in range(flow.degree)]
 
 
 def image_count(degree: int) -> int:

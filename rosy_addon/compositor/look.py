@@ -14,7 +14,9 @@ def _number(default: float, low: float, high: float, text: str) -> Any:
 
 def _angle(default: float, low: float, high: float, text: str) -> Any:
     """Radians here; the panel may show degrees."""
-    return field(default=default, metadata={"low": low, "high": high, "text": text, "unit": "angle"})
+    return field(
+        default=default, metadata={"low": low, "high": high, "text": text, "unit": "angle"}
+    )
 
 
 def _choice(default: str, text: str, **options: str) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Work, part
-from .flow import Flow, blend_weights, image_count, nearest_member, rotations
+from .flow import Flow, all_members, blend_weights, image_count
 from .images import Images, Walker, member_images
 from .look import Look
 from .streamlines import direction_table, interpolate
@@ -55,8 +55,7 @@ def _walkers(flow: Flow, look: Look, angle: float) -> list[Walker]:
     if not look.view_plane:
         fields = _projected_fields(flow, angle)
         return [_along(direction_table(flow, field, field)) for field in fields]
-    nearest = nearest_member(flow, angle)
-    members = [nearest * turn for turn in rotations(flow.degree)[: image_count(flow.degree)]]
+    members = all_members(flow, angle)[: image_count(flow.degree)]
     return [
         _along(direction_table(flow, flow.on_screen(member, look.foreshorten), member))
         for member in members
@@ -81,8 +80,7 @@ def _projected_fields(flow: Flow, angle: float) -> list[np.ndarray]:
     On a tilted surface their angles on screen are not 2 pi / N apart, so that the two sets of
     breaking points come close to each other and the weights no longer tell where they are.
     """
-    nearest = nearest_member(flow, 0.0)
-    members = np.stack([flow.on_screen(nearest * turn) for turn in rotations(flow.degree)])
+    members = np.stack([flow.on_screen(member) for member in all_members(flow, 0.0)])
     fields = []
     for member in range(image_count(flow.degree)):
         guide = np.exp(-1j * (angle + 2 * np.pi * member / flow.degree))

@@ -61,8 +61,17 @@ def _matching(fan: np.ndarray, screen: np.ndarray, start: np.ndarray, sign: int)
     def follow(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
         nonlocal heading
         there = fan.take(entry, axis=0)
-        match = there.real * heading.real[:, None] + there.imag * heading.imag[:, None]
-        best = entry * degree + match.argmax(axis=1).astype(np.int32)
+        # Member by member: numpy is slow at the maximum of a few numbers in each of many rows.
+        x, y = heading.real.copy(), heading.imag.copy()
+        closest = np.full(len(entry), -np.inf, dtype=np.float32)
+        chosen = np.zeros(len(entry), dtype=np.int32)
+        for number in range(degree):
+            match = there[:, number].real * x
+            match += there[:, number].imag * y
+            closer = match > closest
+            np.maximum(match, closest, out=closest)
+            np.copyto(chosen, np.int32(number), where=closer)
+        best = entry * degree + chosen
         heading = members.take(best)
         return np.float32(sign) * interpolate(tables.take(best, axis=0), offset)
 

@@ -30,9 +30,10 @@ class Flow:
     axes : (P, 2) complex64 ndarray or None
         On screen, in pixels as x + i y, the axes of the view plane's frame at each pixel as they
         lie on the surface. None in the plane, where they are 1 and i.
-    neighbours : (P + 1, 9) int32 ndarray
+    neighbours : (9, P + 1) int32 ndarray
         Which entry of this list a streamline is on after a step to each of `OFFSETS`, P if it ends
-        there. Row P, the state of those that have ended, leads to P alone.
+        there. Column P, the state of those that have ended, leads to P alone. One row an offset,
+        since a streamline goes on in one direction and then finds the next entries side by side.
     """
 
     degree: int
@@ -86,7 +87,7 @@ class Flow:
         same = np.cos(np.pi / max(self.degree, 2))
         sine = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-            there = self.neighbours[:-1, OFFSETS.index(offset)]
+            there = self.neighbours[OFFSETS.index(offset), :-1]
             turn = direction.take(there) * here
             alike = (member.take(there) * member_here).real > same
             sine.append(np.where(alike & (turn.real > 0), turn.imag, 0))
@@ -168,16 +169,16 @@ def planar_flow(
 def _neighbours(
     pixel: np.ndarray, width: int, height: int, joined: np.ndarray, defined: np.ndarray
 ) -> np.ndarray:
-    """(P + 1, 9) table of `Flow.neighbours` from the bits of `links`."""
+    """(9, P + 1) table of `Flow.neighbours` from the bits of `links`."""
     count = len(pixel)
     # A frame with a border of one pixel, so that no step needs a test for the edge of the picture.
     entry = np.full((height + 2) * (width + 2), count, dtype=np.int32)
     bordered = (pixel // width + 1) * (width + 2) + pixel % width + 1
     entry[bordered] = np.where(defined, np.arange(count, dtype=np.int32), count)
-    table = np.full((count + 1, 9), count, dtype=np.int32)
+    table = np.full((9, count + 1), count, dtype=np.int32)
     for bit, (dx, dy) in enumerate(OFFSETS):
         there = entry[bordered + dy * (width + 2) + dx]
-        table[:count, bit] = np.where(joined >> bit & 1, there, count)
+        table[bit, :count] = np.where(joined >> bit & 1, there, count)
     return table
 
 

@@ -127,7 +127,7 @@ def gather(
         whole = np.clip(np.rint(offset), -1, 1)
         offset -= whole
         move = whole[:, 0] + 3 * whole[:, 1]
-        entry = neighbours.take(entry * 9 + (move.astype(np.int32) + 4))
+        entry = neighbours.take((move.astype(np.intp) + 4) * (end + 1) + entry)
         if limit is not None:
             entry[limit < count] = end
         alive = entry != end

@@ -126,7 +126,7 @@ def test_silhouettes_end_streamlines():
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = seen(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
     flow = surface_flow(gbuffer, 1, 0.7, False)
-    linked = flow.neighbours[:-1]
+    linked = flow.neighbours[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
     # The tube is 0.8 across; at the two cusps, where a silhouette begins, a pixel can span half.

@@ -19,11 +19,13 @@ from .members import members_images
 from .noise import MEAN, image_noise
 from .picture import Layers, Picture
 from .shading import Light, diffuse
+from .sheets import sheets_images
 
 #: The ways to compose, by their names in a look.
 METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
     "members": members_images,
     "brute": brute_images,
+    "sheets": sheets_images,
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,10 +31,9 @@ class Flow:
     axes : (P, 2) complex64 ndarray or None
         On screen, in pixels as x + i y, the axes of the view plane's frame at each pixel as they
         lie on the surface. None in the plane, where they are 1 and i.
-    neighbours : (9, P + 1) int32 ndarray
-        Which entry of this list a streamline is on after a step to each of `OFFSETS`, P if it ends
-        there. Column P, the state of those that have ended, leads to P alone. One row an offset,
-        since a streamline goes on in one direction and then finds the next entries side by side.
+    joined : (P,) uint16 ndarray
+        To which of its 3 x 3 neighbours a streamline may step from each pixel: bit i is for
+        `OFFSETS[i]`. Pixels where the field is undefined are joined to none.
     """
 
     degree: int
@@ -42,7 +42,24 @@ class Flow:
     pixel: np.ndarray
     representation: np.ndarray
     axes: np.ndarray | None
-    neighbours: np.ndarray
+    joined: np.ndarray
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """(9, P + 1) int32: the entry of the list after a step to each of `OFFSETS`.
+
+        P where streamlines end; column P, the state of those that have, leads to P alone. One row
+        an offset, since a streamline goes on in one direction and then finds the next entries side
+        by side.
+        """
+        count = len(self.pixel)
+        entry = np.full(self.height * self.width, count, dtype=np.int32)
+        entry[self.pixel] = np.arange(count, dtype=np.int32)
+        table = np.full((9, count + 1), count, dtype=np.int32)
+        for bit, (dx, dy) in enumerate(OFFSETS):
+            here = np.flatnonzero(self.joined >> bit & 1)
+            table[bit, here] = entry[self.pixel[here] + (dy * self.width + dx)]
+        return table
 
     def on_screen(self, member: np.ndarray, foreshorten: bool = False) -> np.ndarray:
         """Directions in the view plane as they run on screen.
@@ -120,7 +137,9 @@ def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creas
     if chosen.all():
         chosen = slice(None)
     z = gbuffer.representation[chosen]
-    pixel, camera = gbuffer.pixel[chosen], gbuffer.camera
+    pixel, camera, joined = gbuffer.pixel[chosen], gbuffer.camera, joined[chosen]
+    if not z.all():
+        joined = _closed(joined, pixel, camera.width, camera.height, z != 0)
     return Flow(
         degree=degree,
         width=camera.width,
@@ -128,7 +147,7 @@ def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creas
         pixel=pixel,
         representation=z,
         axes=axes[chosen],
-        neighbours=_neighbours(pixel, camera.width, camera.height, joined[chosen], z != 0),
+        joined=joined,
     )
 
 
@@ -162,24 +181,31 @@ def planar_flow(
         pixel=pixel,
         representation=z,
         axes=None,
-        neighbours=_neighbours(pixel, width, height, everywhere, z != 0),
+        joined=_closed(everywhere, pixel, width, height, z != 0),
     )
 
 
-def _neighbours(
-    pixel: np.ndarray, width: int, height: int, joined: np.ndarray, defined: np.ndarray
+def _closed(
+    joined: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
-    """(9, P + 1) table of `Flow.neighbours` from the bits of `links`."""
-    count = len(pixel)
-    # A frame with a border of one pixel, so that no step needs a test for the edge of the picture.
-    entry = np.full((height + 2) * (width + 2), count, dtype=np.int32)
+    """`Flow.joined`: bits of `links`, but for those that lead to where the field is undefined.
+
+    Parameters
+    ----------
+    joined : (P,) uint16 ndarray
+    pixel : (P,) int ndarray
+    width, height : int
+        Of the frame; nothing is defined beyond it.
+    defined : (P,) bool ndarray
+    """
+    inside = np.zeros((height + 2) * (width + 2), dtype=bool)
     bordered = (pixel // width + 1) * (width + 2) + pixel % width + 1
-    entry[bordered] = np.where(defined, np.arange(count, dtype=np.int32), count)
-    table = np.full((9, count + 1), count, dtype=np.int32)
+    inside[bordered] = defined
+    joined = joined * defined
     for bit, (dx, dy) in enumerate(OFFSETS):
-        there = entry[bordered + dy * (width + 2) + dx]
-        table[bit, :count] = np.where(joined >> bit & 1, there, count)
-    return table
+        closed = ~inside[bordered + (dy * (width + 2) + dx)]
+        joined &= ~(closed.astype(np.uint16) << np.uint16(bit))
+    return joined
 
 
 def blend_weights(flow: Flow, guiding_angle: float) -> np.ndarray:

@@ -38,6 +38,7 @@ class Look:
     method: str = _choice(
         "members",
         "How the N directions become one picture",
+        sheets="Each streamline of the covering surface once: fast, without breaking points",
         members="The paper's decomposition into member vector fields",
         brute="Follow the best of N directions at every step: slow, the yardstick",
     )

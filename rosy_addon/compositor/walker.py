@@ -1,0 +1,265 @@
+"""Many streamlines of a covering, walked side by side, both ways from their seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .covering import END, OPEN, Covering
+from .look import Look
+
+#: Steps after which those that have ended are left out, if they are many.
+COMPACTED = 16
+
+#: The share of the slope across a streamline that counts. Differences over two pixels tell the
+#: change over half of one only in part; this much gives streaks the width that brute force gives.
+LATERAL = 0.7
+
+
+class Walker:
+    """Streamlines of one length, and the room for some of them at once.
+
+    The room is large and used again and again: fresh memory is slower than all that is done there.
+
+    Parameters
+    ----------
+    covering : Covering
+    look : Look
+        Its `length` and `step` count.
+    limit : (C,) intp ndarray or None
+        Steps each way that count for a cell; None for `look.length`.
+    served : int
+        Steps each way for which streamlines serve the states that they pass; beyond them they
+        only gather noise for these.
+    most : int
+        Streamlines at once, at most.
+    """
+
+    def __init__(
+        self, covering: Covering, look: Look, limit: np.ndarray | None, served: int, most: int
+    ) -> None:
+        self._covering = covering
+        self._served, self._reach = served, served + look.length
+        self._length = look.length
+        step, tone, slope = covering.units
+        self._step, self._tone = np.float32(1.5 * step), np.float32(tone)
+        self._lateral = np.float32(LATERAL * slope / look.step * step)
+        self._limit = None if limit is None else np.tile(limit, covering.lines)
+        lanes, channels = 2 * most, covering.channels
+        self._sums = np.empty((self._reach + 1, lanes, channels), dtype=np.complex64)
+        self._state = np.empty((served + 1, lanes), dtype=np.int32)
+        self._aside = np.empty((served + 1, lanes), dtype=np.float32)
+        self._values = np.empty((served + 1) * lanes * (channels + 1), dtype=np.float32)
+
+    def walk(self, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+        """All lines that some streamlines pass, and what they have gathered there.
+
+        Parameters
+        ----------
+        seeds : (n,) intp ndarray
+            Entries of lines.
+
+        Returns
+        -------
+        line : (m,) int32 ndarray
+            Of the cell `END` where streamlines have ended.
+        values : (m, K + 1) float32 ndarray
+            The sum of the noise of each channel around there, and its samples. Both arrays are
+            overwritten by the next walk.
+        steps : int
+            Taken by them all before their end, of those that serve.
+        """
+        alive, steps = self._follow(seeds)
+        rows = min(steps, self._served) + 1
+        line = self._covering.line_of(self._state[:rows, : 2 * len(seeds)])
+        values = self._gathered(alive, line, steps)
+        return line.reshape(-1), values, int(np.minimum(alive, self._served).sum())
+
+    def _follow(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
+        """Fill the room: row i is step i, of n streamlines forward and then of them backward.
+
+        `_state` is where they are, `_aside` how far to the left of the pixel's centre, and `_sums`
+        the noise from the seed on, itself included, with its slope to the left as imaginary part.
+
+        Returns
+        -------
+        alive : (2 n,) intp ndarray
+            Steps before the streamlines ended.
+        steps : int
+            Rows filled after the first.
+        """
+        covering, lanes = self._covering, 2 * len(seeds)
+        kind = np.float64 if covering.channels == 1 else np.complex128
+        records = covering.records.view(kind)[:, 0]
+        # No streamline winds more often than once in four steps.
+        turns = self._reach // 4 + 2
+        first_state = covering.first_states(turns)
+        sheet, cell = np.divmod(seeds, covering.cells)
+        cell = np.concatenate([cell, cell])
+        sheet = np.concatenate([sheet, sheet + covering.lines]) + turns * covering.sheets
+        angle = covering.turn.take(cell) + sheet.astype(np.float32)
+        start = _scattered(len(seeds))
+        position = np.concatenate([start, start])
+        before = None
+        # Those that have not ended, once many have; the others' rows stay as they are.
+        live, lives = None, np.full(lanes, self._reach)
+        alive = lives
+        for number in range(self._reach + 1):
+            state = first_state.take(sheet, mode="clip")
+            state += cell
+            record = records.take(state, mode="clip").view(np.int16).astype(np.float32)
+            record = record.view(np.complex64).reshape(len(cell), -1)
+            ahead = record[:, 0].copy()
+            self._store(number, live, lanes, state, position, ahead, record[:, 1:])
+            if number == self._reach:
+                break
+            # The method of Adams and Bashforth, 3/2 d - 1/2 d_before.
+            way = ahead.copy() if before is None else before
+            flat_way, offset = way.view(np.float32), position.view(np.float32)
+            flat_way *= np.float32(-1 / 3)
+            way += ahead
+            flat_way *= self._step
+            position += way
+            before = ahead
+            np.rint(offset, out=flat_way)
+            np.maximum(flat_way, np.float32(-1), out=flat_way)
+            np.minimum(flat_way, np.float32(1), out=flat_way)
+            position -= way
+            alive[self._move(cell, flat_way[::2], flat_way[1::2])] = number
+            turn = covering.turn.take(cell, mode="clip")
+            angle -= turn
+            np.rint(angle, out=angle)
+            sheet = angle.astype(np.intp)
+            angle += turn
+            if number % COMPACTED == COMPACTED - 1:
+                left = np.flatnonzero(cell)
+                if len(left) < 0.8 * len(cell):
+                    live = np.arange(lanes) if live is None else live
+                    lives[live] = alive
+                    if not len(left):
+                        return lives, number
+                    live, alive, cell, sheet, angle, position, before = (
+                        values[left]
+                        for values in (live, alive, cell, sheet, angle, position, before)
+                    )
+        if live is not None:
+            lives[live] = alive
+        return lives, self._reach
+
+    def _move(self, cell: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+        """Change cells by a step of -1 to 1 columns and rows; return which streamlines it ends."""
+        joined = self._covering.joined.take(cell, mode="clip")
+        shut = np.flatnonzero(joined != OPEN)
+        if len(shut):
+            bit = (column[shut] + 3 * row[shut] + 4).astype(np.uint16)
+            shut = shut[joined[shut] >> bit & 1 == 0]
+        ended = shut[cell[shut] != END]
+        away = row * np.float32(self._covering.width)
+        away += column
+        cell += away.astype(np.intp)
+        cell[shut] = END
+        return ended
+
+    def _store(
+        self,
+        number: int,
+        live: np.ndarray | None,
+        lanes: int,
+        state: np.ndarray,
+        position: np.ndarray,
+        ahead: np.ndarray,
+        gathered: np.ndarray,
+    ) -> None:
+        """Write row `number` of the room, for all streamlines or the live ones alone."""
+        before, sums = self._sums[max(number - 1, 0), :lanes], self._sums[number, :lanes]
+        if live is not None:
+            sums[...] = before
+            sums[live] = before[live] + gathered
+        elif number:
+            np.add(before, gathered, out=sums)
+        else:
+            sums[...] = gathered
+        if number > self._served:
+            return
+        aside = position.imag * ahead.real
+        aside -= position.real * ahead.imag
+        if live is None:
+            self._state[number, :lanes] = state
+            self._aside[number, :lanes] = aside
+        else:
+            self._state[number, :lanes] = END
+            self._state[number, live] = state
+            self._aside[number, :lanes] = 0
+            self._aside[number, live] = aside
+
+    def _gathered(self, alive: np.ndarray, line: np.ndarray, steps: int) -> np.ndarray:
+        """What streamlines have gathered around each of their steps.
+
+        A streamline passes beside the centre of a pixel, not through it, by up to half a pixel:
+        each sum is moved to the centre by its slope across the streamline.
+
+        Parameters
+        ----------
+        alive : (2 n,) intp ndarray
+        line : (i, 2 n) int32 ndarray
+            Entries of lines.
+        steps : int
+            As `_follow` returns them.
+
+        Returns
+        -------
+        (2 i n, K + 1) float32 ndarray
+            Around step i as many before and after it as count, if there are.
+        """
+        lanes, channels = len(alive), self._covering.channels
+        alive = alive.astype(np.float32)
+        other = np.roll(alive, lanes // 2)
+        size = line.size * (channels + 1)
+        values = self._values[:size].reshape(len(line), lanes, channels + 1)
+        for number, row in enumerate(values):
+            length = self._length if self._limit is None else self._limit.take(line[number])
+            last, first = np.minimum(number + length, steps), np.maximum(number - length, -steps)
+            between = self._sums_to(last, lanes) - self._sums_before(first, lanes)
+            aside = self._aside[number, :lanes] * self._lateral
+            lateral = aside[:, None] * between.imag
+            np.multiply(between.real, self._tone, out=row[:, :-1])
+            row[:, :-1] -= lateral
+            samples = np.minimum(alive, last, dtype=np.float32, casting="same_kind")
+            samples += np.minimum(other, -first, dtype=np.float32, casting="same_kind")
+            np.add(samples, np.float32(1), out=row[:, -1])
+        return values.reshape(-1, channels + 1)
+
+    def _sums_to(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64: sums up to some step, included."""
+        if np.ndim(step) == 0:
+            return self._sums[step, :lanes]
+        flat, most = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        return flat.take(step * most + np.arange(lanes), axis=0)
+
+    def _sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64: sums up to some step, without it; steps to the other side negative.
+
+        That side has the sums away from the seed, and sees slopes with the other sign.
+        """
+        half, seed = lanes // 2, self._sums[0, :lanes]
+        if np.ndim(step) == 0:
+            if step > 0:
+                return self._sums[step - 1, :lanes]
+            other = self._sums[-step, :lanes]
+            return seed - np.concatenate([other[half:], other[:half]]).conj()
+        flat, most = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        lane = np.arange(lanes)
+        same = step > 0
+        row = np.where(same, step - 1, -step) * most
+        found = flat.take(row + np.where(same, lane, (lane + half) % lanes), axis=0)
+        return np.where(same[:, None], found, seed - found.conj())
+
+
+def _scattered(count: int) -> np.ndarray:
+    """(count,) complex64 places that fill a pixel evenly, relative to its centre: Roberts' R2.
+
+    Streamlines that began at the centres would all pass on to the next row of pixels at once, and
+    be seen to.
+    """
+    number, base = np.arange(count) + 0.5, 1.3247179572447460
+    place = number / base % 1 + 1j * (number / base**2 % 1)
+    return (place - (0.5 + 0.5j)).astype(np.complex64)

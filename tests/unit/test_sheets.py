@@ -1,0 +1,211 @@
+"""The compositor that walks each streamline once, against brute force and closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planar_fields import pair_angle, pixel_centres
+from scipy import ndimage
+
+from rosy_addon.compositor import sheets
+from rosy_addon.compositor.brute import brute_images
+from rosy_addon.compositor.covering import unfold
+from rosy_addon.compositor.flow import planar_flow
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.noise import image_noise
+from rosy_addon.compositor.sheets import sheets_images
+from rosy_addon.progress import drain
+
+SIZE = 256
+LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
+
+
+def noise_of(flow, look=LOOK, channels=1):
+    return image_noise(
+        flow.pixel,
+        flow.width,
+        look.grain,
+        look.seed,
+        channels,
+        density=look.density,
+        high_pass=look.high_pass,
+    )
+
+
+def drawn(flow, look=LOOK, noise=None):
+    return drain(sheets_images(flow, look, noise_of(flow) if noise is None else noise))
+
+
+def brute(flow, look=LOOK, noise=None):
+    return drain(brute_images(flow, look, noise_of(flow) if noise is None else noise))
+
+
+def uniform(angle, degree, size=SIZE):
+    return planar_flow(np.full((size, size), angle), degree)
+
+
+def singular(degree, size=SIZE):
+    """Singularities of index 1 / N and -1 / N."""
+    x, y = pixel_centres(size)
+    return planar_flow(pair_angle(x, y, size, degree), degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_force(degree):
+    flow = uniform(0.0, degree)
+    noise = np.tile(noise_of(flow)[:SIZE], (SIZE, 1))
+    found, expected = drawn(flow, noise=noise), brute(flow, noise=noise)
+    np.testing.assert_array_equal(found.samples, expected.samples)
+    np.testing.assert_allclose(found.members, expected.members, atol=5e-4)
+
+
+@given(
+    degree=st.integers(1, 12),
+    here=st.floats(-np.pi, np.pi),
+    there=st.floats(-np.pi, np.pi),
+    guide=st.floats(-3, 3),
+)
+@settings(max_examples=200, deadline=None)
+def test_the_sheet_of_the_next_pixel_is_the_direction_nearest_to_this_one(
+    degree, here, there, guide
+):
+    flow = planar_flow(np.array([[here, there]]), degree)
+    covering = unfold(flow, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32))
+    first, second = covering.place
+    directions = covering.records.reshape(covering.sheets, -1, 4)[..., :2] / 32767.0
+    match = directions[:, first] @ directions[:, second].T
+    for sheet in range(covering.sheets):
+        slip = np.rint(covering.turn[first] - covering.turn[second])
+        chosen = int(sheet + slip) % covering.sheets
+        assert match[sheet, chosen] > match[sheet].max() - 2e-4
+
+
+def test_the_directions_of_states_are_the_members_and_their_opposites():
+    angle, degree = 0.3, 5
+    covering = unfold(uniform(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32))
+    states = covering.records.reshape(covering.sheets, -1, 4)[:, covering.place, :2] / 32767.0
+    expected = np.exp(1j * (angle + 2 * np.pi * np.arange(10) / 10))
+    found = states[..., 0] + 1j * states[..., 1]
+    np.testing.assert_allclose(found, np.broadcast_to(expected[:, None], found.shape), atol=1e-4)
+
+
+def autocorrelations(image, angle, lags):
+    """At some distances along and across a direction, of the inner part of a picture."""
+    image = image.reshape(512, 512)[45:-45, 45:-45]
+    power = np.abs(np.fft.fft2(image - image.mean())) ** 2
+    all_of_them = np.fft.fftshift(np.fft.ifft2(power).real)
+    all_of_them /= all_of_them.max()
+    middle = image.shape[0] // 2
+    along = [np.sin(angle) * lags, np.cos(angle) * lags]
+    across = [np.cos(angle) * lags, -np.sin(angle) * lags]
+    return [ndimage.map_coordinates(all_of_them, np.add(way, middle)) for way in (along, across)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [2, 3, 4, 6])
+def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
+    lags = np.array([1.0, 2.0, 3.0, 4.0])
+    spread, curves = [], []
+    for angle in (0.05, 0.37, 0.8, 1.1):
+        flow = uniform(angle, degree, 512)
+        pair = [images.members[0, :, 0] for images in (drawn(flow), brute(flow))]
+        spread.append([np.std(image) for image in pair])
+        curves.append([autocorrelations(image, angle, lags) for image in pair])
+    found, expected = np.mean(spread, axis=0)
+    assert found == pytest.approx(expected, rel=0.02)
+    found, expected = np.mean(curves, axis=0)
+    np.testing.assert_allclose(found, expected, atol=0.035)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 6])
+def test_pictures_of_singular_fields_resemble_brute_force(degree):
+    flow = singular(degree)
+    found, expected = drawn(flow).blend[:, 0], brute(flow).blend[:, 0]
+    # Not the same: each streak is shifted by up to half a pixel.
+    assert np.corrcoef(found, expected)[0, 1] > 0.85
+    assert found.std() == pytest.approx(expected.std(), rel=0.03)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+def test_the_surroundings_of_singularities_are_not_grainy(degree):
+    # Grain is what changes from each pixel to the next; breaking points would show as well.
+    flow = singular(degree)
+    x, y = (axis.ravel() for axis in pixel_centres(SIZE))
+    near = np.zeros(SIZE * SIZE, dtype=bool)
+    for centre in (0.33, 0.67):
+        near |= (x - centre * SIZE) ** 2 + (y - SIZE / 2) ** 2 < 20**2
+
+    def grain(images):
+        image = images.blend[:, 0].reshape(SIZE, SIZE)
+        return ndimage.laplace(image).ravel()[near].std()
+
+    assert grain(drawn(flow)) < 1.15 * grain(brute(flow))
+
+
+def test_streamlines_end_where_those_of_brute_force_end():
+    x, y = pixel_centres(SIZE)
+    angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, 4), np.nan)
+    flow = planar_flow(angles, 4)
+    found, expected = drawn(flow), brute(flow)
+    inside = flow.representation != 0
+    assert (found.samples[~inside] == 1).all()
+    difference = found.samples[inside] - expected.samples[inside]
+    assert abs(difference.mean()) < 0.5
+    assert np.abs(difference).mean() < 2
+
+
+def test_magnitude_sets_the_samples_of_a_pixel():
+    x, _ = pixel_centres(SIZE)
+    flow = planar_flow(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
+    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30)
+    samples = drawn(flow, look).samples.reshape(SIZE, SIZE)[:, 40:-40]
+    expected = 2 * np.rint(30 * x / SIZE)[:, 40:-40] + 1
+    np.testing.assert_array_equal(samples, expected)
+
+
+def test_three_channels_are_three_pictures():
+    flow = singular(3)
+    noise = noise_of(flow, channels=3)
+    together = drawn(flow, noise=noise).members
+    for channel in range(3):
+        alone = drawn(flow, noise=noise[:, channel : channel + 1]).members
+        np.testing.assert_allclose(together[..., channel], alone[..., 0], atol=2e-4)
+
+
+def test_the_same_input_gives_the_same_bytes():
+    flow = singular(5)
+    assert drawn(flow).members.tobytes() == drawn(flow).members.tobytes()
+
+
+def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
+    # A tall picture, in streaks that run up and down: a seam would show as a change of rows.
+    flow = planar_flow(np.full((1024, 64), np.pi / 2 + 0.1), 2)
+    whole = drawn(flow)
+    monkeypatch.setattr(sheets, "STRIP", 64 * 256 * 2)
+    wide = [(wide.stop - wide.start) // 64 for wide, _, _ in sheets._strips(flow, LOOK)]
+    assert len(wide) == 4
+    assert max(wide) <= 256 + 3 * (LOOK.length + 2)
+    found = drawn(flow)
+    assert found.samples.min() >= 1
+    assert np.abs(found.samples - whole.samples).mean() < 2
+    image = found.members[0, :, 0].reshape(1024, 64)
+    change = np.abs(np.diff(image, axis=0)).mean(axis=1)
+    assert change[[255, 511, 767]].mean() < 1.3 * np.median(change)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
+def test_pictures_of_any_size(shape):
+    images = drawn(planar_flow(np.full(shape, 0.7), 3))
+    assert np.isfinite(images.members).all()
+    assert images.samples.min() >= 1
+
+
+def test_a_field_that_is_defined_nowhere_is_its_noise():
+    flow = planar_flow(np.full((20, 20), np.nan), 4)
+    images = drawn(flow)
+    assert (images.samples == 1).all()
+    assert np.isfinite(images.blend).all()

@@ -223,9 +223,7 @@ def _slopes(
     return slopes[0], slopes[1]
 
 
-def _nearest(
-    z: np.ndarray, degree: int, guide: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _nearest(z: np.ndarray, degree: int, guide: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The member nearest to a guiding angle, from there: its angle, cosine and sine; 0, 0 of 0."""
     x, y = _rotated(z.real, z.imag, -degree * guide)
     angle = angle_of(x, y)

@@ -71,7 +71,7 @@ def checked_field(
             f"{source}: holds {len(vectors)} vectors, "
             f"but the mesh {surface.name} has {faces} faces and {vertices} vertices"
         )
-    _settle_undefined(vectors, source, domain, undefined)
+    settle_undefined(vectors, source, domain, undefined)
     normal = tangent_normals(surface, domain)
     if domain == "face":
         return RosyField(degree, into_planes(vectors, normal, FACE_TOLERANCE, source, "face"))
@@ -131,17 +131,31 @@ def into_planes(
     return np.where(normal.any(axis=1)[:, None], tangent, 0.0)
 
 
-def _settle_undefined(vectors: np.ndarray, source: str, domain: str, undefined: str) -> None:
-    """Refuse vectors that are not finite, or make them zero, in place."""
-    lost = ~np.isfinite(vectors).all(axis=1)
+def settle_undefined(values: np.ndarray, source: str, domain: str, undefined: str) -> None:
+    """Refuse values that are not finite, or make them zero, in place.
+
+    Parameters
+    ----------
+    values : (n,) or (n, 3) float ndarray
+        Angles or vectors.
+    source, domain : str
+        Where they are from and what they are on, for the message.
+    undefined : {"error", "zero"}
+
+    Raises
+    ------
+    RosyError
+    """
+    lost = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     if not lost.any():
         return
     if undefined == "error":
+        kind = "vectors" if values.ndim > 1 else "angles"
         raise RosyError(
-            f"{source}: {lost.sum()} of {len(vectors)} vectors are not finite, the first on "
+            f"{source}: {lost.sum()} of {len(values)} {kind} are not finite, the first on "
             f"{domain} {int(np.argmax(lost))}; ask for them to be undefined, or mend them"
         )
-    vectors[lost] = 0.0
+    values[lost] = 0.0
 
 
 def _onto_faces(

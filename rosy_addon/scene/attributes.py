@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..field.check import checked_field, into_planes, tangent_normals
+from ..field.check import checked_field, into_planes, settle_undefined, tangent_normals
 from ..field.fieldfile import check_members
 from ..field.frames import carry, dot, tangent_frame, unit
 from ..field.representation import face_frames, from_representation, to_representation
@@ -129,7 +129,7 @@ def read_carried_field(
     """
     source = f"{owner}, attribute '{name}'"
     vectors = _values(mesh.attributes[name], source, mesh).astype(np.float64)
-    _settle(vectors, source, undefined)
+    settle_undefined(vectors, source, "face", undefined)
     normal = tangent_normals(surface, "face")
     former = read_values(mesh, FACE_NORMAL, np.float32, 3)
     if former is not None:
@@ -227,19 +227,6 @@ def _others(mesh: bpy.types.Mesh) -> str:
     return f"; there are {', '.join(names)}" if names else ""
 
 
-def _settle(values: np.ndarray, source: str, undefined: str) -> None:
-    """Refuse rows that are not finite, or make them zero, in place."""
-    lost = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
-    if not lost.any():
-        return
-    if undefined == "error":
-        raise RosyError(
-            f"{source}: {lost.sum()} of {len(values)} values are not finite, the first is number "
-            f"{int(np.argmax(lost))}; ask for them to be undefined, or mend them"
-        )
-    values[lost] = 0.0
-
-
 def _read_members(mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner: str) -> RosyField:
     """From ``dir0`` ... ``dir{N-1}``; N is how many there are."""
     degree = 0
@@ -274,7 +261,7 @@ def _from_angles(
     x, y = face_frames(surface)
     angles = angles.astype(np.float64)
     defined = np.isfinite(angles)
-    _settle(angles, source, undefined)
+    settle_undefined(angles, source, "face", undefined)
     vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
     return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
 
@@ -284,7 +271,7 @@ def _from_corners(
 ) -> RosyField:
     """Turned into the face's plane at each corner, then averaged as RoSys."""
     vectors = vectors.astype(np.float64)
-    _settle(vectors, source, undefined)
+    settle_undefined(vectors, source, "corner", undefined)
     normal = surface.face_normal
     of_corner = normal[surface.corner_face]
     vectors = into_planes(vectors, of_corner, CORNER_TOLERANCE, source, "corner")

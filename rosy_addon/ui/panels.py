@@ -89,6 +89,7 @@ def _draw_field_there(
     box.label(text=thing.name, icon="OUTLINER_OB_MESH")
     box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
     box.label(text=f"Attribute '{mesh.rosy.attribute}'")
+    box.prop(thing.rosy, "include")
     row = layout.row(align=True)
     row.operator("rosy.field_import", text="Import", icon="IMPORT")
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
@@ -133,7 +134,7 @@ def _draw_picture(
     row.scale_y = 1.5
     row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
     if not drawn:
-        layout.label(text="Needs a field first", icon="INFO")
+        layout.label(text="Needs a field to draw", icon="INFO")
     if made:
         layout.operator("rosy.remove", icon="TRASH")
         _draw_how_to_see(layout, context, made)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+
 import bpy
 import numpy as np
 import pytest
@@ -44,6 +46,32 @@ def test_bake_makes_a_picture(baked, scene):
     covered = picture[..., 3] > 0.5
     assert 0.05 < covered.mean() < 0.9
     assert picture[covered][:, 0].std() > 0.1
+
+
+RENDER_ALONE = """
+import bpy
+assert not hasattr(bpy.types.Scene, "rosy")
+bpy.ops.render.render(write_still=True)
+"""
+
+
+def test_the_saved_file_renders_alike_without_the_extension(baked, scene, tmp_path):
+    expected = render(scene, tmp_path)
+    scene.render.filepath = str(tmp_path / "alone.png")
+    path = tmp_path / "baked.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    words = ["-b", "--factory-startup", str(path), "--python-exit-code", "1"]
+    done = subprocess.run(
+        [bpy.app.binary_path, *words, "--python-expr", RENDER_ALONE],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = pixels(bpy.data.images.load(str(tmp_path / "alone.png")))
+    np.testing.assert_array_equal(found, expected)
+    assert expected[..., :3][expected[..., 3] > 0.9].std() > 0.1
 
 
 @pytest.mark.parametrize("placement", ["PROJECTION", "WINDOW"])

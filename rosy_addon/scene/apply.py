@@ -30,7 +30,7 @@ from .bodies import MADE, Reading, is_rosy_modifier
 from .capabilities import is_editable
 from .images import check_folder, new_image
 from .looks import look_of
-from .nodes import new_group, new_material
+from .nodes import material_of_group, new_group, new_material
 
 MODIFIER = "RoSy"
 
@@ -99,6 +99,8 @@ class Bake:
     image : bpy.types.Image
     stale : str
         Why the picture is out of date, empty if it is not.
+    shown : bool
+        Whether any object shows it; others are kept, to be shown instead.
     """
 
     camera: str
@@ -106,6 +108,7 @@ class Bake:
     height: int
     image: bpy.types.Image
     stale: str
+    shown: bool
 
 
 @dataclass(frozen=True)
@@ -316,9 +319,21 @@ def bakes(scene: bpy.types.Scene) -> list[Bake]:
     for record in scene.rosy.bakes:
         if record.image is None:
             continue
-        stale = _why_stale(scene, record)
-        found.append(Bake(record.name, record.width, record.height, record.image, stale))
+        stale, shown = _why_stale(scene, record), _is_shown(record)
+        found.append(Bake(record.name, record.width, record.height, record.image, stale, shown))
     return sorted(found, key=lambda bake: bake.camera)
+
+
+def _is_shown(record: bpy.types.PropertyGroup) -> bool:
+    things = (bpy.data.objects.get(entry.name) for entry in record.objects)
+    groups = (
+        modifier.node_group
+        for thing in things
+        if thing is not None
+        for modifier in thing.modifiers
+        if is_rosy_modifier(modifier)
+    )
+    return any(material_of_group(group) == record.material for group in groups)
 
 
 def _object_matrices(reading: Reading, camera: Camera) -> dict[bpy.types.Object, np.ndarray | None]:

@@ -126,6 +126,14 @@ def new_group(
     return group
 
 
+def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
+    """The material that a group of `new_group` gives."""
+    for node in group.nodes:
+        if node.bl_idname == "GeometryNodeSetMaterial":
+            return node.inputs["Material"].default_value
+    return None
+
+
 def _rows(matrix: np.ndarray) -> np.ndarray:
     """(3, 4): the rows of a matrix that give clip-space x, y and w."""
     return np.asarray(matrix)[[0, 1, 3]]

@@ -147,7 +147,9 @@ def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:
     box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
     row = box.row()
     row.label(text=f"{bake.width} x {bake.height} pixels")
-    if several:
+    if several and bake.shown:
+        row.label(text="Shown", icon="HIDE_OFF")
+    elif several:
         row.operator("rosy.show", text="Show").camera = bake.camera
     if bake.stale:
         box.label(text="Out of date:", icon="ERROR")

@@ -214,7 +214,7 @@ def panel_without_field():
 def panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
-    yield from photograph("panel-2-field", 430)
+    yield from photograph("panel-2-field", 450)
 
 
 def bake_with_progress():
@@ -236,7 +236,7 @@ def bake_with_progress():
 def panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
-    yield from photograph("panel-3-baked", 560)
+    yield from photograph("panel-3-baked", 580)
 
 
 def panel_out_of_date():

@@ -163,9 +163,11 @@ def test_several_cameras(scene, camera, monkey):
     assert (first_bake.camera, last_bake.camera) == ("Second", "Camera")
     assert [entry.camera for entry in bakes(scene)] == ["Camera", "Second"]
     assert material_of(monkey).name == "RoSy Camera"
+    assert [entry.shown for entry in bakes(scene)] == [True, False]
     groups = len(bpy.data.node_groups)
     use_bake(scene, "Second")
     assert material_of(monkey).name == "RoSy Second"
+    assert [entry.shown for entry in bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
     with pytest.raises(RosyError, match="camera 'Third'; there are 'Second', 'Camera'"):
         use_bake(scene, "Third")

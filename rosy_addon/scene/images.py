@@ -66,19 +66,31 @@ def with_margin(rgba: np.ndarray) -> np.ndarray:
 
     Alpha stays: it says what is covered.
     """
-    rgba = rgba.copy()
-    colour, known = rgba[..., :3], rgba[..., 3] > 0
-    colour[~known] = NEUTRAL
+    # With a frame of its own, so that every pixel has eight neighbours.
+    framed = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))
+    height, width = framed.shape[:2]
+    known = framed[..., 3].ravel() > 0
+    colour = framed.reshape(-1, 4)
+    colour[~known, :3] = NEUTRAL
+    inside = np.zeros((height, width), dtype=bool)
+    inside[1:-1, 1:-1] = True
+    around = [row * width + column for row in (1, 0, -1) for column in (1, 0, -1) if row or column]
+    covered = np.flatnonzero(known)
     for _ in range(MARGIN):
-        total = np.zeros_like(colour)
-        count = np.zeros(known.shape, dtype=np.float32)
-        for here, there in _NEIGHBOURS:
-            total[here] += colour[there] * known[there][..., None]
-            count[here] += known[there]
-        fresh = ~known & (count > 0)
-        colour[fresh] = total[fresh] / count[fresh][:, None]
-        known |= fresh
-    return rgba
+        fresh = np.zeros_like(known)
+        for away in around:
+            fresh[covered + away] = True
+        place = np.flatnonzero(fresh & ~known & inside.ravel())
+        total = np.zeros((len(place), 3), dtype=np.float32)
+        count = np.zeros((len(place), 1), dtype=np.float32)
+        for away in around:
+            there = known[place + away, None]
+            total += colour[place + away, :3] * there
+            count += there
+        colour[place, :3] = total / count
+        known[place] = True
+        covered = place
+    return framed[1:-1, 1:-1].copy()
 
 
 def check_folder(folder: Path) -> None:
@@ -128,20 +140,3 @@ def _relative(path: Path) -> str:
         return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     except ValueError:
         return str(path)  # another drive
-
-
-def _shifted(step: int) -> tuple[slice, slice]:
-    if step == 0:
-        return slice(None), slice(None)
-    return (slice(1, None), slice(None, -1)) if step > 0 else (slice(None, -1), slice(1, None))
-
-
-_NEIGHBOURS = [
-    (
-        (_shifted(row)[0], _shifted(column)[0]),
-        (_shifted(row)[1], _shifted(column)[1]),
-    )
-    for row in (-1, 0, 1)
-    for column in (-1, 0, 1)
-    if row or column
-]

@@ -36,22 +36,24 @@ class Look:
     """
 
     method: str = _choice(
-        "members",
+        "sheets",
         "How the N directions become one picture",
         sheets="Each streamline of the covering surface once: fast, without breaking points",
-        members="The paper's decomposition into member vector fields",
+        members="The paper's decomposition into member vector fields, an image of each",
         brute="Follow the best of N directions at every step: slow, the yardstick",
     )
     weights: str = _choice(
         "cosine",
-        "How the two sets of member images are blended, so that breaking points do not show",
+        "How the two sets of images of the members method are blended, so that breaking points do "
+        "not show",
         cosine="Smoothly, by the squared cosine and sine of N t / 2",
         binary="Each pixel from one set or the other",
         none="The first set alone: shows the breaking points",
     )
     view_plane: bool = _switch(
         True,
-        "Rotate the field into the view plane before decomposing it (off: the paper's Figure 8)",
+        "Rotate the field into the view plane before the members method decomposes it (off: the "
+        "paper's Figure 8)",
     )
     display: str = _choice(
         "smooth",

@@ -239,6 +239,8 @@ def _matters(settings: Any, name: str) -> bool:
     look = settings.look
     if name in {"magnitude_range", "colour_map"}:
         return look.magnitude != "none" and (name, look.magnitude) != ("colour_map", "length")
+    if name in {"weights", "view_plane"}:
+        return look.method == "members"
     if name == "light":
         return look.shading > 0
     if name == "directory":

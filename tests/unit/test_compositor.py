@@ -7,7 +7,7 @@ import pytest
 from planar_fields import pair_angle, pixel_centres, swirl_angle
 from scipy import ndimage
 
-from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.compose import METHODS, compose_planar
 from rosy_addon.compositor.contrast import blend_gain, expected_deviation
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.noise import image_noise
@@ -78,7 +78,7 @@ def test_one_direction_agrees_with_a_plain_integrator():
     x, y = pixel_centres(SIZE)
     noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step)
-    found = tone(swirl_angle(x, y, SIZE), 1, noise=noise)
+    found = tone(swirl_angle(x, y, SIZE), 1, plain(method="members"), noise=noise)
     assert correlation(whole(found), whole(expected)) > 0.99
 
 
@@ -98,12 +98,12 @@ def test_one_direction_resembles_another_library():
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
 def test_the_decomposition_agrees_with_brute_force(degree):
     angles = pair_angle(*pixel_centres(SIZE), SIZE, degree)
-    members = tone(angles, degree)
+    members = tone(angles, degree, plain(method="members"))
     brute = tone(angles, degree, plain(method="brute"))
     assert correlation(members, brute) > 0.98
 
 
-@pytest.mark.parametrize("method", ["members", "brute"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("degree", range(1, 13))
 def test_any_member_stands_for_the_field(degree, method):
     size = 64
@@ -117,10 +117,11 @@ def test_any_member_stands_for_the_field(degree, method):
 
 @pytest.mark.parametrize("noise", [{}, {"high_pass": 16.0, "density": 0.1}])
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6, 7])
-def test_contrast_after_correction_is_that_of_one_member(degree, noise):
+@pytest.mark.parametrize("method", ["members", "sheets"])
+def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
     size = 512
     angles = np.full((size, size), 0.2)
-    layers = compose_planar(angles, degree, plain(**noise)).layers[0]
+    layers = compose_planar(angles, degree, plain(method=method, **noise)).layers[0]
     inner = whole(np.arange(size * size).reshape(size, size)).ravel()
     one = np.mean([member[inner].std() for member in layers.images.members])
     assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
@@ -154,9 +155,16 @@ def along_field_autocorrelation(image, angles, chosen, lag):
     return correlation(image[row, column], there)
 
 
-@pytest.mark.parametrize("weights", ["cosine", "binary"])
+@pytest.mark.parametrize(
+    "way",
+    [
+        {"method": "members", "weights": "cosine"},
+        {"method": "members", "weights": "binary"},
+        {"method": "sheets"},
+    ],
+)
 @pytest.mark.parametrize("degree", [2, 3, 4, 6])
-def test_breaking_points_do_not_show(degree, weights):
+def test_breaking_points_do_not_show(degree, way):
     size, guides = 384, 6
     x, _ = pixel_centres(size)
     # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
@@ -164,7 +172,7 @@ def test_breaking_points_do_not_show(degree, weights):
     spread, alike = np.zeros(2), np.zeros(2)
     # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
     for guide in np.arange(guides) * 2 * np.pi / degree / guides:
-        image = tone(angles, degree, plain(weights=weights, guiding_angle=guide))
+        image = tone(angles, degree, plain(guiding_angle=guide, **way))
         turn = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
         inner = np.zeros_like(x, dtype=bool)
         inner[50:-50, 50:-50] = True
@@ -178,22 +186,26 @@ def test_breaking_points_do_not_show(degree, weights):
 def test_one_set_alone_shows_the_breaking_points():
     angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
     brute = tone(angles, 4, plain(method="brute"))
-    both = tone(angles, 4)
-    one = tone(angles, 4, plain(weights="none"))
+    both = tone(angles, 4, plain(method="members"))
+    one = tone(angles, 4, plain(method="members", weights="none"))
     assert correlation(one, brute) < correlation(both, brute) - 0.01
 
 
-def test_short_streamlines_have_the_contrast_of_whole_ones():
+@pytest.mark.parametrize("method", METHODS)
+def test_short_streamlines_have_the_contrast_of_whole_ones(method):
+    look = plain(method=method)
     size = 256
     angles = np.full((size, size), 0.0)
     angles[:, 100:112] = np.nan
-    image = tone(angles, 1)
+    image = tone(angles, 1, look)
     # Ten pixels from a gap half of a streamline is missing.
     beside, away = image[:, 112:122], image[:, 170:200]
     assert beside.std() == pytest.approx(away.std(), rel=0.1)
 
 
-def test_undefined_pixels_end_streamlines_and_stay_grey():
+@pytest.mark.parametrize("method", METHODS)
+def test_undefined_pixels_end_streamlines_and_stay_grey(method):
+    look = plain(method=method)
     angles = np.full((64, 64), 0.0)
     angles[:, 32:] = np.nan
     changed = np.full((64, 64), 0.0)
@@ -201,18 +213,19 @@ def test_undefined_pixels_end_streamlines_and_stay_grey():
     other = noise.copy()
     other[:, 32:] = 1 - other[:, 32:]
     assert np.array_equal(
-        tone(angles, 1, noise=noise)[:, :32], tone(angles, 1, noise=other)[:, :32]
+        tone(angles, 1, look, noise=noise)[:, :32], tone(angles, 1, look, noise=other)[:, :32]
     )
     assert not np.array_equal(
-        tone(changed, 1, noise=noise)[:, :32], tone(changed, 1, noise=other)[:, :32]
+        tone(changed, 1, look, noise=noise)[:, :32], tone(changed, 1, look, noise=other)[:, :32]
     )
 
 
-def test_magnitude_drives_the_length_of_streaks():
+@pytest.mark.parametrize("method", METHODS)
+def test_magnitude_drives_the_length_of_streaks(method):
     size = 256
     angles = np.zeros((size, size))
     rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
-    look = plain(magnitude="length", magnitude_range=1.0)
+    look = plain(method=method, magnitude="length", magnitude_range=1.0)
     image = tone(angles, 1, look, magnitude=rho)
 
     def along(rows, lag):

@@ -18,14 +18,15 @@ PAGES = {
     "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how well N can be read"),
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
-HERO = "hero"
+#: What is drawn beside the figures: the README's picture, and the page of looks.
+OTHERS = ("hero", "looks-page")
 
 
 def main() -> int:
     """Draw what the arguments name."""
     parser = argparse.ArgumentParser(prog="python -m tools.gallery", description=__doc__)
-    parser.add_argument("figure", nargs="*", help=", ".join([*PAGES, HERO]))
-    known = [*PAGES, HERO]
+    parser.add_argument("figure", nargs="*", help=", ".join([*PAGES, *OTHERS]))
+    known = [*PAGES, *OTHERS]
     names = parser.parse_args().figure or known
     unknown = [name for name in names if name not in known]
     if unknown:

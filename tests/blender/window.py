@@ -172,6 +172,7 @@ def broken_off(interrupt, *, unchanged=True, photographed=None):
     """Start a long bake, do `interrupt`, and see that it ends and leaves the scene as it was."""
     yield from fresh_scene(size=(1600, 1200))
     make_field()
+    bpy.context.scene.rosy.look.method = "brute"
     before = contents()
     yield from start_bake()
     if photographed is not None:
@@ -220,6 +221,7 @@ def panel_with_field():
 def bake_with_progress():
     yield from fresh_scene(size=(800, 600))
     make_field()
+    bpy.context.scene.rosy.look.method = "brute"  # which takes long enough to be watched
     yield from start_bake()
     seen, longest, last = [], 0.0, time.monotonic()
     while status().now is not None:

@@ -15,6 +15,12 @@ TURN = 0.5
 #: Deviation of the blur that is taken out of the noise, as a part of `Look.high_pass`.
 BLUR = 0.5
 
+#: Side of the tiles of the picture in which noise is made, pixels.
+TILE = 256
+
+#: So many pixels of noise are kept for the next picture.
+KEPT = 1 << 22
+
 #: Points along each side of a pixel at which the cells are averaged.
 TAPS = 3
 
@@ -84,17 +90,44 @@ def image_noise(
         With mean `MEAN`; that of a cell has the standard deviation `DEVIATION`. At half density
         and without a high pass it is from 0 to 1.
     """
-    row, column = pixel // width, pixel % width
-    margin = int(np.ceil(3 * BLUR * high_pass))
-    left, right = int(column.min()) - margin, int(column.max()) + margin + 1
-    bottom, top = int(row[0]) - margin, int(row[-1]) + margin + 1
-    noise = np.empty((len(pixel), channels), dtype=np.float32)
+    row, column = np.divmod(pixel, np.int32(width))
+    # The same for all views of a picture, so that noise is made once for a moving camera.
+    left, right = _tiled(int(column.min()), int(column.max()) + 1)
+    bottom, top = _tiled(int(row[0]), int(row[-1]) + 1)
+    make = _tiles if (right - left) * (top - bottom) <= KEPT else _tiles.__wrapped__
+    place = (row - bottom) * np.int32(right - left) + (column - left)
+    noise = np.empty((channels, len(pixel)), dtype=np.float32)
     for channel in range(channels):
-        cells = _cells(left, right, bottom, top, grain, seed, channel, density)
-        if high_pass:
-            cells += MEAN - _blurred(cells, BLUR * high_pass)
-        noise[:, channel] = cells[row - bottom, column - left]
-    return noise
+        tiles = make(left, right, bottom, top, grain, seed, channel, density, high_pass)
+        tiles.take(place, out=noise[channel], mode="clip")
+    return np.ascontiguousarray(noise.T)
+
+
+def _tiled(start: int, stop: int) -> tuple[int, int]:
+    """The whole tiles that hold some rows or columns of pixels."""
+    return start // TILE * TILE, -(-stop // TILE) * TILE
+
+
+@lru_cache(maxsize=6)
+def _tiles(
+    left: int,
+    right: int,
+    bottom: int,
+    top: int,
+    grain: float,
+    seed: int,
+    channel: int,
+    density: float,
+    high_pass: float,
+) -> np.ndarray:
+    """(pixels,) float32 noise of a rectangle of the picture."""
+    margin = int(np.ceil(3 * BLUR * high_pass))
+    around = (left - margin, right + margin, bottom - margin, top + margin)
+    cells = _cells(*around, grain, seed, channel, density)
+    if high_pass:
+        cells += MEAN - _blurred(cells, BLUR * high_pass)
+        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
+    return np.ascontiguousarray(cells).reshape(-1)
 
 
 def _cells(

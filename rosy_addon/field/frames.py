@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
@@ -38,6 +40,23 @@ def carry(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.nda
     """
     divisor = np.maximum(1 + dot(source, target), np.finfo(vectors.dtype).eps)
     return vectors - (dot(vectors, target) / divisor)[..., None] * (source + target)
+
+
+def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+    """`dot` of vectors given by their three components: quicker, as these lie in a row."""
+    product = a[0] * b[0]
+    product += a[1] * b[1]
+    product += a[2] * b[2]
+    return product
+
+
+def carry_components(
+    vectors: Sequence[np.ndarray], source: Sequence[np.ndarray], target: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """`carry` of vectors given by their three components."""
+    share = dot_components(vectors, target)
+    share /= np.maximum(1 + dot_components(source, target), np.finfo(share.dtype).eps)
+    return [v - share * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
 
 
 def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,6 +98,7 @@ def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     wx, wy, wz = toward_eye[..., 0], toward_eye[..., 1], toward_eye[..., 2]
     a = 1 / (1 + wz)
-    x = np.stack([1 - wx * wx * a, -wx * wy * a, -wx], axis=-1)
-    y = np.stack([-wx * wy * a, 1 - wy * wy * a, -wy], axis=-1)
-    return x, y
+    across = -wx * wy * a
+    x = np.stack([1 - wx * wx * a, across, -wx])
+    y = np.stack([across, 1 - wy * wy * a, -wy])
+    return np.moveaxis(x, 0, -1), np.moveaxis(y, 0, -1)

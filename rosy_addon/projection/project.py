@@ -15,7 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..field.frames import carry, dot, tangent_frame, unit
+from ..field.frames import (
+    carry,
+    carry_components,
+    dot,
+    dot_components,
+    tangent_frame,
+    unit,
+)
 from ..field.representation import power
 from ..field.surface import Surface, mix_over_fans, next_corners
 from ..progress import Progress, Work, drain
@@ -73,16 +80,19 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
     buffer = _empty_buffer(bodies, places, camera, seen)
     done = 0
     for number, (body, place) in enumerate(zip(bodies, places, strict=True)):
-        pixels = np.flatnonzero(buffer.body == number)
-        if not len(pixels):
+        own = buffer.body == number
+        if not own.any():
             continue
-        shown, shown_of_pixel = _numbered(buffer.triangle[pixels], len(body.surface.triangles))
+        pixels = None if own.all() else np.flatnonzero(own)
+        triangle = buffer.triangle if pixels is None else buffer.triangle[pixels]
+        shown, shown_of_pixel = _numbered(triangle, len(body.surface.triangles))
         values = _triangle_values(body, place, camera, shown, display)
-        for start in range(0, len(pixels), BLOCK):
+        for start in range(0, len(triangle), BLOCK):
             yield Progress(0.4 + 0.6 * done / len(buffer.body), "turning the field into the view")
-            part = slice(start, start + BLOCK)
-            _fill(buffer, pixels[part], shown_of_pixel[part], values, body.field.degree)
-            done += len(pixels[part])
+            part = slice(start, min(start + BLOCK, len(triangle)))
+            where = part if pixels is None else pixels[part]
+            _fill(buffer, where, shown_of_pixel[part], values, body.field.degree)
+            done += part.stop - part.start
     return buffer
 
 
@@ -186,9 +196,8 @@ def _empty_buffer(
     count = len(seen.body)
     fragments = seen.fragments
     face = np.empty(count, dtype=np.int32)
-    position = np.empty((count, 3), dtype=np.float32)
-    toward_eye = np.zeros((count, 3), dtype=np.float32)
-    toward_eye[:, 2] = 1.0
+    position, toward_eye = _vectors(count), _vectors(count)
+    toward_eye[:] = (0.0, 0.0, 1.0)
     single = len(np.unique(seen.body)) == 1
     for number in np.unique(seen.body):
         pixels = slice(None) if single else np.flatnonzero(seen.body == number)
@@ -213,12 +222,17 @@ def _empty_buffer(
         triangle=seen.triangle,
         barycentric=fragments.barycentric.astype(np.float32),
         position=position,
-        normal=np.empty((count, 3), dtype=np.float32),
+        normal=_vectors(count),
         toward_eye=toward_eye,
         representation=np.empty(count, dtype=np.complex64),
-        plane_normal=np.empty((count, 3), dtype=np.float32),
+        plane_normal=_vectors(count),
         front=np.empty(count, dtype=bool),
     )
+
+
+def _vectors(count: int) -> np.ndarray:
+    """(P, 3) float32, each component of all pixels in a row: what is done here is done by them."""
+    return np.empty((3, count), dtype=np.float32).T
 
 
 # --- from faces at rest to corners in camera space ---------------------------------------------
@@ -380,9 +394,9 @@ class _Triangles:
 
     Attributes
     ----------
-    corner_normal : (3, T, 3) ndarray
-        n_0, n_1, n_2.
-    axis : (T, 3) ndarray
+    corner_normal : (3, 3, T) ndarray
+        Components of n_0, n_1, n_2.
+    axis : (3, T) ndarray
         A unit tangent e at n_0: values are relative to it.
     z : (3, T) complex ndarray
         The corners' values, those of corners 1 and 2 carried along the arc to n_0.
@@ -390,7 +404,7 @@ class _Triangles:
         n_0.n_1, n_0.n_2, n_1.n_2.
     volume : (T,) ndarray
         n_0 . (n_1 x n_2).
-    plane_normal : (T, 3) ndarray
+    plane_normal : (3, T) ndarray
         Of the triangle itself, turned toward the eye.
     front : (T,) bool ndarray
     """
@@ -418,12 +432,12 @@ def _triangle_values(
     dots = [dot(normal[0], normal[1]), dot(normal[0], normal[2]), dot(normal[1], normal[2])]
     volume = dot(normal[0], np.cross(normal[1], normal[2]))
     return _Triangles(
-        corner_normal=normal.astype(np.float32),
-        axis=axis.astype(np.float32),
+        corner_normal=np.ascontiguousarray(normal.transpose(0, 2, 1), dtype=np.float32),
+        axis=np.ascontiguousarray(axis.T, dtype=np.float32),
         z=np.where(defined, z, 0).astype(np.complex64),
         dots=np.array(dots, dtype=np.float32),
         volume=volume.astype(np.float32),
-        plane_normal=plane_normal.astype(np.float32),
+        plane_normal=np.ascontiguousarray(plane_normal.T, dtype=np.float32),
         front=front,
     )
 
@@ -505,39 +519,50 @@ def _onto(z: np.ndarray, source: np.ndarray, target: np.ndarray, degree: int) ->
 
 
 def _fill(
-    buffer: GBuffer, pixels: np.ndarray, shown: np.ndarray, values: _Triangles, degree: int
+    buffer: GBuffer,
+    pixels: slice | np.ndarray,
+    shown: np.ndarray,
+    values: _Triangles,
+    degree: int,
 ) -> None:
     """Write normals and the representation at some pixels of one body.
 
     `shown` says for each which entry of `values` it sees.
     """
-    toward_eye, weights = buffer.toward_eye[pixels], buffer.barycentric[pixels].T
-    plane_normal, front = values.plane_normal[shown], values.front[shown]
-    normal, size = _interpolated_normal(values, shown, weights)
-    lost = size == 0
-    normal[lost] = np.where(front[lost, None], plane_normal[lost], -plane_normal[lost])
+    weights = buffer.barycentric[pixels].T
+    toward_eye = buffer.toward_eye[pixels].T
+    front = values.front.take(shown)
+    plane_normal = values.plane_normal.take(shown, axis=1)
+    corners = [[component.take(shown) for component in corner] for corner in values.corner_normal]
+    normal, size = _interpolated_normal(corners, weights)
+    if not size.all():
+        lost = size == 0
+        normal[:, lost] = np.where(front, plane_normal, -plane_normal)[:, lost]
     z = _interpolated_values(values, shown, weights, size, degree)
-    axis = carry(values.axis[shown], values.corner_normal[0][shown], normal)
-    # The members stay where they are in space; seen from behind, angles run the other way.
-    z = np.where(front, z, np.conj(z))
-    normal *= np.where(front, np.float32(1), np.float32(-1))[:, None]
-    buffer.normal[pixels] = normal
-    buffer.plane_normal[pixels] = plane_normal
+    axis = carry_components(values.axis.take(shown, axis=1), corners[0], normal)
+    if not front.all():
+        # The members stay where they are in space; seen from behind, angles run the other way.
+        np.conjugate(z, out=z, where=~front)
+        np.negative(normal, out=normal, where=~front)
+    z *= power(_turn_into_view(axis, normal, toward_eye), degree)
+    buffer.normal[pixels] = normal.T
+    buffer.plane_normal[pixels] = plane_normal.T
     buffer.front[pixels] = front
-    buffer.representation[pixels] = z * power(_turn_into_view(axis, normal, toward_eye), degree)
+    buffer.representation[pixels] = z
 
 
 def _interpolated_normal(
-    values: _Triangles, shown: np.ndarray, weights: np.ndarray
+    corners: Sequence[Sequence[np.ndarray]], weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(P, 3) unit n along m = sum b_i n_i, and (P,) the length of m; both 0 where lost."""
-    normal = sum(
-        weight[:, None] * corner[shown]
-        for weight, corner in zip(weights, values.corner_normal, strict=True)
-    )
-    size = np.sqrt(dot(normal, normal))
+    """(3, P) unit n along m = sum b_i n_i, and (P,) the length of m; both 0 where lost."""
+    normal = np.empty_like(weights)
+    for component, out in enumerate(normal):
+        np.multiply(weights[0], corners[0][component], out=out)
+        out += weights[1] * corners[1][component]
+        out += weights[2] * corners[2][component]
+    size = np.sqrt(dot_components(normal, normal))
     size[size < 1e-6] = 0
-    normal = np.divide(normal, size[:, None], out=np.zeros_like(normal), where=size[:, None] > 0)
+    normal *= np.divide(np.float32(1), size, out=np.zeros_like(size), where=size > 0)
     return normal, size
 
 
@@ -557,32 +582,45 @@ def _interpolated_values(
     n is a combination of them.
     """
     b0, b1, b2 = weights
-    d01, d02, d12 = values.dots[:, shown]
-    z0, z1, z2 = values.z[:, shown]
-    volume = values.volume[shown]
+    d01, d02, d12 = (products.take(shown) for products in values.dots)
+    z0, z1, z2 = (corner.take(shown) for corner in values.z)
+    volume = values.volume.take(shown)
     n0 = b0 + b1 * d01 + b2 * d02
-    n1 = b0 * d01 + b1 + b2 * d12
-    n2 = b0 * d02 + b1 * d12 + b2
-    half1 = size * (1 + d01) + n0 + n1 + 1j * (b2 * volume)
-    half2 = size * (1 + d02) + n0 + n2 - 1j * (b1 * volume)
-    return (
-        b0 * z0
-        + b1 * z1 * power(_squared_phase(half1), degree)
-        + b2 * z2 * power(_squared_phase(half2), degree)
-    )
+    half1, half2 = np.empty_like(z0), np.empty_like(z0)
+    half1.real = size * (1 + d01) + n0 + (b0 * d01 + b1 + b2 * d12)
+    half1.imag = b2 * volume
+    half2.real = size * (1 + d02) + n0 + (b0 * d02 + b1 * d12 + b2)
+    half2.imag = -b1 * volume
+    z1 *= power(_squared_phase(half1), degree)
+    z2 *= power(_squared_phase(half2), degree)
+    z0 *= b0
+    z1 *= b1
+    z2 *= b2
+    z0 += z1
+    z0 += z2
+    return z0
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:
     """half^2 / |half|^2, and 0 for 0."""
-    square = half.real**2 + half.imag**2
-    return half * half / np.maximum(square, np.float32(1e-30))
+    square = half.real * half.real
+    square += half.imag * half.imag
+    np.maximum(square, np.float32(1e-30), out=square)
+    half = half * half
+    half *= 1 / square
+    return half
 
 
-def _turn_into_view(axis: np.ndarray, normal: np.ndarray, toward_eye: np.ndarray) -> np.ndarray:
+def _turn_into_view(
+    axis: Sequence[np.ndarray], normal: np.ndarray, toward_eye: np.ndarray
+) -> np.ndarray:
     """(P,) complex direction, in the view frame, of tangents rotated into the view plane."""
-    seen = carry(axis, normal, toward_eye)
+    x, y, z = carry_components(axis, normal, toward_eye)
     # In coordinates of `view_frame`: the minimal rotation back from `toward_eye` to (0, 0, 1).
-    lean = seen[:, 2] / (1 + toward_eye[:, 2])
-    return _phase(
-        (seen[:, 0] - lean * toward_eye[:, 0]) + 1j * (seen[:, 1] - lean * toward_eye[:, 1])
-    )
+    z /= 1 + toward_eye[2]
+    turn = np.empty(len(z), dtype=np.complex64)
+    turn.real = x - z * toward_eye[0]
+    turn.imag = y - z * toward_eye[1]
+    size = np.sqrt(turn.real * turn.real + turn.imag * turn.imag)
+    turn *= np.divide(np.float32(1), size, out=np.zeros_like(size), where=size > 0)
+    return turn

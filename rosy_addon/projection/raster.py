@@ -366,7 +366,7 @@ def _barycentrics(
     x = (vertices[:, 0] + vertices[:, 3]) * (0.5 * width)
     y = (vertices[:, 1] + vertices[:, 3]) * (0.5 * height)
     w = np.ascontiguousarray(vertices[:, 3])
-    weights = np.empty((len(pixel), 3))
+    weights = np.empty((3, len(pixel))).T
     for start in range(0, len(pixel), BLOCK):
         part = slice(start, start + BLOCK)
         row, column = np.divmod(pixel[part], width)

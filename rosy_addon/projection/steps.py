@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.frames import carry, dot, view_frame
+from ..field.frames import carry_components, dot, view_frame
 from .gbuffer import GBuffer
 
 #: Pixels that are worked on at once.
@@ -43,20 +43,21 @@ def screen_axes(buffer: GBuffer) -> np.ndarray:
     across = camera.projection[:2, :2] * [[camera.width], [camera.height]]
     across /= 2 * camera.pixels_per_unit
     across = across.astype(np.float32)
-    axes = np.empty((len(buffer.pixel), 2), dtype=np.complex64)
-    for start in range(0, len(axes), BLOCK):
+    axes = np.empty((2, len(buffer.pixel)), dtype=np.complex64)
+    for start in range(0, len(buffer.pixel), BLOCK):
         part = slice(start, start + BLOCK)
-        toward_eye = buffer.toward_eye[part]
-        for number, axis in enumerate(view_frame(toward_eye)):
-            tangent = carry(axis, toward_eye, buffer.normal[part])
-            flat = tangent[:, :2]
-            if camera.is_perspective:
+        toward_eye, normal = buffer.toward_eye[part].T, buffer.normal[part].T
+        ray = toward_eye[:2] / toward_eye[2] if camera.is_perspective else None
+        frame = (axis.T for axis in view_frame(toward_eye.T))
+        for axis, out in zip(frame, axes[:, part], strict=True):
+            x, y, depth = carry_components(axis, toward_eye, normal)
+            if ray is not None:
                 # Along a ray, points at depth 1 stay where they are: what counts is the rest.
-                ray = toward_eye[:, :2] / toward_eye[:, 2:]
-                flat = flat - tangent[:, 2:] * ray
-            screen = flat @ across.T
-            axes[part, number] = screen[:, 0] + 1j * screen[:, 1]
-    return axes
+                x -= depth * ray[0]
+                y -= depth * ray[1]
+            out.real = x * across[0, 0] + y * across[0, 1]
+            out.imag = x * across[1, 0] + y * across[1, 1]
+    return axes.T
 
 
 def links(buffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarray:
@@ -87,28 +88,31 @@ def links(buffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarr
     of which planes are linear functions on screen: z, under perspective 1 / z.
     """
     slopes = _slopes(buffer)
-    aligned = -2.0 if cross_creases else float(np.cos(crease_angle))
+    aligned = None if cross_creases else np.float32(np.cos(crease_angle))
     camera = buffer.camera
-    row, column = np.divmod(buffer.pixel, np.int32(camera.width))
+    width = np.int32(camera.width)
+    row, column = np.divmod(buffer.pixel, width)
     lowest = int(row[0]) if len(row) else 0
     rows = int(row[-1]) - lowest + 1 if len(row) else 0
     # One row and one pixel more than there are, for neighbours beyond the last.
     index = np.full((rows + 1) * camera.width + 1, -1, dtype=np.int32)
-    index[buffer.pixel - np.int32(lowest * camera.width)] = np.arange(len(row), dtype=np.int32)
+    index[buffer.pixel - lowest * width] = np.arange(len(row), dtype=np.int32)
     bits = np.full(len(row), 1 << 4, dtype=np.uint16)
     for start in range(0, len(row), BLOCK):
         part = slice(start, min(start + BLOCK, len(row)))
-        origin = buffer.pixel[part] - np.int32(lowest * camera.width)
+        origin = buffer.pixel[part] - lowest * width
+        here = np.arange(part.start, part.stop, dtype=np.int32)
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
-            there = index[origin + np.int32(dy * camera.width + dx)]
-            there[column[part] == (camera.width - 1 if dx > 0 else 0 if dx < 0 else -1)] = -1
-            here = np.flatnonzero(there >= 0).astype(np.int32)
-            there, here = there[here], here + np.int32(start)
-            joined = _goes_on(buffer, slopes, here, there, (dx, dy), aligned)
-            here, there = here[joined], there[joined]
+            there = index.take(origin + (dy * width + np.int32(dx)))
+            if dx:
+                there[column[part] == (width - 1 if dx > 0 else 0)] = -1
+            nothing = there < 0
+            np.copyto(there, here, where=nothing)
+            joined = _goes_on(buffer, slopes, part, there, (dx, dy), aligned)
+            joined[nothing] = False
             bit = (dy + 1) * 3 + (dx + 1)
-            bits[here] |= np.uint16(1 << bit)
-            bits[there] |= np.uint16(1 << (8 - bit))
+            bits[part] |= joined.astype(np.uint16) << np.uint16(bit)
+            bits[there[joined]] |= np.uint16(1 << (8 - bit))
     return bits
 
 
@@ -158,26 +162,48 @@ def _slopes(buffer: GBuffer) -> _Slopes:
 def _goes_on(
     buffer: GBuffer,
     slopes: _Slopes,
-    here: np.ndarray,
+    here: slice,
     there: np.ndarray,
     step: tuple[int, int],
-    aligned: float,
+    aligned: np.float32 | None,
 ) -> np.ndarray:
     """(K,) bool: whether the surface goes on from pixels to neighbours, `step` away."""
-    dx, dy = step
-    scale = np.maximum(slopes.scale[here], slopes.scale[there])
-    jump = scale * (slopes.depth[there] - slopes.depth[here])
-    from_here = jump - scale * (dx * slopes.along[here] + dy * slopes.upward[here])
-    from_there = jump - scale * (dx * slopes.along[there] + dy * slopes.upward[there])
-    least = np.minimum(np.abs(from_here), np.abs(from_there))
-    off = np.where(from_here * from_there > 0, least, 0)
-    turned_over = buffer.front[here] != buffer.front[there]
-    if turned_over.any():
+    dx, dy = (np.float32(part) for part in step)
+    scale = np.maximum(slopes.scale[here], slopes.scale.take(there))
+    jump = slopes.depth.take(there) - slopes.depth[here]
+    from_here = jump - _along(slopes.along[here], slopes.upward[here], dx, dy)
+    from_there = jump - _along(slopes.along.take(there), slopes.upward.take(there), dx, dy)
+    from_here *= scale
+    from_there *= scale
+    off = np.minimum(np.abs(from_here), np.abs(from_there))
+    from_here *= from_there
+    off *= from_here > 0
+    if not buffer.front.all():
         # No smooth surface shows its other side without a silhouette; an unevenly oriented one may.
-        most = np.maximum(np.abs(from_here), np.abs(from_there))
-        off = np.where(turned_over, most, off)
-    recedes = np.minimum(slopes.steep[here], slopes.steep[there])
-    joined = off <= np.hypot(dx, dy) * (TOLERANCE + OBLIQUE_TOLERANCE * recedes)
-    joined &= buffer.body[here] == buffer.body[there]
-    joined &= dot(buffer.normal[here], buffer.normal[there]) >= aligned
+        turned_over = buffer.front[here] != buffer.front.take(there)
+        jump *= scale
+        straight = scale * _along(slopes.along[here], slopes.upward[here], dx, dy)
+        most = np.maximum(np.abs(jump - straight), np.abs(from_there))
+        np.copyto(off, most, where=turned_over)
+    allowed = np.minimum(slopes.steep[here], slopes.steep.take(there))
+    allowed *= np.float32(OBLIQUE_TOLERANCE)
+    allowed += np.float32(TOLERANCE)
+    allowed *= np.float32(np.hypot(dx, dy))
+    joined = off <= allowed
+    if len(buffer.names) > 1:
+        joined &= buffer.body[here] == buffer.body.take(there)
+    if aligned is not None:
+        normal = buffer.normal.T
+        facing = normal[0, here] * normal[0].take(there)
+        facing += normal[1, here] * normal[1].take(there)
+        facing += normal[2, here] * normal[2].take(there)
+        joined &= facing >= aligned
     return joined
+
+
+def _along(along: np.ndarray, upward: np.ndarray, dx: np.float32, dy: np.float32) -> np.ndarray:
+    """By how much depth changes over a step on the tangent plane."""
+    if not dx:
+        return upward
+    change = along if dx > 0 else -along
+    return change + upward if dy else change

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..trigonometry import angle_of, cosine_sine
 from .flow import OFFSETS, Flow
 from .look import Look
-from .trigonometry import angle_of, cosine_sine
 
 #: Pixels unfolded at once, so that they stay in a core's cache.
 BLOCK = 1 << 14

@@ -65,6 +65,16 @@ class Surface:
         return next_corners(self.face_start)
 
     @cached_property
+    def triangle_vertex(self) -> np.ndarray:
+        """(T, 3) int32: the vertices of the triangles."""
+        return self.corner_vertex.take(self.triangles)
+
+    @cached_property
+    def fan_normal(self) -> np.ndarray:
+        """(K, 3) float64: the mean direction of the corner normals of each fan, unit."""
+        return unit(mix_over_fans(self.corner_normal, self.corner_fan))
+
+    @cached_property
     def face_normal(self) -> np.ndarray:
         """(F, 3) float64 unit normals by Newell's formula; zero for a face without area."""
         return unit(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))

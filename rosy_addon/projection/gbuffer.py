@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import numpy as np
 
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
+from .carried import Carried
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,11 +25,14 @@ class Body:
         Object to world space.
     field : RosyField or None
         On the faces of `surface`; None for what only hides others.
+    carried : dict of str to Carried
+        What does not depend on the camera, by the display it is for: kept from one to the next.
     """
 
     surface: Surface
     matrix: np.ndarray
     field: RosyField | None = None
+    carried: dict[str, Carried] = dataclass_field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

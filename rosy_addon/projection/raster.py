@@ -29,9 +29,11 @@ class Fragments(NamedTuple):
     pixel : (P,) int32 ndarray
         Flat index, ``row * width + column`` from the lower left.
     triangle : (P,) int32 ndarray
-    barycentric : (P, 3) float64 ndarray
+    barycentric : (P, 3) float32 ndarray
         Perspective-correct weights of the triangle's vertices at the pixel's centre; not below 0,
         sum 1.
+    front : (P,) bool ndarray
+        Whether the corners of the triangle run counter-clockwise as seen.
     depth : (P,) float64 ndarray
         z / w, from -1 at the near to 1 at the far plane.
     """
@@ -39,6 +41,7 @@ class Fragments(NamedTuple):
     pixel: np.ndarray
     triangle: np.ndarray
     barycentric: np.ndarray
+    front: np.ndarray
     depth: np.ndarray
 
 
@@ -91,7 +94,7 @@ def rasterise(
     -------
     Fragments
     """
-    clip_vertices = np.ascontiguousarray(clip_vertices, dtype=np.float64)
+    clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
     vertices, pieces = _before_near_plane(clip_vertices, triangles)
     screen = _on_screen(vertices, width, height)
@@ -103,8 +106,8 @@ def rasterise(
         for values, kept in zip(found, (pixel, triangle, depth), strict=True):
             kept.append(values)
     pixel, triangle = np.concatenate(pixel), np.concatenate(triangle)
-    barycentric = _barycentrics(clip_vertices, triangles, pixel, triangle, width, height)
-    return Fragments(pixel, triangle, barycentric, np.concatenate(depth))
+    weights, front = _barycentrics(clip_vertices, triangles, pixel, triangle, width, height)
+    return Fragments(pixel, triangle, weights, front, np.concatenate(depth))
 
 
 def _before_near_plane(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, _Pieces]:
@@ -187,7 +190,7 @@ def _visible_in_rows(
         block = slice(start, start + BLOCK)
         corners = tuple(corner[block] for corner in pieces.corners)
         for spans in _spans(screen, corners, pieces.triangle[block], width):
-            spans = spans._replace(start=spans.start - np.int32(low * width))
+            spans.start[:] -= low * width
             for part in _blocks(spans.count):
                 _draw(_Spans(*(values[part] for values in spans)), nearest, owner)
     pixel = np.flatnonzero(owner >= 0)
@@ -200,49 +203,65 @@ def _spans(
     """The spans of a block of triangles, in the order of the triangles."""
     a, b, c = corners
     for centres in (screen.row, screen.column):
-        at = centres[a], centres[b], centres[c]
         # Corners with the same first pixel centre have none between them.
-        holds = np.flatnonzero((at[0] != at[1]) | (at[1] != at[2]))
+        at = centres.take(b)
+        between = centres.take(a) != at
+        between |= centres.take(c) != at
+        holds = np.flatnonzero(between)
         if len(holds) < len(a):
-            a, b, c, triangle = a[holds], b[holds], c[holds], triangle[holds]
-    gradient = _depth_gradient(screen, a, b, c)
+            a, b, c, triangle = (values.take(holds) for values in (a, b, c, triangle))
     a, b, c = _by_height(screen.y, a, b, c)
-    bottom, middle, top = screen.row[a], screen.row[b], screen.row[c]
-    long_edge, lower_edge, upper_edge = (_edge(screen, *ends) for ends in ((a, c), (a, b), (b, c)))
-    edges = long_edge, np.concatenate([lower_edge, upper_edge], axis=1)
+    bottom, middle, top = (screen.row.take(corner) for corner in (a, b, c))
+    low, mid, high = (_corner(screen, corner) for corner in (a, b, c))
+    gradient = _depth_gradient(low, mid, high)
+    long_edge, lower_edge, upper_edge = _edge(low, high), _edge(low, mid), _edge(mid, high)
+    short_edges = tuple(np.concatenate(pair) for pair in zip(lower_edge, upper_edge, strict=True))
     for part in _blocks(top - bottom):
-        first, last = bottom[part], top[part]
-        piece = np.repeat(np.arange(part.start, part.stop, dtype=np.int32), last - first)
-        row = _counted(first, last - first)
-        piece, row, first, last = _covered(row, piece, middle, edges, width)
+        first, rows = bottom[part], (top - bottom)[part]
+        piece = np.repeat(np.arange(part.start, part.stop), rows)
+        row = _counted(first, rows)
+        short = piece + len(middle) * (row >= middle.take(piece))
+        line = row + 0.5
+        one, other = _crossing(long_edge, piece, line), _crossing(short_edges, short, line)
+        first, last = _between(one, other, width)
+        kept = np.flatnonzero(first < last)
+        piece, row, first, last = (values.take(kept) for values in (piece, row, first, last))
         spans = _with_depth(row, piece, first, last, gradient, width)
-        yield spans._replace(triangle=triangle[piece])
+        yield spans._replace(triangle=triangle.take(piece))
 
 
-def _covered(
-    row: np.ndarray,
-    piece: np.ndarray,
-    middle: np.ndarray,
-    edges: tuple[np.ndarray, np.ndarray],
-    width: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of rows of triangles those that hold a pixel: triangle, row, first column, and end."""
-    long_edge, short_edges = edges
-    line = row + 0.5
-    one = _crossing(long_edge, piece, line)
-    other = _crossing(short_edges, piece + len(middle) * (row >= middle[piece]), line)
-    first = np.ceil(np.minimum(one, other) - 0.5)
-    last = np.ceil(np.maximum(one, other) - 0.5)
-    np.maximum(first, 0, out=first)
-    np.minimum(last, width, out=last)
-    kept = np.flatnonzero(first < last)
-    return piece[kept], row[kept], first[kept], last[kept]
+class _Corner(NamedTuple):
+    """One corner of each of some triangles: pixels, and z / w."""
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
 
 
-def _crossing(edges: np.ndarray, edge: np.ndarray, line: np.ndarray) -> np.ndarray:
+def _corner(screen: _Screen, vertex: np.ndarray) -> _Corner:
+    return _Corner(screen.x.take(vertex), screen.y.take(vertex), screen.depth.take(vertex))
+
+
+def _crossing(
+    edges: tuple[np.ndarray, np.ndarray, np.ndarray], edge: np.ndarray, line: np.ndarray
+) -> np.ndarray:
     """x where edges cross horizontal lines."""
     x, y, slope = edges
-    return x[edge] + (line - y[edge]) * slope[edge]
+    crossing = line - y.take(edge)
+    crossing *= slope.take(edge)
+    crossing += x.take(edge)
+    return crossing
+
+
+def _between(one: np.ndarray, other: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first column whose centre is between two crossings, and that after the last."""
+    columns = []
+    for x in (np.minimum(one, other), np.maximum(one, other)):
+        x -= 0.5
+        np.ceil(x, out=x)
+        np.maximum(x, 0, out=x)
+        columns.append(np.minimum(x, width, out=x))
+    return columns[0], columns[1]
 
 
 def _with_depth(
@@ -250,21 +269,29 @@ def _with_depth(
     piece: np.ndarray,
     first: np.ndarray,
     last: np.ndarray,
-    gradient: np.ndarray,
+    gradient: tuple[np.ndarray, ...],
     width: int,
 ) -> _Spans:
     """Spans, their triangles still counted within the block."""
-    along, upward, base, nearest, farthest = gradient.take(piece, axis=1)
-    base += upward * (row + 0.5)
-    # A sliver's gradient may be all rounding: no depth outside the triangle's own comes of it.
-    start = np.minimum(np.maximum(base + along * (first + 0.5), nearest), farthest)
-    end = np.minimum(np.maximum(base + along * (last - 0.5), nearest), farthest)
+    along, upward, base, nearest, farthest = (values.take(piece) for values in gradient)
+    upward *= row + 0.5
+    base += upward
+    ends = []
+    for column in (first + 0.5, last - 0.5):
+        column *= along
+        column += base
+        # A sliver's gradient may be all rounding: no depth outside the triangle's own comes of it.
+        np.maximum(column, nearest, out=column)
+        ends.append(np.minimum(column, farthest, out=column))
+    start, end = ends
     steps = last - first
+    end -= start
+    end /= np.maximum(steps - 1, 1)
     return _Spans(
-        start=row * np.int32(width) + first.astype(np.int32),
-        count=steps.astype(np.int32),
+        start=row * width + first.astype(np.intp),
+        count=steps.astype(np.intp),
         depth=start,
-        slope=(end - start) / np.maximum(steps - 1, 1),
+        slope=end,
         triangle=piece,
     )
 
@@ -276,19 +303,21 @@ def _draw(spans: _Spans, nearest: np.ndarray, owner: np.ndarray) -> None:
     stayed writes again, until nobody is: a few rounds, since each leaves only the losers that are
     in front of the winner.
     """
-    span = np.repeat(np.arange(len(spans.count), dtype=np.int32), spans.count)
+    span = np.repeat(np.arange(len(spans.count)), spans.count)
     pixel = _counted(spans.start, spans.count)
-    depth = spans.depth[span] + spans.slope[span] * (pixel - spans.start[span])
-    closer = np.flatnonzero(depth < nearest[pixel])
-    span, pixel, depth = span[closer], pixel[closer], depth[closer]
+    depth = pixel - spans.start.take(span)
+    depth = depth * spans.slope.take(span)
+    depth += spans.depth.take(span)
+    closer = np.flatnonzero(depth < nearest.take(pixel))
+    span, pixel, depth = span.take(closer), pixel.take(closer), depth.take(closer)
     where, what = pixel, depth
     while len(where):
         nearest[where] = what
-        closer = np.flatnonzero(what < nearest[where])
-        where, what = where[closer], what[closer]
+        closer = np.flatnonzero(what < nearest.take(where))
+        where, what = where.take(closer), what.take(closer)
     # Backwards, so that of equal depths the first triangle is written last and stays.
-    won = np.flatnonzero(depth == nearest[pixel])[::-1]
-    owner[pixel[won]] = spans.triangle[span[won]]
+    won = np.flatnonzero(depth == nearest.take(pixel))[::-1]
+    owner[pixel.take(won)] = spans.triangle.take(span.take(won))
 
 
 def _blocks(count: np.ndarray) -> Iterator[slice]:
@@ -302,11 +331,13 @@ def _blocks(count: np.ndarray) -> Iterator[slice]:
 
 
 def _counted(first: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """first[0], first[0] + 1, ... `count[0]` of them, then those of first[1] and so on, int32."""
+    """first[0], first[0] + 1, ... `count[0]` of them, then those of first[1] and so on, intp."""
     stop = np.cumsum(count)
-    total = int(stop[-1]) if len(stop) else 0
-    shift = (first - (stop - count)).astype(np.int32)
-    return np.arange(total, dtype=np.int32) + np.repeat(shift, count)
+    shift = first + count
+    shift -= stop
+    number = np.repeat(shift, count)
+    number += np.arange(len(number))
+    return number
 
 
 def _by_height(
@@ -315,7 +346,7 @@ def _by_height(
     """Corners from the lowest to the highest."""
 
     def ordered(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        swap = y[one] > y[other]
+        swap = y.take(one) > y.take(other)
         return np.where(swap, other, one), np.where(swap, one, other)
 
     a, b = ordered(a, b)
@@ -324,29 +355,28 @@ def _by_height(
     return a, b, c
 
 
-def _edge(screen: _Screen, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(3, K) x and y of the lower end, and how far x goes for each unit up."""
-    x, y = screen.x[low], screen.y[low]
-    rise = screen.y[high] - y
-    slope = np.divide(screen.x[high] - x, rise, out=np.zeros_like(rise), where=rise > 0)
-    return np.stack([x, y, slope])
+def _edge(low: _Corner, high: _Corner) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x and y of the lower end, and how far x goes for each unit up."""
+    rise = high.y - low.y
+    rise[rise == 0] = np.inf
+    return low.x, low.y, (high.x - low.x) / rise
 
 
-def _depth_gradient(screen: _Screen, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """(5, K) depth = along x + upward y + base, and the least and largest depth of a triangle.
+def _depth_gradient(a: _Corner, b: _Corner, c: _Corner) -> tuple[np.ndarray, ...]:
+    """depth = along x + upward y + base, and the least and largest depth of a triangle.
 
     z / w of a plane is affine on screen, under perspective too.
     """
-    x, y, depth = screen.x[a], screen.y[a], screen.depth[a]
-    xb, yb, xc, yc = screen.x[b] - x, screen.y[b] - y, screen.x[c] - x, screen.y[c] - y
-    depth_b, depth_c = screen.depth[b], screen.depth[c]
-    area = xb * yc - xc * yb
-    inverse = np.divide(1.0, area, out=np.zeros_like(area), where=area != 0)
-    along = ((depth_b - depth) * yc - (depth_c - depth) * yb) * inverse
-    upward = ((depth_c - depth) * xb - (depth_b - depth) * xc) * inverse
-    nearest = np.minimum(np.minimum(depth, depth_b), depth_c)
-    farthest = np.maximum(np.maximum(depth, depth_b), depth_c)
-    return np.stack([along, upward, depth - along * x - upward * y, nearest, farthest])
+    xb, yb, depth_b = b.x - a.x, b.y - a.y, b.depth - a.depth
+    xc, yc, depth_c = c.x - a.x, c.y - a.y, c.depth - a.depth
+    inverse = xb * yc - xc * yb
+    inverse[inverse == 0] = np.inf
+    np.divide(1, inverse, out=inverse)
+    along = (depth_b * yc - depth_c * yb) * inverse
+    upward = (depth_c * xb - depth_b * xc) * inverse
+    nearest = np.minimum(np.minimum(a.depth, b.depth), c.depth)
+    farthest = np.maximum(np.maximum(a.depth, b.depth), c.depth)
+    return along, upward, a.depth - along * a.x - upward * a.y, nearest, farthest
 
 
 def _barycentrics(
@@ -356,33 +386,40 @@ def _barycentrics(
     triangle: np.ndarray,
     width: int,
     height: int,
-) -> np.ndarray:
-    """(P, 3) perspective-correct weights of whole triangles at the centres of pixels.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Perspective-correct weights of whole triangles at the centres of pixels, and which face them.
 
     Homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
     Coordinates", 1997), which hold for triangles that reach behind the eye as well. Taken relative
     to the pixel, so that small triangles lose no digits.
     """
-    x = (vertices[:, 0] + vertices[:, 3]) * (0.5 * width)
-    y = (vertices[:, 1] + vertices[:, 3]) * (0.5 * height)
-    w = np.ascontiguousarray(vertices[:, 3])
-    weights = np.empty((3, len(pixel))).T
+    w = vertices[:, 3]
+    x, y, w = (vertices[:, 0] + w) * (0.5 * width), (vertices[:, 1] + w) * (0.5 * height), w.copy()
+    corners = np.ascontiguousarray(triangles.T)
+    weights = np.empty((3, len(pixel)), dtype=np.float32)
+    front = np.empty(len(pixel), dtype=bool)
     for start in range(0, len(pixel), BLOCK):
         part = slice(start, start + BLOCK)
-        row, column = np.divmod(pixel[part], width)
+        row, column = np.divmod(pixel[part], np.int32(width))
         column, row = column + 0.5, row + 0.5
         offsets = []
-        for corner in triangles[triangle[part]].T:
-            depth = w[corner]
-            offsets.append((x[corner] - column * depth, y[corner] - row * depth))
+        for corner in corners:
+            vertex = corner.take(triangle[part]).astype(np.intp)
+            depth = w.take(vertex)
+            offsets.append((x.take(vertex) - column * depth, y.take(vertex) - row * depth))
         (ax, ay), (bx, by), (cx, cy) = offsets
         one, two, three = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
-        sign = np.sign(one + two + three)
-        one, two, three = (np.maximum(edge * sign, 0.0) for edge in (one, two, three))
-        total = one + two + three
-        lost = total == 0
-        total[lost] = 1.0
-        for corner, edge in enumerate((one, two, three)):
-            weights[part, corner] = edge / total
-        weights[part][lost] = 1 / 3
-    return weights
+        total = one + two
+        total += three
+        np.greater_equal(total, 0, out=front[part])
+        with np.errstate(divide="ignore"):
+            np.divide(1, total, out=total)
+        # A triangle without an area on screen has no weights.
+        lost = np.isinf(total)
+        total[lost] = 0
+        for edge, out in zip((one, two, three), weights[:, part], strict=True):
+            edge *= total
+            np.maximum(edge, 0, out=edge)
+            out[:] = edge
+        weights[:, part][:, lost] = 1 / 3
+    return weights.T, front

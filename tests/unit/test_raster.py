@@ -168,7 +168,8 @@ def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
     x = (2 * (column + 0.5) / 200 - 1) / camera.projection[0, 0] * -z
     assert len(seen.pixel) == 200 * ((z[np.unique(row, return_index=True)[1]] > -9).sum())
     position = np.einsum("pc,pci->pi", seen.barycentric, points[triangles[seen.triangle]])
-    np.testing.assert_allclose(position, np.stack([x, -1 + 0 * x, z], axis=1), atol=1e-9)
+    # Weights are rounded to single precision, and the corners are up to 70 away.
+    np.testing.assert_allclose(position, np.stack([x, -1 + 0 * x, z], axis=1), atol=1e-5)
     depth = (camera.projection[2, 2] * z + camera.projection[2, 3]) / -z
     np.testing.assert_allclose(seen.depth, depth, atol=1e-9)
 
@@ -193,7 +194,11 @@ def test_order_of_triangles_and_corners_does_not_matter(seed):
     turned = rasterise(clip, triangles[:, [1, 2, 0]], WIDTH, HEIGHT)
     assert (turned.pixel == seen.pixel).all()
     assert (turned.triangle == seen.triangle).all()
-    np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], seen.barycentric, atol=1e-9)
+    np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], seen.barycentric, atol=1e-6)
+    assert (turned.front == seen.front).all()
+    mirrored = rasterise(clip, triangles[:, ::-1], WIDTH, HEIGHT)
+    assert (mirrored.triangle == seen.triangle).all()
+    assert (mirrored.front == ~seen.front).all()
 
 
 def test_the_first_of_equal_depths_is_seen():

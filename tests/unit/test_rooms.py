@@ -13,10 +13,11 @@ from conftest import ROOT
 PACKAGE = ROOT / "rosy_addon"
 
 #: What each room may import besides itself. Modules at the top are rooms of their own.
-BASE = {"errors", "progress", "files"}
+BASE = {"errors", "progress", "files", "trigonometry"}
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
+    "trigonometry": set(),
     "files": {"errors"},
     "field": BASE,
     "projection": BASE | {"field"},

@@ -1,0 +1,481 @@
+"""A body's field at the corners of its triangles, in world space: the same for every camera.
+
+A field is given on faces at rest. Each face's member is carried to where the face is now, and from
+the faces to the corners, where it is averaged over each smooth fan. Everything but the first step
+is done on the representation z = rho exp(i N t), so that nothing depends on which of the N members
+is stored.
+
+Vectors are kept and worked on by their components, which lie in a row each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..field.frames import dot_components
+from ..field.representation import power
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..progress import Progress, Work
+from ..trigonometry import angle_of
+
+#: Faces, corners and triangles that are worked on at once: bounds memory, and fits the caches.
+BLOCK = 1 << 14
+
+#: Corner normals that differ by no more from that of their fan are the fan's.
+SAME_NORMAL = 1e-6
+
+#: A matrix that turns and scales is one within the rounding of Blender's single precision.
+SIMILAR = 2e-6
+
+Vectors = Sequence[np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """What the pixels of T triangles are computed from, single precision.
+
+    Attributes
+    ----------
+    normal : (3, 3, T) ndarray
+        Components of n_0, n_1, n_2.
+    axis : (3, T) ndarray
+        A unit tangent e at n_0: values are relative to it.
+    z : (3, T) complex ndarray
+        The corners' values, those of corners 1 and 2 carried along the arc to n_0.
+    dots : (3, T) ndarray
+        n_0.n_1, n_0.n_2, n_1.n_2.
+    volume : (T,) ndarray
+        n_0 . (n_1 x n_2).
+    plane_normal : (3, T) ndarray
+        Of the triangles themselves, from the order of their corners.
+    """
+
+    normal: np.ndarray
+    axis: np.ndarray
+    z: np.ndarray
+    dots: np.ndarray
+    volume: np.ndarray
+    plane_normal: np.ndarray
+
+    def turned(self, rotation: np.ndarray) -> Carried:
+        """The same in another space, given the (3, 3) rotation to there."""
+        return replace(
+            self,
+            normal=np.stack([_transformed(corner, rotation) for corner in self.normal]),
+            axis=_transformed(self.axis, rotation),
+            plane_normal=_transformed(self.plane_normal, rotation),
+        )
+
+
+def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: str) -> Work[Carried]:
+    """Carry a field from the faces at rest to the corners of the triangles as they are now.
+
+    Parameters
+    ----------
+    surface : Surface
+    matrix : (4, 4) float64 ndarray
+        Object to world space.
+    field : RosyField
+    display : {"smooth", "flat"}
+        Whether values and normals are averaged at the corners, or each face keeps its own.
+
+    Returns
+    -------
+    Carried
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    now = linear @ surface.vertices.T
+    yield Progress(0.0, "carrying the field")
+    faces = _faces(surface, linear, now, field, angles=display == "smooth")
+    yield Progress(0.4, "carrying the field")
+    fans = _fans(surface, linear, faces, field.degree) if display == "smooth" else None
+    yield Progress(0.7, "carrying the field")
+    count = len(surface.triangles)
+    carried = Carried(
+        normal=np.empty((3, 3, count), dtype=np.float32),
+        axis=np.empty((3, count), dtype=np.float32),
+        z=np.empty((3, count), dtype=np.complex64),
+        dots=np.empty((3, count), dtype=np.float32),
+        volume=np.empty(count, dtype=np.float32),
+        plane_normal=np.empty((3, count), dtype=np.float32),
+    )
+    custom = None
+    if fans is not None and not _is_of_fans(surface):
+        custom = _transformed(surface.corner_normal.T, _cofactors(linear))
+    for start in range(0, count, BLOCK):
+        part = slice(start, min(start + BLOCK, count))
+        _fill_triangles(carried, part, surface, now, faces, fans, custom, field.degree)
+    return carried
+
+
+# --- faces ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Faces as they are now, and a member of each.
+
+    Attributes
+    ----------
+    normal : (3, F) float32 ndarray
+        Unit; zero for a face without area.
+    member : (3, F) float32 ndarray
+        Unit tangents; arbitrary where `magnitude` is 0.
+    magnitude : (F,) float32 ndarray
+        rho; 0 where the field is undefined.
+    angle : (C,) float32 ndarray or None
+        Of each face at each of its corners.
+    """
+
+    normal: np.ndarray
+    member: np.ndarray
+    magnitude: np.ndarray
+    angle: np.ndarray | None
+
+
+def _faces(
+    surface: Surface, linear: np.ndarray, now: np.ndarray, field: RosyField, angles: bool
+) -> _Faces:
+    """Carry members from faces at rest to the same faces as they are now.
+
+    `now` are the (3, V) vertices in world space, but for the shift.
+    """
+    count = surface.face_count
+    found = _Faces(
+        normal=np.empty((3, count), dtype=np.float32),
+        member=np.empty((3, count), dtype=np.float32),
+        magnitude=np.empty(count, dtype=np.float32),
+        angle=np.empty(len(surface.corner_vertex), dtype=np.float32) if angles else None,
+    )
+    scale = _similarity(linear) if surface.rest is None else None
+    rest = None
+    if scale is None:
+        rest = np.ascontiguousarray((surface.vertices if surface.rest is None else surface.rest).T)
+    for size, block in _faces_by_size(surface.face_start):
+        first = surface.face_start[:-1][block]
+        corner_vertex = [surface.corner_vertex.take(first + corner) for corner in range(size)]
+        points = _from_first(now, corner_vertex)
+        normal = _normal(points)
+        vectors = [np.ascontiguousarray(part) for part in field.vectors[block].T]
+        if rest is None:
+            member = _transformed(vectors, linear)
+            across = dot_components(member, normal)
+            member = [part - across * n for part, n in zip(member, normal, strict=True)]
+            length = np.sqrt(dot_components(member, member))
+            magnitude = length * (1 / scale)
+        else:
+            member, magnitude = _carried_member(_from_first(rest, corner_vertex), points, vectors)
+            length = np.sqrt(dot_components(member, member))
+        length[length == 0] = np.inf
+        magnitude[np.isinf(length) | ~np.logical_or.reduce(normal)] = 0
+        for axis in range(3):
+            found.normal[axis, block] = normal[axis]
+            found.member[axis, block] = member[axis] / length
+        found.magnitude[block] = magnitude
+        if angles:
+            for corner, angle in enumerate(_angles(points)):
+                found.angle[first + corner] = angle
+    return found
+
+
+def _faces_by_size(face_start: np.ndarray) -> Iterator[tuple[int, slice | np.ndarray]]:
+    """Blocks of faces with equally many corners."""
+    size = np.diff(face_start)
+    if (size == size[0]).all():
+        for start in range(0, len(size), BLOCK):
+            yield int(size[0]), slice(start, start + BLOCK)
+        return
+    for corners in np.unique(size).tolist():
+        alike = np.flatnonzero(size == corners)
+        # Faces with very many corners are few; their blocks are to stay as small.
+        block = max(4 * BLOCK // max(corners, 4), 1)
+        for start in range(0, len(alike), block):
+            yield corners, alike[start : start + block]
+
+
+def _similarity(linear: np.ndarray) -> float | None:
+    """By how much a linear map scales, if that is all it does but turning and mirroring."""
+    square = linear.T @ linear
+    scale = np.trace(square) / 3
+    if not scale > 0 or np.abs(square - scale * np.eye(3)).max() > SIMILAR * scale:
+        return None
+    return float(np.sqrt(scale))
+
+
+def _from_first(points: np.ndarray, corner_vertex: Sequence[np.ndarray]) -> list[list[np.ndarray]]:
+    """Corners of faces relative to their first, which is left out."""
+    origin = [part.take(corner_vertex[0]) for part in points]
+    return [
+        [part.take(vertex) - start for part, start in zip(points, origin, strict=True)]
+        for vertex in corner_vertex[1:]
+    ]
+
+
+def _cross(a: Vectors, b: Vectors) -> list[np.ndarray]:
+    return [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+
+
+def _unit(vectors: Vectors) -> list[np.ndarray]:
+    """Scaled to length 1; zero vectors stay zero."""
+    length = np.sqrt(dot_components(vectors, vectors))
+    length[length == 0] = np.inf
+    return [part / length for part in vectors]
+
+
+def _normal(points: Sequence[Vectors]) -> list[np.ndarray]:
+    """Unit normals of polygons given by `_from_first`: the sum of a fan of triangles."""
+    area = _cross(points[0], points[1])
+    for one, other in pairwise(points[1:]):
+        area = [total + part for total, part in zip(area, _cross(one, other), strict=True)]
+    return _unit(area)
+
+
+def _angles(points: Sequence[Vectors]) -> list[np.ndarray]:
+    """The angle at each corner of polygons given by `_from_first`."""
+    edges = [points[0]]
+    edges += [_less(after, before) for before, after in pairwise(points)]
+    edges.append([-part for part in points[-1]])
+    triangle = len(points) == 2
+    area = _cross(edges[0], edges[1]) if triangle else None
+    angles = []
+    for ahead, behind in zip(edges, edges[-1:] + edges[:-1], strict=True):
+        across = area if triangle else _cross(behind, ahead)
+        size = np.sqrt(dot_components(across, across))
+        along = dot_components(ahead, behind)
+        longer = np.maximum(size, np.abs(along))
+        longer[longer == 0] = 1
+        size /= longer
+        along /= -longer
+        angles.append(angle_of(along.astype(np.float32), size.astype(np.float32)))
+    return angles
+
+
+def _less(a: Vectors, b: Vectors) -> list[np.ndarray]:
+    return [one - other for one, other in zip(a, b, strict=True)]
+
+
+def _carried_member(
+    rest: Sequence[Vectors], now: Sequence[Vectors], vectors: Vectors
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Members of faces that are deformed, as they are now, and their lengths.
+
+    In frames of both planes the corners are complex numbers w and u. The linear map that takes w
+    to u best, u = a w + b conj(w), has the rotation a / |a| as its polar part, and that part alone
+    is applied: members stay 2 pi / N apart and keep their length however the face is stretched.
+    Both normals follow from the order of the corners, so a mirrored face needs no care.
+    """
+    rest_normal = _normal(rest)
+    rest_x, rest_y = _frame(rest_normal)
+    x, y = _frame(_normal(now))
+    w, u = _flat(rest, rest_x, rest_y), _flat(now, x, y)
+    ww = uw = square = 0
+    for one, other in zip(w, u, strict=True):
+        ww, uw = ww + one * one, uw + other * one
+        square = square + (one.real**2 + one.imag**2)
+    turned = square * sum(other * one.conj() for one, other in zip(w, u, strict=True))
+    turned -= np.conj(ww) * uw
+    member = dot_components(vectors, rest_x) + 1j * dot_components(vectors, rest_y)
+    magnitude = np.abs(member)
+    member *= turned * np.logical_or.reduce(rest_normal)
+    member /= np.maximum(np.abs(member), np.finfo(np.float64).tiny)
+    return [member.real * a + member.imag * b for a, b in zip(x, y, strict=True)], magnitude
+
+
+def _flat(points: Sequence[Vectors], x: Vectors, y: Vectors) -> list[np.ndarray]:
+    """Corners in a frame of the face, relative to their mean."""
+    flat = [dot_components(point, x) + 1j * dot_components(point, y) for point in points]
+    mean = sum(flat) / (len(flat) + 1)
+    return [-mean, *(point - mean for point in flat)]
+
+
+def _frame(normal: Vectors) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """`frames.tangent_frame` by components."""
+    nx, ny, nz = normal
+    sign = np.copysign(nz.dtype.type(1), nz)
+    a = -1 / (sign + nz)
+    b = nx * ny * a
+    x = [1 + sign * nx * nx * a, sign * b, -sign * nx]
+    return x, [b, sign + ny * ny * a, -ny]
+
+
+def _transformed(vectors: Vectors, matrix: np.ndarray) -> np.ndarray:
+    """(3, n): each vector times a matrix, in the precision of the vectors."""
+    matrix = matrix.astype(vectors[0].dtype)
+    result = np.empty((3, len(vectors[0])), dtype=matrix.dtype)
+    for row, out in zip(matrix, result, strict=True):
+        np.multiply(vectors[0], row[0], out=out)
+        out += vectors[1] * row[1]
+        out += vectors[2] * row[2]
+    return result
+
+
+def _cofactors(linear: np.ndarray) -> np.ndarray:
+    """det(L) times the inverse transpose: what L does to normals, mirrored or flattened too."""
+    a, b, c = linear
+    return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+
+
+# --- fans ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Fans:
+    """Smooth fans of corners: (3, K) float32 normals, (K,) complex64 z in their `_frame`."""
+
+    normal: np.ndarray
+    z: np.ndarray
+
+
+def _is_of_fans(surface: Surface) -> bool:
+    """Whether all corners of a fan share its normal."""
+    shared = surface.fan_normal.take(surface.corner_fan, axis=0)
+    return bool(np.abs(surface.corner_normal - shared).max() <= SAME_NORMAL)
+
+
+def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _Fans:
+    """Average the faces' values at their corners, weighted by the angle there.
+
+    Each is carried to the fan's normal by the minimal rotation from its face's. Faces on which the
+    field is undefined have no say.
+    """
+    normal = np.array(_unit(_transformed(surface.fan_normal.T, _cofactors(linear))))
+    normal = normal.astype(np.float32)
+    frame_x, frame_y = _frame(normal)
+    count, fans = len(surface.corner_vertex), normal.shape[1]
+    real, imaginary, weight = (np.empty(count) for _ in range(3))
+    for start in range(0, count, BLOCK):
+        part = slice(start, min(start + BLOCK, count))
+        face, fan = surface.corner_face[part], surface.corner_fan[part].astype(np.intp)
+        turn = _carried_turn(
+            [member.take(face) for member in faces.member],
+            [own.take(face) for own in faces.normal],
+            [there.take(fan) for there in normal],
+            [x.take(fan) for x in frame_x],
+            [y.take(fan) for y in frame_y],
+        )
+        magnitude, angle = faces.magnitude.take(face), faces.angle[part]
+        z = power(turn, degree)
+        magnitude *= angle
+        z *= magnitude
+        real[part], imaginary[part] = z.real, z.imag
+        np.multiply(angle, magnitude > 0, out=weight[part])
+    total = np.bincount(surface.corner_fan, weight, fans)
+    total[total == 0] = np.inf
+    z = np.empty(fans, dtype=np.complex64)
+    z.real = np.bincount(surface.corner_fan, real, fans) / total
+    z.imag = np.bincount(surface.corner_fan, imaginary, fans) / total
+    return _Fans(normal, z)
+
+
+def _carried_turn(
+    vectors: Vectors, source: Vectors, target: Vectors, x: Vectors, y: Vectors
+) -> np.ndarray:
+    """(n,) complex64 directions, in a frame at `target`, of tangents at `source` carried to there.
+
+    As `frames.carry`: v - (v.t) / (1 + s.t) (s + t), of which t has no part in the frame.
+    """
+    share = dot_components(vectors, target)
+    share /= np.maximum(1 + dot_components(source, target), np.finfo(share.dtype).eps)
+    turn = np.empty(len(share), dtype=np.complex64)
+    turn.real = dot_components(vectors, x) - share * dot_components(source, x)
+    turn.imag = dot_components(vectors, y) - share * dot_components(source, y)
+    size = np.sqrt(turn.real * turn.real + turn.imag * turn.imag)
+    size[size == 0] = np.inf
+    turn *= np.float32(1) / size
+    return turn
+
+
+# --- triangles -----------------------------------------------------------------------------------
+
+
+def _fill_triangles(
+    carried: Carried,
+    part: slice,
+    surface: Surface,
+    now: np.ndarray,
+    faces: _Faces,
+    fans: _Fans | None,
+    custom: np.ndarray | None,
+    degree: int,
+) -> None:
+    """Write what some triangles have at their corners; without fans, what their faces have."""
+    corners = surface.triangles[part].T.astype(np.intp)
+    face = surface.triangle_face[part]
+    vertices = [surface.corner_vertex.take(corner) for corner in corners]
+    plane_normal = np.array(_normal(_from_first(now, vertices)), dtype=np.float32)
+    if fans is None:
+        normals = [[own.take(face) for own in faces.normal]] * 3
+        member = [member.take(face) for member in faces.member]
+        values = [_face_values(faces, face, member, normals[0], degree)] * 3
+    else:
+        normals, values = _fan_values(surface, corners, fans, custom, degree)
+    normals = [_completed(normal, plane_normal) for normal in normals]
+    x, y = _frame(normals[0])
+    # Values on faces where the field is undefined are so at all corners.
+    defined = faces.magnitude.take(face) > 0
+    for corner, (normal, z) in enumerate(zip(normals, values, strict=True)):
+        if corner and fans is not None:
+            there, _ = _frame(normal)
+            z = z * power(_carried_turn(there, normal, normals[0], x, y), degree)
+        carried.normal[corner, :, part] = normal
+        np.multiply(z, defined, out=carried.z[corner, part])
+    carried.axis[:, part] = x
+    carried.plane_normal[:, part] = plane_normal
+    for number, (one, other) in enumerate(((0, 1), (0, 2), (1, 2))):
+        carried.dots[number, part] = dot_components(normals[one], normals[other])
+    carried.volume[part] = dot_components(normals[0], _cross(normals[1], normals[2]))
+
+
+def _completed(normal: list[np.ndarray], plane_normal: np.ndarray) -> list[np.ndarray]:
+    """Normals that are zero replaced by those of the triangles, or by any."""
+    lost = dot_components(normal, normal) == 0
+    if lost.any():
+        plane = plane_normal[:, lost]
+        plane[2, ~plane.any(axis=0)] = 1
+        normal = [part.copy() for part in normal]
+        for part, instead in zip(normal, plane, strict=True):
+            part[lost] = instead
+    return normal
+
+
+def _face_values(
+    faces: _Faces, face: np.ndarray, member: Vectors, normal: Vectors, degree: int
+) -> np.ndarray:
+    """(n,) complex64 z of faces in the `_frame` of their normals."""
+    turn = np.empty(len(face), dtype=np.complex64)
+    x, y = _frame(normal)
+    turn.real, turn.imag = dot_components(member, x), dot_components(member, y)
+    return power(turn, degree) * faces.magnitude.take(face)
+
+
+def _fan_values(
+    surface: Surface,
+    corners: np.ndarray,
+    fans: _Fans,
+    custom: np.ndarray | None,
+    degree: int,
+) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
+    """Normals and values of the fans at corners; with custom normals, those and values there."""
+    normals, values = [], []
+    for corner in corners:
+        fan = surface.corner_fan.take(corner).astype(np.intp)
+        normal, z = [part.take(fan) for part in fans.normal], fans.z.take(fan)
+        if custom is not None:
+            own = [
+                part.astype(np.float32) for part in _unit([part.take(corner) for part in custom])
+            ]
+            there, _ = _frame(normal)
+            z *= power(_carried_turn(there, normal, own, *_frame(own)), degree)
+            normal = own
+        normals.append(normal)
+        values.append(z)
+    return normals, values

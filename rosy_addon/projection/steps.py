@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.frames import carry_components, dot, view_frame
+from ..field.frames import carry_components, dot_components, view_frame
 from .gbuffer import GBuffer
 
 #: Pixels that are worked on at once.
@@ -87,123 +87,159 @@ def links(buffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarr
     and uneven meshes and that parallel sheets a pixel apart exceed. Depth is measured in a quantity
     of which planes are linear functions on screen: z, under perspective 1 / z.
     """
-    slopes = _slopes(buffer)
-    aligned = None if cross_creases else np.float32(np.cos(crease_angle))
-    camera = buffer.camera
-    width = np.int32(camera.width)
+    width = np.int32(buffer.camera.width)
     row, column = np.divmod(buffer.pixel, width)
-    lowest = int(row[0]) if len(row) else 0
-    rows = int(row[-1]) - lowest + 1 if len(row) else 0
-    # One row and one pixel more than there are, for neighbours beyond the last.
-    index = np.full((rows + 1) * camera.width + 1, -1, dtype=np.int32)
-    index[buffer.pixel - lowest * width] = np.arange(len(row), dtype=np.int32)
     bits = np.full(len(row), 1 << 4, dtype=np.uint16)
-    for start in range(0, len(row), BLOCK):
-        part = slice(start, min(start + BLOCK, len(row)))
-        origin = buffer.pixel[part] - lowest * width
-        here = np.arange(part.start, part.stop, dtype=np.int32)
+    if not len(row):
+        return bits
+    left = column.min()
+    column -= left - 1
+    # With a column of nothing on either side.
+    width = int(column.max()) + 2
+    aligned = None if cross_creases else np.float32(np.cos(crease_angle))
+    rows = max(BLOCK // width, 1)
+    for low in range(int(row[0]), int(row[-1]) + 1, rows):
+        # And with the first row after these, or one of nothing.
+        first, after = np.searchsorted(row, np.array([low, low + rows + 1], row.dtype)).tolist()
+        cell = (row[first:after] - low) * width + column[first:after]
+        window = _window(buffer, slice(first, after), cell, (rows + 1, width))
+        joined = np.zeros((rows + 1, width), dtype=np.uint16)
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
-            there = index.take(origin + (dy * width + np.int32(dx)))
-            if dx:
-                there[column[part] == (width - 1 if dx > 0 else 0)] = -1
-            nothing = there < 0
-            np.copyto(there, here, where=nothing)
-            joined = _goes_on(buffer, slopes, part, there, (dx, dy), aligned)
-            joined[nothing] = False
+            here, there = _shifted(rows + 1, width, dx, dy)
+            goes_on = _goes_on(window, here, there, (dx, dy), aligned).astype(np.uint16)
             bit = (dy + 1) * 3 + (dx + 1)
-            bits[part] |= joined.astype(np.uint16) << np.uint16(bit)
-            bits[there[joined]] |= np.uint16(1 << (8 - bit))
+            joined[here] |= goes_on << np.uint16(bit)
+            joined[there] |= goes_on << np.uint16(8 - bit)
+        # The last row's own links to the right are found again with the next rows.
+        bits[first:after] |= joined.reshape(-1).take(cell)
     return bits
 
 
-class _Slopes(NamedTuple):
-    """Depth on screen, as a quantity of which planes are linear functions there.
+class _Window(NamedTuple):
+    """Some rows of the frame, as far as a G-buffer covers it.
 
     Attributes
     ----------
-    depth : (P,) float32 ndarray
-        Orthographic: z. Perspective: one by the depth.
-    along, upward : (P,) float32 ndarray
+    depth : (h, w) float32 ndarray
+        A quantity of which planes are linear functions on screen. Orthographic: z. Perspective: one
+        by the depth. NaN where nothing is seen.
+    along, upward : (h, w) float32 ndarray
         By how much it grows to the next column and row on the tangent plane.
-    scale : (P,) float32 ndarray
-        Makes pixels of depth of it, at this pixel.
-    steep : (P,) float32 ndarray
-        Pixels of depth for a pixel across, in the steepest direction.
+    tolerance : (h, w) float32 ndarray
+        How far it may be off what is predicted a pixel away.
+    normal : 3 (h, w) float32 ndarrays
+    body : (h, w) int32 ndarray or None
+        None if there is but one.
+    front : (h, w) bool ndarray or None
+        None if all are seen from there.
     """
 
     depth: np.ndarray
     along: np.ndarray
     upward: np.ndarray
-    scale: np.ndarray
-    steep: np.ndarray
+    tolerance: np.ndarray
+    normal: tuple[np.ndarray, ...]
+    body: np.ndarray | None
+    front: np.ndarray | None
 
 
-def _slopes(buffer: GBuffer) -> _Slopes:
-    camera, normal, z = buffer.camera, buffer.plane_normal, buffer.position[:, 2]
+def _window(buffer: GBuffer, pixels: slice, cell: np.ndarray, shape: tuple[int, int]) -> _Window:
+    def spread(values: np.ndarray, nothing: float = 0) -> np.ndarray:
+        window = np.full(shape, nothing, dtype=values.dtype)
+        window.reshape(-1)[cell] = values
+        return window
+
+    depth, along, upward, tolerance = _slopes(buffer, pixels)
+    return _Window(
+        depth=spread(depth, np.nan),
+        along=spread(along),
+        upward=spread(upward),
+        tolerance=spread(tolerance),
+        normal=tuple(spread(component) for component in buffer.normal[pixels].T),
+        body=spread(buffer.body[pixels]) if len(buffer.names) > 1 else None,
+        front=None if buffer.front.all() else spread(buffer.front[pixels]),
+    )
+
+
+def _slopes(
+    buffer: GBuffer, pixels: slice
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """`_Window.depth`, `along`, `upward` and `tolerance` of some pixels."""
+    camera, normal, z = buffer.camera, buffer.plane_normal[pixels].T, buffer.position[pixels, 2]
     inverse = np.linalg.inv(camera.projection[:2, :2])
     inverse = (inverse * (2.0 / camera.width, 2.0 / camera.height)).astype(np.float32)
-    along = normal[:, 0] * inverse[0, 0] + normal[:, 1] * inverse[1, 0]
-    upward = normal[:, 0] * inverse[0, 1] + normal[:, 1] * inverse[1, 1]
+    along = normal[0] * inverse[0, 0] + normal[1] * inverse[1, 0]
+    upward = normal[0] * inverse[0, 1] + normal[1] * inverse[1, 1]
+    per_unit = np.float32(camera.pixels_per_unit)
     if camera.is_perspective:
         # Points r d at depth d along a ray r lie on n.x = c where 1 / d = n.r / c.
-        divisor, depth = dot(normal, buffer.position), -1 / z
-        scale = -z * np.float32(camera.pixels_per_unit)
+        divisor, depth = dot_components(normal, buffer.position[pixels].T), -1 / z
+        scale = -z * per_unit
     else:
-        divisor, depth = -normal[:, 2], z
-        scale = np.full(len(z), camera.pixels_per_unit, dtype=np.float32)
+        divisor, depth, scale = -normal[2], z, per_unit
     least = np.float32(1e-12)
-    divisor = np.where(np.abs(divisor) < least, -least, divisor)
-    along, upward = along / divisor, upward / divisor
-    steep = scale * np.hypot(along, upward)
+    divisor[np.abs(divisor) < least] = -least
+    np.divide(1, divisor, out=divisor)
+    along *= divisor
+    upward *= divisor
+    steep = np.sqrt(along * along + upward * upward)
+    steep *= scale
     limit = np.minimum(1, np.float32(STEEPEST) / np.maximum(steep, least))
-    return _Slopes(depth, along * limit, upward * limit, scale, steep * limit)
+    along *= limit
+    upward *= limit
+    steep *= limit
+    steep *= np.float32(OBLIQUE_TOLERANCE)
+    steep += np.float32(TOLERANCE)
+    steep /= scale
+    return depth, along, upward, steep
+
+
+def _shifted(
+    height: int, width: int, dx: int, dy: int
+) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """The parts of a window that a neighbour lies in, and the neighbours."""
+    columns = slice(max(-dx, 0), width - max(dx, 0)), slice(max(dx, 0), width - max(-dx, 0))
+    return (slice(0, height - dy), columns[0]), (slice(dy, height), columns[1])
 
 
 def _goes_on(
-    buffer: GBuffer,
-    slopes: _Slopes,
-    here: slice,
-    there: np.ndarray,
+    window: _Window,
+    here: tuple[slice, slice],
+    there: tuple[slice, slice],
     step: tuple[int, int],
     aligned: np.float32 | None,
 ) -> np.ndarray:
-    """(K,) bool: whether the surface goes on from pixels to neighbours, `step` away."""
-    dx, dy = (np.float32(part) for part in step)
-    scale = np.maximum(slopes.scale[here], slopes.scale.take(there))
-    jump = slopes.depth.take(there) - slopes.depth[here]
-    from_here = jump - _along(slopes.along[here], slopes.upward[here], dx, dy)
-    from_there = jump - _along(slopes.along.take(there), slopes.upward.take(there), dx, dy)
-    from_here *= scale
-    from_there *= scale
-    off = np.minimum(np.abs(from_here), np.abs(from_there))
-    from_here *= from_there
-    off *= from_here > 0
-    if not buffer.front.all():
-        # No smooth surface shows its other side without a silhouette; an unevenly oriented one may.
-        turned_over = buffer.front[here] != buffer.front.take(there)
-        jump *= scale
-        straight = scale * _along(slopes.along[here], slopes.upward[here], dx, dy)
-        most = np.maximum(np.abs(jump - straight), np.abs(from_there))
-        np.copyto(off, most, where=turned_over)
-    allowed = np.minimum(slopes.steep[here], slopes.steep.take(there))
-    allowed *= np.float32(OBLIQUE_TOLERANCE)
-    allowed += np.float32(TOLERANCE)
-    allowed *= np.float32(np.hypot(dx, dy))
-    joined = off <= allowed
-    if len(buffer.names) > 1:
-        joined &= buffer.body[here] == buffer.body.take(there)
+    """Whether the surface goes on from cells to neighbours, `step` away."""
+    jump = window.depth[there] - window.depth[here]
+    from_here = _along(window.along[here], window.upward[here], *step)
+    from_there = _along(window.along[there], window.upward[there], *step)
+    allowed = np.minimum(window.tolerance[here], window.tolerance[there])
+    if all(step):
+        allowed *= np.float32(np.sqrt(2))
+    with np.errstate(invalid="ignore"):
+        joined = jump <= np.maximum(from_here, from_there) + allowed
+        joined &= jump >= np.minimum(from_here, from_there) - allowed
+        if window.front is not None:
+            # No smooth surface shows its other side without a silhouette; an unevenly oriented one
+            # may, where both planes predict the jump.
+            straight = np.abs(jump - from_here) <= allowed
+            straight &= np.abs(jump - from_there) <= allowed
+            straight |= window.front[here] == window.front[there]
+            joined &= straight
+    if window.body is not None:
+        joined &= window.body[here] == window.body[there]
     if aligned is not None:
-        normal = buffer.normal.T
-        facing = normal[0, here] * normal[0].take(there)
-        facing += normal[1, here] * normal[1].take(there)
-        facing += normal[2, here] * normal[2].take(there)
+        facing = window.normal[0][here] * window.normal[0][there]
+        facing += window.normal[1][here] * window.normal[1][there]
+        facing += window.normal[2][here] * window.normal[2][there]
         joined &= facing >= aligned
     return joined
 
 
-def _along(along: np.ndarray, upward: np.ndarray, dx: np.float32, dy: np.float32) -> np.ndarray:
+def _along(along: np.ndarray, upward: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """By how much depth changes over a step on the tangent plane."""
     if not dx:
         return upward
-    change = along if dx > 0 else -along
-    return change + upward if dy else change
+    if not dy:
+        return along
+    return upward + along if dx > 0 else upward - along

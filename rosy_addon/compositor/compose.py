@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..memory import keep_freed_memory
 from ..progress import Work, drain, part
 from ..projection.gbuffer import GBuffer
 from .brute import brute_images
@@ -113,6 +114,7 @@ def _scaled(look: Look) -> Look:
 
 def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Layers]:
     """LIC images of the members, blended, with the contrast of one of them times the gain."""
+    keep_freed_memory()
     if noise is None:
         channels = 3 if look.noise == "colour" else 1
         noise = image_noise(

@@ -54,9 +54,8 @@ class Covering:
     place : (P,) int32 ndarray
         The cell of each pixel.
     turn : (C,) float32 ndarray
-        t in units of 2 pi / S.
-    joined : (C,) uint16 ndarray
-        As in `Flow`; streamlines stay in the cell `END`.
+        t in units of 2 pi / S, plus 2. The last nine bits, too fine to matter, hold what can be
+        got with `joined`: streamlines look both up at every step, so they lie together.
     records : (S C, 2 + 2 K) int16 ndarray
         A step on screen, and for each channel the noise and its slope to the left.
     units : (3,) tuple of float
@@ -67,7 +66,6 @@ class Covering:
     width: int
     place: np.ndarray
     turn: np.ndarray
-    joined: np.ndarray
     records: np.ndarray
     units: tuple[float, float, float]
 
@@ -117,9 +115,10 @@ class Covering:
         size[size == 0] = 1
         column = np.rint((along * x - left * y) / size).astype(np.intp)
         row = np.rint((along * y + left * x) / size).astype(np.intp)
-        goes_on = self.joined.take(cell) >> (column + 3 * row + 4) & 1
+        turn = self.turn.take(cell)
+        goes_on = joined(turn) >> (column + 3 * row + 4).astype(np.uint32) & 1
         there = np.where(goes_on, cell + row * self.width + column, END)
-        slip = np.rint(self.turn.take(cell) - self.turn.take(there)).astype(np.intp)
+        slip = np.rint(turn - self.turn.take(there)).astype(np.intp)
         return (sheet + slip) % self.lines * self.cells + there
 
 
@@ -152,13 +151,11 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
     sheets = sheet_count(degree)
     half = sheets // 2
     place, width, cells = _window(flow)
-    turn = np.zeros(cells, dtype=np.float32)
-    joined = np.zeros(cells, dtype=np.uint16)
-    joined[place] = flow.joined
-    joined[END] = 1 << 4
+    # Streamlines that have ended stay in `END`.
+    turn = np.full(cells, _with_bits(np.float32(2), 1 << 4))
     spread = np.zeros((cells, channels), dtype=np.float32)
     spread[place] = noise
-    # A direction that is kept foreshortened may be a little longer than 1 under a wide lens.
+    # A direction that is kept foreshortened may be longer than 1 under a wide lens.
     longest = 2.0 if look.foreshorten else 1.0
     brightest = max(float(np.abs(noise).max()), 1e-30)
     steepest = 2 * brightest * longest
@@ -168,35 +165,55 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
         part = slice(start, min(start + BLOCK, count))
         here = place[part]
         right, up = _slopes(spread, here, width, flow.joined[part])
+        right, up = right * in_units[2], up * in_units[2]
         base, x, y = _nearest(flow.representation[part], degree, look.guiding_angle)
-        turn[here] = base * np.float32(sheets / (2 * np.pi))
-        record = np.empty((len(here), 2 + 2 * channels), dtype=np.float32)
+        base *= np.float32(sheets / (2 * np.pi))
+        base += np.float32(2)
+        turn[here] = _with_bits(base, flow.joined[part])
+        rows = np.empty((len(here), 2 + 2 * channels), dtype=np.int16)
+        rows[:, 2::2] = np.rint(noise[part] * in_units[1])
         for sheet in range(half):
             angle = look.guiding_angle + 2 * np.pi * sheet / sheets
             way_x, way_y = _on_screen(flow, part, *_rotated(x, y, angle), look.foreshorten)
-            record[:, 0], record[:, 1] = way_x * in_units[0], way_y * in_units[0]
-            record[:, 2::2] = noise[part] * in_units[1]
-            record[:, 3::2] = (up * way_x[:, None] - right * way_y[:, None]) * in_units[2]
-            whole = np.clip(np.rint(record), -TOP, TOP, out=record).astype(np.int16)
-            put(records[sheet], here, whole)
-            np.negative(whole, out=whole)
-            np.negative(whole[:, 2::2], out=whole[:, 2::2])
-            put(records[sheet + half], here, whole)
+            if look.foreshorten:
+                way_x, way_y = np.clip(way_x, -longest, longest), np.clip(way_y, -longest, longest)
+            rows[:, 3::2] = np.rint(up * way_x[:, None] - right * way_y[:, None])
+            way_x, way_y = way_x * in_units[0], way_y * in_units[0]
+            rows[:, 0], rows[:, 1] = np.rint(way_x, out=way_x), np.rint(way_y, out=way_y)
+            put(records[sheet], here, rows)
+            # Of the opposite direction all but the noise is the opposite.
+            for column in (0, 1, *range(3, rows.shape[1], 2)):
+                np.negative(rows[:, column], out=rows[:, column])
+            put(records[sheet + half], here, rows)
     return Covering(
         sheets=sheets,
         width=width,
         place=place,
         turn=turn,
-        joined=joined,
         records=records.reshape(-1, records.shape[2]),
         units=(look.step * longest / TOP, brightest / TOP, steepest / TOP),
     )
 
 
+def joined(turn: np.ndarray) -> np.ndarray:
+    """(n,) uint32: `Flow.joined` of the cells that have these turns."""
+    return turn.view(np.uint32) & np.uint32(OPEN)
+
+
+def _with_bits(turn: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
+    """Turns that hold what `joined` is to give."""
+    return (turn.view(np.uint32) & ~np.uint32(OPEN) | bits).view(np.float32)
+
+
 def put(table: np.ndarray, row: np.ndarray, rows: np.ndarray) -> None:
     """Write some rows of a table, each as one number."""
-    kind = np.complex64 if rows.shape[1] * rows.itemsize == 8 else np.complex128
-    table.view(kind)[:, 0][row] = rows.view(kind)[:, 0]
+    whole_rows(table)[row] = whole_rows(rows)
+
+
+def whole_rows(table: np.ndarray) -> np.ndarray:
+    """(n, k) numbers seen as (n,), each row of 8 or 16 bytes as one number."""
+    kind = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
+    return table.view(kind)[:, 0]
 
 
 def _window(flow: Flow) -> tuple[np.ndarray, int, int]:
@@ -258,6 +275,7 @@ def _on_screen(
         size += up * up
         np.sqrt(size, out=size)
         size[size == 0] = 1
-        across /= size
-        up /= size
+        np.divide(1, size, out=size)
+        across *= size
+        up *= size
     return across, up

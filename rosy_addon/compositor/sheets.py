@@ -16,7 +16,16 @@ import numpy as np
 
 from ..progress import Progress, Work, part
 from .contrast import even_out
-from .covering import END, OPEN, Covering, line_of_member, put, sheet_count, unfold
+from .covering import (
+    END,
+    OPEN,
+    Covering,
+    line_of_member,
+    put,
+    sheet_count,
+    unfold,
+    whole_rows,
+)
 from .flow import Flow
 from .images import Images, limits
 from .look import Look
@@ -71,11 +80,11 @@ def sheets_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
         averages.start_still(covering.place[still], noise[wide][still])
         walking = _pass_all(covering, averages, look, _on_cells(limit, wide, covering))
         yield from part(walking, core.start / count, core.stop / count)
-        known = averages.take(inside)[line]
+        known = averages.take(inside, line)
         _fade(known, carried, near.pixel[core.start - wide.start :] // flow.width)
         members[:, core] = _evened(known[:, :, :-1], known[:, :, -1], look)
         samples[core] = known[:, :, -1].mean(axis=0)
-        carried = averages.take(beyond)[line]
+        carried = averages.take(beyond, line)
     return Images(members, members.mean(axis=0), samples, np.ones(count, dtype=np.float32))
 
 
@@ -173,11 +182,11 @@ class _Averages:
 
     def __init__(self, covering: Covering, wanted: np.ndarray) -> None:
         shape = (covering.lines, covering.cells, covering.channels + 1)
-        self._values = np.zeros(shape, dtype=np.float32)
-        self._values[:, :, -1] = -1
-        self._values[:, wanted, -1] = 0
+        state = np.full(covering.cells, -1, dtype=np.float32)
+        state[wanted] = 0
+        self._values = np.empty(shape, dtype=np.float32)
+        self._values[:, :, -1] = state
         self._flat = self._values.reshape(-1, shape[-1])
-        self._wanted = wanted
 
     def start_still(self, cell: np.ndarray, noise: np.ndarray) -> None:
         """Pixels without a direction have their own noise and no streamline."""
@@ -205,9 +214,12 @@ class _Averages:
         """Those among some lines that are wanted and not known yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
-    def take(self, cell: np.ndarray) -> np.ndarray:
-        """(M, n, K + 1) sums and samples."""
-        return self._values.take(cell, axis=1)
+    def take(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
+        """(M, n, K + 1) sums and samples of the lines of some cells."""
+        found = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
+        for number, out in zip(line, found, strict=True):
+            whole_rows(self._values[number]).take(cell, out=whole_rows(out), mode="clip")
+        return found
 
 
 def _pass_all(
@@ -215,10 +227,10 @@ def _pass_all(
 ) -> Work[None]:
     """Walk streamlines until every wanted line has an average."""
     served = max(SERVED, look.length)
-    walker = Walker(covering, look, limit, served, TOGETHER)
     missing = averages.missing()
     total = len(missing)
     seeds = _on_lattice(covering, averages, max(int(EVERY * served * look.step), 1))
+    walker = Walker(covering, look, limit, served, TOGETHER)
     for _ in range(MOST_ROUNDS):
         steps = 0
         for some in _batches(seeds):

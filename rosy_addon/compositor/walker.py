@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .covering import END, OPEN, Covering
+from .covering import END, OPEN, Covering, joined
 from .look import Look
 
 #: Steps after which those that have ended are left out, if they are many.
@@ -17,8 +17,6 @@ LATERAL = 0.7
 
 class Walker:
     """Streamlines of one length, and the room for some of them at once.
-
-    The room is large and used again and again: fresh memory is slower than all that is done there.
 
     Parameters
     ----------
@@ -96,7 +94,8 @@ class Walker:
         sheet, cell = np.divmod(seeds, covering.cells)
         cell = np.concatenate([cell, cell])
         sheet = np.concatenate([sheet, sheet + covering.lines]) + turns * covering.sheets
-        angle = covering.turn.take(cell) + sheet.astype(np.float32)
+        turn = covering.turn.take(cell)
+        angle = turn + sheet.astype(np.float32)
         start = _scattered(len(seeds))
         position = np.concatenate([start, start])
         before = None
@@ -124,7 +123,7 @@ class Walker:
             np.maximum(flat_way, np.float32(-1), out=flat_way)
             np.minimum(flat_way, np.float32(1), out=flat_way)
             position -= way
-            alive[self._move(cell, flat_way[::2], flat_way[1::2])] = number
+            alive[self._move(cell, joined(turn), flat_way[::2], flat_way[1::2])] = number
             turn = covering.turn.take(cell, mode="clip")
             angle -= turn
             np.rint(angle, out=angle)
@@ -137,21 +136,22 @@ class Walker:
                     lives[live] = alive
                     if not len(left):
                         return lives, number
-                    live, alive, cell, sheet, angle, position, before = (
+                    live, alive, cell, sheet, turn, angle, position, before = (
                         values[left]
-                        for values in (live, alive, cell, sheet, angle, position, before)
+                        for values in (live, alive, cell, sheet, turn, angle, position, before)
                     )
         if live is not None:
             lives[live] = alive
         return lives, self._reach
 
-    def _move(self, cell: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    def _move(
+        self, cell: np.ndarray, goes_on: np.ndarray, column: np.ndarray, row: np.ndarray
+    ) -> np.ndarray:
         """Change cells by a step of -1 to 1 columns and rows; return which streamlines it ends."""
-        joined = self._covering.joined.take(cell, mode="clip")
-        shut = np.flatnonzero(joined != OPEN)
+        shut = np.flatnonzero(goes_on != OPEN)
         if len(shut):
-            bit = (column[shut] + 3 * row[shut] + 4).astype(np.uint16)
-            shut = shut[joined[shut] >> bit & 1 == 0]
+            bit = (column[shut] + 3 * row[shut] + 4).astype(np.uint32)
+            shut = shut[goes_on[shut] >> bit & 1 == 0]
         ended = shut[cell[shut] != END]
         away = row * np.float32(self._covering.width)
         away += column

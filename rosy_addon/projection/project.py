@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import carry_components, dot_components
 from ..field.representation import power
+from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
 from .camera import Camera, pixel_rays
 from .carried import Carried, carrying
@@ -63,6 +64,7 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
         RoSy surface is in view.
     """
     _check(bodies, camera, display)
+    keep_freed_memory()
     yield Progress(0.0, "finding what is seen")
     seen = _seen(bodies, camera)
     yield Progress(0.3, "finding what is seen")

@@ -13,10 +13,11 @@ from conftest import ROOT
 PACKAGE = ROOT / "rosy_addon"
 
 #: What each room may import besides itself. Modules at the top are rooms of their own.
-BASE = {"errors", "progress", "files", "trigonometry"}
+BASE = {"errors", "progress", "files", "memory", "trigonometry"}
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
+    "memory": set(),
     "trigonometry": set(),
     "files": {"errors"},
     "field": BASE,

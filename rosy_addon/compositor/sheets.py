@@ -32,13 +32,13 @@ from .look import Look
 from .walker import Walker
 
 #: Streamlines walked together, in both directions at once.
-TOGETHER = 4096
+TOGETHER = 5120
 
 #: Steps for which a streamline serves the states it passes, each way, at the usual length.
 SERVED = 96
 
 #: The first streamlines begin on rows and columns of pixels, this share of those steps apart.
-EVERY = 4 / 3
+EVERY = 1.1
 
 #: Those of later rounds begin anywhere, so many for each pixel across that none has passed.
 COVER = 1.75
@@ -270,7 +270,7 @@ def _on_lattice(covering: Covering, averages: _Averages, every: int) -> np.ndarr
     covering : Covering
     averages : _Averages
     every : int
-        Pixels from one row, and column, to the next.
+        Pixels from one row, and column, to the next, about.
 
     Returns
     -------
@@ -278,7 +278,7 @@ def _on_lattice(covering: Covering, averages: _Averages, every: int) -> np.ndarr
         Entries of lines.
     """
     width, height = covering.width, covering.cells // covering.width
-    rows, columns = (np.arange(every // 2, size, every)[:, None] for size in (height, width))
+    rows, columns = (_evenly(size, every)[:, None] for size in (height, width))
     lattice = rows * width + np.arange(width), columns + np.arange(height) * width
     seeds = []
     for line in range(covering.lines):
@@ -288,6 +288,12 @@ def _on_lattice(covering: Covering, averages: _Averages, every: int) -> np.ndarr
             along, across = step[:, axis], step[:, 1 - axis]
             seeds.append(entry[along < across if axis else along <= across])
     return np.concatenate(seeds)
+
+
+def _evenly(size: int, every: int) -> np.ndarray:
+    """Places in a length, the same distance apart and half of it from the ends."""
+    count = max(round(size / every), 1)
+    return ((np.arange(count) + 0.5) * (size / count)).astype(np.intp)
 
 
 def _spread(length: int, count: int) -> np.ndarray:

@@ -59,6 +59,38 @@ def carry_components(
     return [v - share * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
 
 
+def transformed(
+    vectors: Sequence[np.ndarray], matrix: np.ndarray, shift: np.ndarray | None = None
+) -> np.ndarray:
+    """Vectors given by their three components, times a matrix, in the precision of the vectors.
+
+    Parameters
+    ----------
+    vectors : 3 (n,) ndarrays
+    matrix : (m, 3) ndarray
+    shift : (m,) ndarray, optional
+        Added.
+
+    Returns
+    -------
+    (m, n) ndarray
+
+    Notes
+    -----
+    A matrix product would do, but that of a linear algebra library wakes all cores for so little,
+    and they keep each other waiting long after.
+    """
+    kind = vectors[0].dtype
+    result = np.empty((len(matrix), len(vectors[0])), dtype=kind)
+    for number, (row, out) in enumerate(zip(matrix.astype(kind), result, strict=True)):
+        np.multiply(vectors[0], row[0], out=out)
+        out += vectors[1] * row[1]
+        out += vectors[2] * row[2]
+        if shift is not None:
+            out += kind.type(shift[number])
+    return result
+
+
 def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit tangents x, y with x cross y = normal, a smooth choice for z > 0 and for z < 0.
 

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..field.frames import dot_components
+from ..field.frames import dot_components, transformed
 from ..field.representation import power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -66,9 +66,9 @@ class Carried:
         """The same in another space, given the (3, 3) rotation to there."""
         return replace(
             self,
-            normal=np.stack([_transformed(corner, rotation) for corner in self.normal]),
-            axis=_transformed(self.axis, rotation),
-            plane_normal=_transformed(self.plane_normal, rotation),
+            normal=np.stack([transformed(corner, rotation) for corner in self.normal]),
+            axis=transformed(self.axis, rotation),
+            plane_normal=transformed(self.plane_normal, rotation),
         )
 
 
@@ -89,7 +89,7 @@ def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: st
     Carried
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    now = linear @ surface.vertices.T
+    now = transformed(np.ascontiguousarray(surface.vertices.T), linear)
     yield Progress(0.0, "carrying the field")
     faces = _faces(surface, linear, now, field, angles=display == "smooth")
     yield Progress(0.4, "carrying the field")
@@ -106,7 +106,7 @@ def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: st
     )
     custom = None
     if fans is not None and not _is_of_fans(surface):
-        custom = _transformed(surface.corner_normal.T, _cofactors(linear))
+        custom = transformed(surface.corner_normal.T, _cofactors(linear))
     for start in range(0, count, BLOCK):
         part = slice(start, min(start + BLOCK, count))
         _fill_triangles(carried, part, surface, now, faces, fans, custom, field.degree)
@@ -163,7 +163,7 @@ def _faces(
         normal = _normal(points)
         vectors = [np.ascontiguousarray(part) for part in field.vectors[block].T]
         if rest is None:
-            member = _transformed(vectors, linear)
+            member = transformed(vectors, linear)
             across = dot_components(member, normal)
             member = [part - across * n for part, n in zip(member, normal, strict=True)]
             length = np.sqrt(dot_components(member, member))
@@ -307,17 +307,6 @@ def _frame(normal: Vectors) -> tuple[list[np.ndarray], list[np.ndarray]]:
     return x, [b, sign + ny * ny * a, -ny]
 
 
-def _transformed(vectors: Vectors, matrix: np.ndarray) -> np.ndarray:
-    """(3, n): each vector times a matrix, in the precision of the vectors."""
-    matrix = matrix.astype(vectors[0].dtype)
-    result = np.empty((3, len(vectors[0])), dtype=matrix.dtype)
-    for row, out in zip(matrix, result, strict=True):
-        np.multiply(vectors[0], row[0], out=out)
-        out += vectors[1] * row[1]
-        out += vectors[2] * row[2]
-    return result
-
-
 def _cofactors(linear: np.ndarray) -> np.ndarray:
     """det(L) times the inverse transpose: what L does to normals, mirrored or flattened too."""
     a, b, c = linear
@@ -347,7 +336,7 @@ def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _
     Each is carried to the fan's normal by the minimal rotation from its face's. Faces on which the
     field is undefined have no say.
     """
-    normal = np.array(_unit(_transformed(surface.fan_normal.T, _cofactors(linear))))
+    normal = np.array(_unit(transformed(surface.fan_normal.T, _cofactors(linear))))
     normal = normal.astype(np.float32)
     frame_x, frame_y = _frame(normal)
     count, fans = len(surface.corner_vertex), normal.shape[1]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..field.frames import carry_components, dot_components
+from ..field.frames import carry_components, dot_components, transformed
 from ..field.representation import power
 from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
@@ -27,6 +27,9 @@ __all__ = ["links", "project", "projecting", "screen_axes"]
 
 #: Pixels that are worked on at once: bounds memory, and fits the caches.
 BLOCK = 1 << 14
+
+#: Radians by which directions may turn on the way over a triangle without being turned back.
+FLAT = 3e-4
 
 DISPLAYS = ("smooth", "flat")
 
@@ -174,9 +177,7 @@ def _rasterised(bodies: Sequence[Body], camera: Camera) -> tuple[Fragments, np.n
 def _on_clip(body: Body, camera: Camera) -> np.ndarray:
     """(4, V) vertices in clip space."""
     matrix = camera.projection @ camera.view @ np.asarray(body.matrix, dtype=np.float64)
-    clip = matrix[:, :3] @ body.surface.vertices.T
-    clip += matrix[:, 3:]
-    return clip
+    return transformed(np.ascontiguousarray(body.surface.vertices.T), matrix[:, :3], matrix[:, 3])
 
 
 def _raise_nothing_in_view(bodies: Sequence[Body], camera: Camera) -> None:
@@ -288,8 +289,9 @@ def _interpolated_normal(
         out += weights[1] * corners[1][component]
         out += weights[2] * corners[2][component]
     size = np.sqrt(dot_components(normal, normal))
-    size[size < 1e-6] = 0
-    normal *= np.divide(np.float32(1), size, out=np.zeros_like(size), where=size > 0)
+    size[size < 1e-6] = np.inf
+    normal *= 1 / size
+    size[np.isinf(size)] = 0
     return normal, size
 
 
@@ -306,12 +308,15 @@ def _interpolated_values(
         exp(i A / 2) ~ 1 + n_0.n_i + n_i.n + n.n_0 + i n_0 . (n_i x n)
 
     (Van Oosterom and Strackee 1983), in which all products follow from those of the corners, as
-    n is a combination of them.
+    n is a combination of them. The triangle lies in that of the corners, whose area is about half
+    of their triple product.
     """
     b0, b1, b2 = weights
-    d01, d02, d12 = (products.take(shown) for products in values.dots)
     z0, z1, z2 = (corner.take(shown) for corner in values.z)
     volume = values.volume.take(shown)
+    if np.abs(volume).max(initial=0) < 2 * FLAT:
+        return z0 * b0 + z1 * b1 + z2 * b2
+    d01, d02, d12 = (products.take(shown) for products in values.dots)
     n0 = b0 + b1 * d01 + b2 * d02
     half1, half2 = np.empty_like(z0), np.empty_like(z0)
     half1.real = size * (1 + d01) + n0 + (b0 * d01 + b1 + b2 * d12)
@@ -349,5 +354,6 @@ def _turn_into_view(
     turn.real = x - z * toward_eye[0]
     turn.imag = y - z * toward_eye[1]
     size = np.sqrt(turn.real * turn.real + turn.imag * turn.imag)
-    turn *= np.divide(np.float32(1), size, out=np.zeros_like(size), where=size > 0)
+    size[size == 0] = np.inf
+    turn *= 1 / size
     return turn

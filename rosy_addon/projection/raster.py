@@ -17,6 +17,9 @@ import numpy as np
 #: Triangles, spans and fragments that are worked on at once: bounds memory, and fits the caches.
 BLOCK = 1 << 14
 
+#: The bits of a column where one number holds a row and a column.
+COLUMN = 0xFFFF
+
 #: Pixels of the frame whose depth is kept at once.
 BAND = 1 << 24
 
@@ -46,13 +49,20 @@ class Fragments(NamedTuple):
 
 
 class _Screen(NamedTuple):
-    """Vertices on screen: pixels, z / w, and the first pixel centres at or beyond them."""
+    """Vertices on screen: pixels, z / w, and the first pixel centres at or beyond them.
+
+    `centre` is the row of such a centre, times 2^16, plus its column.
+    """
 
     x: np.ndarray
     y: np.ndarray
     depth: np.ndarray
-    column: np.ndarray
-    row: np.ndarray
+    centre: np.ndarray
+
+    def within(self, low: int, high: int) -> _Screen:
+        """With no rows but those from `low` up to before `high`."""
+        row = np.clip(self.centre >> 16, low, high)
+        return self._replace(centre=row << 16 | self.centre & COLUMN)
 
 
 class _Pieces(NamedTuple):
@@ -176,14 +186,14 @@ def _on_screen(vertices: np.ndarray, width: int, height: int) -> _Screen:
     y = (y * inverse + 1.0) * (0.5 * height)
     column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int32)
     row = np.clip(np.ceil(y - 0.5), 0, height).astype(np.int32)
-    return _Screen(x, y, z * inverse, column, row)
+    return _Screen(x, y, z * inverse, row << 16 | column)
 
 
 def _visible_in_rows(
     screen: _Screen, pieces: _Pieces, width: int, low: int, high: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pixels, triangles and depths that are seen in the rows from `low` up to before `high`."""
-    screen = screen._replace(row=np.clip(screen.row, low, high))
+    screen = screen.within(low, high)
     nearest = np.full((high - low) * width, np.nextafter(1.0, 2.0))  # just beyond the far plane
     owner = np.full((high - low) * width, -1, dtype=np.int32)
     for start in range(0, len(pieces.triangle), BLOCK):
@@ -202,16 +212,15 @@ def _spans(
 ) -> Iterator[_Spans]:
     """The spans of a block of triangles, in the order of the triangles."""
     a, b, c = corners
-    for centres in (screen.row, screen.column):
-        # Corners with the same first pixel centre have none between them.
-        at = centres.take(b)
-        between = centres.take(a) != at
-        between |= centres.take(c) != at
-        holds = np.flatnonzero(between)
-        if len(holds) < len(a):
-            a, b, c, triangle = (values.take(holds) for values in (a, b, c, triangle))
+    # Corners with the same first row or column of pixel centres have no centre between them.
+    at = screen.centre.take(a)
+    apart = at ^ screen.centre.take(b)
+    apart |= at ^ screen.centre.take(c)
+    holds = np.flatnonzero((apart > COLUMN) & (apart & COLUMN != 0))
+    if len(holds) < len(a):
+        a, b, c, triangle = (values.take(holds) for values in (a, b, c, triangle))
     a, b, c = _by_height(screen.y, a, b, c)
-    bottom, middle, top = (screen.row.take(corner) for corner in (a, b, c))
+    bottom, middle, top = (screen.centre.take(corner) >> 16 for corner in (a, b, c))
     low, mid, high = (_corner(screen, corner) for corner in (a, b, c))
     gradient = _depth_gradient(low, mid, high)
     long_edge, lower_edge, upper_edge = _edge(low, high), _edge(low, mid), _edge(mid, high)

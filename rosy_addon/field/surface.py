@@ -11,6 +11,9 @@ from ..errors import RosyError
 from .frames import dot, unit
 from .triangulate import triangulate
 
+#: Corner normals that differ by no more from that of their fan are the fan's.
+SAME_NORMAL = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -73,6 +76,12 @@ class Surface:
     def fan_normal(self) -> np.ndarray:
         """(K, 3) float64: the mean direction of the corner normals of each fan, unit."""
         return unit(mix_over_fans(self.corner_normal, self.corner_fan))
+
+    @cached_property
+    def fans_share_normals(self) -> bool:
+        """Whether no corner normal differs from that of its fan, as custom ones may."""
+        shared = self.fan_normal.take(self.corner_fan, axis=0)
+        return bool(np.abs(self.corner_normal - shared).max() <= SAME_NORMAL)
 
     @cached_property
     def face_normal(self) -> np.ndarray:

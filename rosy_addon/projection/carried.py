@@ -26,9 +26,6 @@ from ..trigonometry import angle_of
 #: Faces, corners and triangles that are worked on at once: bounds memory, and fits the caches.
 BLOCK = 1 << 14
 
-#: Corner normals that differ by no more from that of their fan are the fan's.
-SAME_NORMAL = 1e-6
-
 #: A matrix that turns and scales is one within the rounding of Blender's single precision.
 SIMILAR = 2e-6
 
@@ -105,7 +102,7 @@ def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: st
         plane_normal=np.empty((3, count), dtype=np.float32),
     )
     custom = None
-    if fans is not None and not _is_of_fans(surface):
+    if fans is not None and not surface.fans_share_normals:
         custom = transformed(surface.corner_normal.T, _cofactors(linear))
     for start in range(0, count, BLOCK):
         part = slice(start, min(start + BLOCK, count))
@@ -118,23 +115,20 @@ def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: st
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Faces as they are now, and a member of each.
+    """Faces as they are now, and their values.
 
     Attributes
     ----------
     normal : (3, F) float32 ndarray
         Unit; zero for a face without area.
-    member : (3, F) float32 ndarray
-        Unit tangents; arbitrary where `magnitude` is 0.
-    magnitude : (F,) float32 ndarray
-        rho; 0 where the field is undefined.
+    z : (F,) complex64 ndarray
+        In the `_frame` of that normal.
     angle : (C,) float32 ndarray or None
         Of each face at each of its corners.
     """
 
     normal: np.ndarray
-    member: np.ndarray
-    magnitude: np.ndarray
+    z: np.ndarray
     angle: np.ndarray | None
 
 
@@ -148,8 +142,7 @@ def _faces(
     count = surface.face_count
     found = _Faces(
         normal=np.empty((3, count), dtype=np.float32),
-        member=np.empty((3, count), dtype=np.float32),
-        magnitude=np.empty(count, dtype=np.float32),
+        z=np.empty(count, dtype=np.complex64),
         angle=np.empty(len(surface.corner_vertex), dtype=np.float32) if angles else None,
     )
     scale = _similarity(linear) if surface.rest is None else None
@@ -161,22 +154,18 @@ def _faces(
         corner_vertex = [surface.corner_vertex.take(first + corner) for corner in range(size)]
         points = _from_first(now, corner_vertex)
         normal = _normal(points)
+        for part, out in zip(normal, found.normal, strict=True):
+            out[block] = part
+        x, y = _frame([part[block].astype(np.float64) for part in found.normal])
         vectors = [np.ascontiguousarray(part) for part in field.vectors[block].T]
         if rest is None:
-            member = transformed(vectors, linear)
-            across = dot_components(member, normal)
-            member = [part - across * n for part, n in zip(member, normal, strict=True)]
-            length = np.sqrt(dot_components(member, member))
-            magnitude = length * (1 / scale)
+            vectors = transformed(vectors, linear * (1 / scale))
+            member = dot_components(vectors, x) + 1j * dot_components(vectors, y)
         else:
-            member, magnitude = _carried_member(_from_first(rest, corner_vertex), points, vectors)
-            length = np.sqrt(dot_components(member, member))
-        length[length == 0] = np.inf
-        magnitude[np.isinf(length) | ~np.logical_or.reduce(normal)] = 0
-        for axis in range(3):
-            found.normal[axis, block] = normal[axis]
-            found.member[axis, block] = member[axis] / length
-        found.magnitude[block] = magnitude
+            member = _carried_member(_from_first(rest, corner_vertex), points, vectors, x, y)
+        size = np.abs(member)
+        member /= np.maximum(size, np.finfo(np.float64).tiny)
+        found.z[block] = power(member, field.degree) * (size * np.logical_or.reduce(normal))
         if angles:
             for corner, angle in enumerate(_angles(points)):
                 found.angle[first + corner] = angle
@@ -244,19 +233,23 @@ def _angles(points: Sequence[Vectors]) -> list[np.ndarray]:
     edges = [points[0]]
     edges += [_less(after, before) for before, after in pairwise(points)]
     edges.append([-part for part in points[-1]])
-    triangle = len(points) == 2
-    area = _cross(edges[0], edges[1]) if triangle else None
-    angles = []
-    for ahead, behind in zip(edges, edges[-1:] + edges[:-1], strict=True):
-        across = area if triangle else _cross(behind, ahead)
-        size = np.sqrt(dot_components(across, across))
-        along = dot_components(ahead, behind)
-        longer = np.maximum(size, np.abs(along))
-        longer[longer == 0] = 1
-        size /= longer
-        along /= -longer
-        angles.append(angle_of(along.astype(np.float32), size.astype(np.float32)))
-    return angles
+    corners = list(zip(edges, edges[-1:] + edges[:-1], strict=True))
+    if len(corners) > 3:
+        return [_angle(ahead, behind, _cross(behind, ahead)) for ahead, behind in corners]
+    area = _cross(edges[0], edges[1])
+    one, other = (_angle(ahead, behind, area) for ahead, behind in corners[:2])
+    return [one, other, np.maximum(np.float32(np.pi) - one - other, 0)]
+
+
+def _angle(ahead: Vectors, behind: Vectors, across: Vectors) -> np.ndarray:
+    """Between one edge and that before it, which runs the other way, given their cross product."""
+    size = np.sqrt(dot_components(across, across))
+    along = dot_components(ahead, behind)
+    longer = np.maximum(size, np.abs(along))
+    longer[longer == 0] = 1
+    size /= longer
+    along /= -longer
+    return angle_of(along.astype(np.float32), size.astype(np.float32))
 
 
 def _less(a: Vectors, b: Vectors) -> list[np.ndarray]:
@@ -264,9 +257,9 @@ def _less(a: Vectors, b: Vectors) -> list[np.ndarray]:
 
 
 def _carried_member(
-    rest: Sequence[Vectors], now: Sequence[Vectors], vectors: Vectors
-) -> tuple[list[np.ndarray], np.ndarray]:
-    """Members of faces that are deformed, as they are now, and their lengths.
+    rest: Sequence[Vectors], now: Sequence[Vectors], vectors: Vectors, x: Vectors, y: Vectors
+) -> np.ndarray:
+    """Members of faces that are deformed, as they are now, in the frames x, y.
 
     In frames of both planes the corners are complex numbers w and u. The linear map that takes w
     to u best, u = a w + b conj(w), has the rotation a / |a| as its polar part, and that part alone
@@ -275,7 +268,6 @@ def _carried_member(
     """
     rest_normal = _normal(rest)
     rest_x, rest_y = _frame(rest_normal)
-    x, y = _frame(_normal(now))
     w, u = _flat(rest, rest_x, rest_y), _flat(now, x, y)
     ww = uw = square = 0
     for one, other in zip(w, u, strict=True):
@@ -283,11 +275,9 @@ def _carried_member(
         square = square + (one.real**2 + one.imag**2)
     turned = square * sum(other * one.conj() for one, other in zip(w, u, strict=True))
     turned -= np.conj(ww) * uw
-    member = dot_components(vectors, rest_x) + 1j * dot_components(vectors, rest_y)
-    magnitude = np.abs(member)
-    member *= turned * np.logical_or.reduce(rest_normal)
-    member /= np.maximum(np.abs(member), np.finfo(np.float64).tiny)
-    return [member.real * a + member.imag * b for a, b in zip(x, y, strict=True)], magnitude
+    turned *= np.logical_or.reduce(rest_normal)
+    turned /= np.maximum(np.abs(turned), np.finfo(np.float64).tiny)
+    return turned * (dot_components(vectors, rest_x) + 1j * dot_components(vectors, rest_y))
 
 
 def _flat(points: Sequence[Vectors], x: Vectors, y: Vectors) -> list[np.ndarray]:
@@ -324,12 +314,6 @@ class _Fans:
     z: np.ndarray
 
 
-def _is_of_fans(surface: Surface) -> bool:
-    """Whether all corners of a fan share its normal."""
-    shared = surface.fan_normal.take(surface.corner_fan, axis=0)
-    return bool(np.abs(surface.corner_normal - shared).max() <= SAME_NORMAL)
-
-
 def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _Fans:
     """Average the faces' values at their corners, weighted by the angle there.
 
@@ -345,18 +329,16 @@ def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _
         part = slice(start, min(start + BLOCK, count))
         face, fan = surface.corner_face[part], surface.corner_fan[part].astype(np.intp)
         turn = _carried_turn(
-            [member.take(face) for member in faces.member],
             [own.take(face) for own in faces.normal],
             [there.take(fan) for there in normal],
             [x.take(fan) for x in frame_x],
             [y.take(fan) for y in frame_y],
         )
-        magnitude, angle = faces.magnitude.take(face), faces.angle[part]
-        z = power(turn, degree)
-        magnitude *= angle
-        z *= magnitude
+        z, angle = faces.z.take(face), faces.angle[part]
+        np.multiply(angle, z != 0, out=weight[part])
+        z *= power(turn, degree)
+        z *= angle
         real[part], imaginary[part] = z.real, z.imag
-        np.multiply(angle, magnitude > 0, out=weight[part])
     total = np.bincount(surface.corner_fan, weight, fans)
     total[total == 0] = np.inf
     z = np.empty(fans, dtype=np.complex64)
@@ -365,13 +347,12 @@ def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _
     return _Fans(normal, z)
 
 
-def _carried_turn(
-    vectors: Vectors, source: Vectors, target: Vectors, x: Vectors, y: Vectors
-) -> np.ndarray:
-    """(n,) complex64 directions, in a frame at `target`, of tangents at `source` carried to there.
+def _carried_turn(source: Vectors, target: Vectors, x: Vectors, y: Vectors) -> np.ndarray:
+    """(n,) complex64: the x axes of normals' `_frame` carried to others, in frames x, y of these.
 
     As `frames.carry`: v - (v.t) / (1 + s.t) (s + t), of which t has no part in the frame.
     """
+    vectors, _ = _frame(source)
     share = dot_components(vectors, target)
     share /= np.maximum(1 + dot_components(source, target), np.finfo(share.dtype).eps)
     turn = np.empty(len(share), dtype=np.complex64)
@@ -399,22 +380,22 @@ def _fill_triangles(
     """Write what some triangles have at their corners; without fans, what their faces have."""
     corners = surface.triangles[part].T.astype(np.intp)
     face = surface.triangle_face[part]
-    vertices = [surface.corner_vertex.take(corner) for corner in corners]
-    plane_normal = np.array(_normal(_from_first(now, vertices)), dtype=np.float32)
+    plane_normal = faces.normal.take(face, axis=1)
+    if len(surface.triangles) > surface.face_count:
+        vertices = [surface.corner_vertex.take(corner) for corner in corners]
+        plane_normal[:] = _normal(_from_first(now, vertices))
     if fans is None:
         normals = [[own.take(face) for own in faces.normal]] * 3
-        member = [member.take(face) for member in faces.member]
-        values = [_face_values(faces, face, member, normals[0], degree)] * 3
+        values = [faces.z.take(face)] * 3
     else:
         normals, values = _fan_values(surface, corners, fans, custom, degree)
     normals = [_completed(normal, plane_normal) for normal in normals]
     x, y = _frame(normals[0])
     # Values on faces where the field is undefined are so at all corners.
-    defined = faces.magnitude.take(face) > 0
+    defined = faces.z.take(face) != 0
     for corner, (normal, z) in enumerate(zip(normals, values, strict=True)):
         if corner and fans is not None:
-            there, _ = _frame(normal)
-            z = z * power(_carried_turn(there, normal, normals[0], x, y), degree)
+            z = z * power(_carried_turn(normal, normals[0], x, y), degree)
         carried.normal[corner, :, part] = normal
         np.multiply(z, defined, out=carried.z[corner, part])
     carried.axis[:, part] = x
@@ -436,16 +417,6 @@ def _completed(normal: list[np.ndarray], plane_normal: np.ndarray) -> list[np.nd
     return normal
 
 
-def _face_values(
-    faces: _Faces, face: np.ndarray, member: Vectors, normal: Vectors, degree: int
-) -> np.ndarray:
-    """(n,) complex64 z of faces in the `_frame` of their normals."""
-    turn = np.empty(len(face), dtype=np.complex64)
-    x, y = _frame(normal)
-    turn.real, turn.imag = dot_components(member, x), dot_components(member, y)
-    return power(turn, degree) * faces.magnitude.take(face)
-
-
 def _fan_values(
     surface: Surface,
     corners: np.ndarray,
@@ -462,8 +433,7 @@ def _fan_values(
             own = [
                 part.astype(np.float32) for part in _unit([part.take(corner) for part in custom])
             ]
-            there, _ = _frame(normal)
-            z *= power(_carried_turn(there, normal, own, *_frame(own)), degree)
+            z *= power(_carried_turn(normal, own, *_frame(own)), degree)
             normal = own
         normals.append(normal)
         values.append(z)

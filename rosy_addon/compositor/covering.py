@@ -152,7 +152,7 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
     half = sheets // 2
     place, width, cells = _window(flow)
     # Streamlines that have ended stay in `END`.
-    turn = np.full(cells, _with_bits(np.float32(2), 1 << 4))
+    turn = _with_bits(np.full(cells, 2, dtype=np.float32), 1 << 4)
     spread = np.zeros((cells, channels), dtype=np.float32)
     spread[place] = noise
     # A direction that is kept foreshortened may be longer than 1 under a wide lens.

@@ -22,9 +22,10 @@ def unregister() -> None:
     import bpy
 
     from . import operators
-    from .rosy_addon import ui
+    from .rosy_addon import reuse, ui
 
     bpy.utils.unregister_cli_command(_cli)
     _cli = None
     operators.unregister()
     ui.unregister()
+    reuse.KEPT.clear()

@@ -11,7 +11,9 @@ from .compositor.compose import composing
 from .compositor.look import Look
 from .progress import Progress, Work, drain, part
 from .projection.camera import Camera, check_size
+from .projection.gbuffer import Body, GBuffer
 from .projection.project import projecting
+from .reuse import KEPT
 from .scene.apply import Baked, Settings, Shot, apply_picture, check_appliable, settings_of
 from .scene.bodies import read_scene
 from .scene.cameras import camera_of_object, picture_size, render_camera
@@ -78,7 +80,7 @@ def baking(
     depsgraph = _depsgraph(scene) if depsgraph is None else depsgraph
     views = [_camera(scene, depsgraph, source, size) for source in sources]
     fine = [_scaled(view, look.supersampling) for view in views]
-    reading = read_scene(depsgraph, objects, _undefined(scene))
+    reading = read_scene(depsgraph, objects, _undefined(scene), KEPT)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
     shots = []
@@ -86,10 +88,11 @@ def baking(
         start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
         middle = start + 0.4 * (stop - start)
         gbuffer = yield from part(
-            projecting(reading.bodies, fine[number], look.display), start, middle
+            _projecting(reading.bodies, fine[number], look.display), start, middle
         )
         picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
         shots.append(Shot(picture, views[number], _camera_object(scene, source)))
+    KEPT.trim()
     yield Progress(0.97, "putting the picture on")
     return [apply_picture(scene, reading, shot, settings) for shot in shots]
 
@@ -116,6 +119,17 @@ def bake(
             settings=settings,
         )
     )
+
+
+def _projecting(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
+    """`projecting`, or what an earlier bake has found if nothing has moved since."""
+    view = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
+    key = "gbuffer", tuple(map(id, bodies)), view, camera.name, display
+    found = KEPT.find(key)
+    if found is None:
+        # With the bodies, so that these numbers stay theirs.
+        found = KEPT.put(key, (bodies, (yield from projecting(bodies, camera, display))))
+    return found[1]
 
 
 def _camera_object(scene: bpy.types.Scene, source: Source) -> bpy.types.Object | None:

@@ -29,6 +29,9 @@ METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
     "sheets": sheets_images,
 }
 
+#: Settings of a look that LIC images do not depend on.
+AFTERWARDS = ("gain", "shading", "light", "colour_map")
+
 
 def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
     """Draw the fields of a G-buffer.
@@ -52,9 +55,10 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     layers = []
     degrees = np.unique(degree_of).tolist()
     for count, degree in enumerate(degrees):
-        flow = surface_flow(gbuffer, degree, look.crease_angle, look.cross_creases)
+        flow = _flow(gbuffer, degree, look)
         start, stop = count / len(degrees), (count + 1) / len(degrees)
-        layer = yield from part(_layers(flow, finer), start, stop)
+        images = yield from part(_images_of(gbuffer, flow, finer), start, stop)
+        layer = _layers(flow, finer, images)
         colour[degree_of == degree] = _ink(flow, layer.tone, look)
         layers.append(layer)
     colour *= diffuse(gbuffer, look, lights)
@@ -96,7 +100,8 @@ def compose_planar(
     flow = planar_flow(angles, degree, magnitude)
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(flow.pixel), -1)
-    layers = drain(_layers(flow, replace(look, supersampling=1), noise))
+    look = replace(look, supersampling=1)
+    layers = _layers(flow, look, drain(_images(flow, look, noise)))
     colour = _ink(flow, layers.tone, look)
     return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
 
@@ -112,8 +117,28 @@ def _scaled(look: Look) -> Look:
     )
 
 
-def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Layers]:
-    """LIC images of the members, blended, with the contrast of one of them times the gain."""
+def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
+    """`surface_flow`, or that made for the last look if it would be the same."""
+    key = look.crease_angle, look.cross_creases
+    made = gbuffer.made.get(("flow", degree))
+    if made is None or made[0] != key:
+        made = key, surface_flow(gbuffer, degree, look.crease_angle, look.cross_creases)
+        gbuffer.made["flow", degree] = made
+    return made[1]
+
+
+def _images_of(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Images]:
+    """`_images`, or those made for the last look if they would be the same."""
+    key = replace(look, **{name: getattr(Look, name) for name in AFTERWARDS})
+    made = gbuffer.made.get(("images", flow.degree))
+    if made is None or made[0] != key:
+        made = key, (yield from _images(flow, look))
+        gbuffer.made["images", flow.degree] = made
+    return made[1]
+
+
+def _images(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Images]:
+    """LIC images of the members, by the look's method."""
     keep_freed_memory()
     if noise is None:
         channels = 3 if look.noise == "colour" else 1
@@ -126,7 +151,11 @@ def _layers(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Lay
             density=look.density,
             high_pass=look.high_pass,
         )
-    images = yield from METHODS[look.method](flow, look, noise)
+    return (yield from METHODS[look.method](flow, look, noise))
+
+
+def _layers(flow: Flow, look: Look, images: Images) -> Layers:
+    """Images blended, with the contrast of one of them times the gain."""
     gain = look.gain * blend_gain(flow.degree, images.samples, look)
     if look.supersampling > 1:
         gain *= np.float32(averaging_gain(look))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +74,8 @@ class GBuffer:
     front : (P,) bool ndarray
         Whether the side of the triangle is seen on which its corners run counter-clockwise. True
         throughout if not given.
+    made : dict
+        What has been made of it for a look, for the next one.
     """
 
     camera: Camera
@@ -89,6 +92,7 @@ class GBuffer:
     representation: np.ndarray
     plane_normal: np.ndarray | None = None
     front: np.ndarray | None = None
+    made: dict[Any, Any] = dataclass_field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.plane_normal is None:

@@ -13,6 +13,7 @@ from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import Body
+from ..reuse import Kept, digest
 from .attributes import (
     FACE_NORMAL,
     attribute_name,
@@ -89,6 +90,7 @@ def read_scene(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object] | None = None,
     undefined: str = "error",
+    kept: Kept | None = None,
 ) -> Reading:
     """All that a camera could see, as arrays.
 
@@ -106,6 +108,8 @@ def read_scene(
         if not given.
     undefined : {"error", "zero"}
         What to do about vectors that are not finite.
+    kept : Kept, optional
+        Where bodies that have not changed since an earlier reading are found.
 
     Raises
     ------
@@ -119,7 +123,7 @@ def read_scene(
         raise RosyError("no visible object has a RoSy field: make or import one first")
     shown = set(_shown_objects(view_layer))
     with _prepared(depsgraph, objects, undefined) as names:
-        reader = _Reader(names, undefined)
+        reader = _Reader(names, undefined, Kept() if kept is None else kept)
         for instance in depsgraph.object_instances:
             if _is_seen(instance, shown):
                 reader.add(instance)
@@ -132,9 +136,12 @@ def read_scene(
 class _Reader:
     """Collects bodies; one surface and one field an evaluated mesh, however many instances."""
 
-    def __init__(self, names: dict[bpy.types.Object, tuple[str, int]], undefined: str) -> None:
+    def __init__(
+        self, names: dict[bpy.types.Object, tuple[str, int]], undefined: str, kept: Kept
+    ) -> None:
         self.names = names
         self.undefined = undefined
+        self.kept = kept
         self.drawn: list[tuple[Body, bpy.types.Object]] = []
         self.hiding: list[Body] = []
         self.read: dict[tuple, tuple[Surface, RosyField | None] | None] = {}
@@ -149,7 +156,9 @@ class _Reader:
         if self.read[key] is None:
             return
         surface, field = self.read[key]
-        body = Body(surface, np.array(instance.matrix_world, dtype=np.float64), field)
+        matrix = np.array(instance.matrix_world, dtype=np.float64)
+        place = "body", id(surface), id(field), matrix.tobytes()
+        body = self.kept.find_or_make(place, lambda: Body(surface, matrix, field))
         if field is None:
             self.hiding.append(body)
         else:
@@ -163,12 +172,14 @@ class _Reader:
             if mesh is None or not len(mesh.polygons):
                 return None
             if name_and_degree is None or name_and_degree[0] not in mesh.attributes:
-                return mesh_surface(mesh, thing.name, plain=True), None
+                return mesh_surface(mesh, thing.name, plain=True, kept=self.kept), None
             name, degree = name_and_degree
             owner = f"object '{thing.name}'"
-            surface = mesh_surface(mesh, owner, rest=True)
+            surface = mesh_surface(mesh, owner, rest=True, kept=self.kept)
             field = read_carried_field(mesh, name, degree, surface, self.undefined, owner)
-            return surface, field
+            return surface, self.kept.find_or_make(
+                ("field", field.degree, digest(field.vectors)), lambda: field
+            )
         finally:
             thing.to_mesh_clear()
 

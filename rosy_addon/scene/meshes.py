@@ -7,13 +7,19 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.surface import Surface, build_surface
+from ..reuse import Kept, digest
 
 #: Attribute that Blender writes for objects with `add_rest_position_attribute`.
 REST = "rest_position"
 
 
 def mesh_surface(
-    mesh: bpy.types.Mesh, name: str | None = None, *, rest: bool = False, plain: bool = False
+    mesh: bpy.types.Mesh,
+    name: str | None = None,
+    *,
+    rest: bool = False,
+    plain: bool = False,
+    kept: Kept | None = None,
 ) -> Surface:
     """The surface of a mesh.
 
@@ -27,6 +33,8 @@ def mesh_surface(
         Whether to read the undeformed positions from the attribute `REST`, where it is.
     plain : bool
         Whether no normals will be mixed on it: cheaper, for what only hides others.
+    kept : Kept, optional
+        Where the surface of a mesh that has not changed is found.
 
     Raises
     ------
@@ -46,18 +54,24 @@ def mesh_surface(
     face_start[-1] = corners
     triangles = len(mesh.loop_triangles)
     flat = np.ones(faces, dtype=bool) if plain else read_values(mesh, "sharp_face", bool, 1)
-    return build_surface(
-        _get(mesh.vertices, "co", np.float32, 3),
-        _get(mesh.loops, "vertex_index", np.int32),
-        face_start,
-        name=name,
-        sharp_edges=None if plain else _sharp_edges(mesh),
-        flat_faces=flat,
-        corner_normal=_get(mesh.corner_normals, "vector", np.float32, 3),
-        triangles=_get(mesh.loop_triangles, "loops", np.int32, 3) if triangles else None,
-        triangle_face=_get(mesh.loop_triangle_polygons, "value", np.int32) if triangles else None,
-        rest=read_values(mesh, REST, np.float32, 3) if rest else None,
-    )
+    parts = {
+        "vertices": _get(mesh.vertices, "co", np.float32, 3),
+        "corner_vertex": _get(mesh.loops, "vertex_index", np.int32),
+        "face_start": face_start,
+        "name": name,
+        "sharp_edges": None if plain else _sharp_edges(mesh),
+        "flat_faces": flat,
+        "corner_normal": _get(mesh.corner_normals, "vector", np.float32, 3),
+        "triangles": _get(mesh.loop_triangles, "loops", np.int32, 3) if triangles else None,
+        "triangle_face": (
+            _get(mesh.loop_triangle_polygons, "value", np.int32) if triangles else None
+        ),
+        "rest": read_values(mesh, REST, np.float32, 3) if rest else None,
+    }
+    if kept is None:
+        return build_surface(**parts)
+    key = "surface", digest(*parts.values())
+    return kept.find_or_make(key, lambda: build_surface(**parts))
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:

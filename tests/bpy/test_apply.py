@@ -9,6 +9,7 @@ from rosy.rosy_addon.bake import bake, baking
 from rosy.rosy_addon.compositor.colour import to_display
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.reuse import KEPT
 from rosy.rosy_addon.scene import apply as apply_room
 from rosy.rosy_addon.scene.apply import bakes, remove, use_bake
 from rosy.rosy_addon.scene.cameras import scene_cameras
@@ -132,12 +133,14 @@ def test_cancelled_at_any_step_nothing_is_left(scene, camera, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
     steps = 0
+    KEPT.clear()
     work = baking(scene)
     for _ in work:
         steps += 1
     remove(scene)
     assert steps > 3
     for stop in range(steps):
+        KEPT.clear()
         work = baking(scene)
         for _ in range(stop + 1):
             next(work)

@@ -64,6 +64,28 @@ def cosine_sine(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return _polynomial(_COS, square), sine
 
 
+def phase_of(angle: np.ndarray) -> np.ndarray:
+    """exp(i angle).
+
+    Parameters
+    ----------
+    angle : float64 ndarray
+        Radians; a million turns leave single precision what it is.
+
+    Returns
+    -------
+    complex64 ndarray
+        Within 4e-7.
+    """
+    half_turns = angle * (1 / np.pi)
+    whole = np.rint(half_turns)
+    half_turns -= whole
+    phase = np.empty(angle.shape, dtype=np.complex64)
+    phase.real, phase.imag = cosine_sine((half_turns * np.pi).astype(np.float32))
+    np.negative(phase, out=phase, where=whole.astype(np.int64) & 1 == 1)
+    return phase
+
+
 def _polynomial(coefficients: tuple[float, ...], x: np.ndarray) -> np.ndarray:
     """Horner's scheme, highest power first."""
     total = np.full_like(x, coefficients[0])

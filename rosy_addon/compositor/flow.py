@@ -10,6 +10,7 @@ import numpy as np
 from ..field.rosy_field import check_degree
 from ..projection.gbuffer import GBuffer
 from ..projection.steps import links, screen_axes
+from ..trigonometry import phase_of
 
 #: Offsets of the 3 x 3 neighbours, in the order of the bits of `links`.
 OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -168,11 +169,11 @@ def planar_flow(
     degree = check_degree(degree)
     angles = np.asarray(angles, dtype=np.float64)
     height, width = angles.shape
-    rho = np.broadcast_to(1.0 if magnitude is None else magnitude, angles.shape)
+    rho = np.broadcast_to(np.float32(1) if magnitude is None else magnitude, angles.shape)
     defined = np.isfinite(angles) & (rho > 0)
-    z = np.where(defined, rho * np.exp(1j * degree * np.where(defined, angles, 0.0)), 0.0)
+    z = phase_of(np.where(defined, degree * angles, 0.0).ravel())
+    z *= np.where(defined, rho, 0).astype(np.float32).ravel()
     pixel = np.arange(height * width, dtype=np.int32)
-    z = z.ravel().astype(np.complex64)
     everywhere = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
     return Flow(
         degree=degree,
@@ -198,14 +199,14 @@ def _closed(
         Of the frame; nothing is defined beyond it.
     defined : (P,) bool ndarray
     """
-    inside = np.zeros((height + 2) * (width + 2), dtype=bool)
-    bordered = (pixel // width + 1) * (width + 2) + pixel % width + 1
-    inside[bordered] = defined
-    joined = joined * defined
+    frame = np.zeros(height * width, dtype=np.uint16)
+    frame[pixel] = defined
+    inside = np.pad(frame.reshape(height, width), 1)
+    open_bits = np.zeros((height, width), dtype=np.uint16)
     for bit, (dx, dy) in enumerate(OFFSETS):
-        closed = ~inside[bordered + (dy * (width + 2) + dx)]
-        joined &= ~(closed.astype(np.uint16) << np.uint16(bit))
-    return joined
+        there = inside[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+        open_bits |= there << np.uint16(bit)
+    return joined & open_bits.ravel()[pixel] * defined
 
 
 def blend_weights(flow: Flow, guiding_angle: float) -> np.ndarray:

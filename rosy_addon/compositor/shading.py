@@ -66,7 +66,7 @@ def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
     """(P,) what one light gives, without its colour."""
     vector = np.asarray(light.vector, dtype=np.float32)
     if light.kind == "sun":
-        return light.strength * np.maximum(gbuffer.normal @ vector, 0)
+        return light.strength * np.maximum(dot(gbuffer.normal, vector), 0)
     way = vector - gbuffer.position
     squared = np.maximum(dot(way, way), 1e-12)
     return light.strength * np.maximum(dot(gbuffer.normal, unit(way)), 0) / squared

@@ -17,6 +17,7 @@ import numpy as np
 from ..progress import Progress, Work, part
 from .contrast import even_out
 from .covering import (
+    BLOCK,
     END,
     OPEN,
     Covering,
@@ -34,7 +35,11 @@ from .walker import Walker
 #: Streamlines walked together, in both directions at once.
 TOGETHER = 5120
 
-#: Steps for which a streamline serves the states it passes, each way, at the usual length.
+#: Steps of all of these, each way: fewer streamlines walk together if they are very long.
+ROOM = 1 << 21
+
+#: Steps for which a streamline serves the states it passes, each way; half the length if that is
+#: more, so that long ones do not mostly gather for the few states near their seeds.
 SERVED = 96
 
 #: The first streamlines begin on rows and columns of pixels, this share of those steps apart.
@@ -82,7 +87,7 @@ def sheets_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
         yield from part(walking, core.start / count, core.stop / count)
         known = averages.take(inside, line)
         _fade(known, carried, near.pixel[core.start - wide.start :] // flow.width)
-        members[:, core] = _evened(known[:, :, :-1], known[:, :, -1], look)
+        _average(known, look, members[:, core])
         samples[core] = known[:, :, -1].mean(axis=0)
         carried = averages.take(beyond, line)
     return Images(members, members.mean(axis=0), samples, np.ones(count, dtype=np.float32))
@@ -117,12 +122,16 @@ def _fade(known: np.ndarray, carried: np.ndarray | None, row: np.ndarray) -> Non
     known[:, :count] += share[:, None].astype(np.float32) * (carried - known[:, :count])
 
 
-def _evened(sums: np.ndarray, samples: np.ndarray, look: Look) -> np.ndarray:
-    """(M, n, K) averages of (M, n, K) sums of (M, n) samples, of even spread."""
-    averages = sums / samples[:, :, None]
-    short = samples < 2 * look.length + 1
-    averages[short] = even_out(averages[short], samples[short], look)
-    return averages
+def _average(known: np.ndarray, look: Look, members: np.ndarray) -> None:
+    """Write (M, n, K) averages, of even spread, of (M, n, K + 1) sums and samples."""
+    whole = 2 * look.length + 1
+    for line, member in zip(known, members, strict=True):
+        for start in range(0, len(line), BLOCK):
+            sums, samples = line[start : start + BLOCK, :-1], line[start : start + BLOCK, -1].copy()
+            mean = member[start : start + BLOCK]
+            np.divide(sums, samples[:, None], out=mean)
+            if samples.min() < whole:
+                mean[...] = even_out(mean, samples, look)
 
 
 def _strips(flow: Flow, look: Look) -> Iterator[tuple[slice, slice, int]]:
@@ -226,14 +235,15 @@ def _pass_all(
     covering: Covering, averages: _Averages, look: Look, limit: np.ndarray | None
 ) -> Work[None]:
     """Walk streamlines until every wanted line has an average."""
-    served = max(SERVED, look.length)
+    served = max(SERVED, look.length // 2)
     missing = averages.missing()
     total = len(missing)
     seeds = _on_lattice(covering, averages, max(int(EVERY * served * look.step), 1))
-    walker = Walker(covering, look, limit, served, TOGETHER)
+    most = _together(served + look.length)
+    walker = Walker(covering, look, limit, served, most)
     for _ in range(MOST_ROUNDS):
         steps = 0
-        for some in _batches(seeds):
+        for some in _batches(seeds, most):
             line, values, taken = walker.walk(some)
             averages.put(line, values)
             steps += taken
@@ -247,16 +257,21 @@ def _pass_all(
     for along, left in BESIDE:
         missing = averages.copy(missing, covering.beside(missing, along, left))
     # What has no neighbour walks alone, no farther than it must.
-    walker = Walker(covering, look, limit, 0, min(TOGETHER, len(missing)))
-    for some in _batches(missing):
+    most = min(_together(look.length), len(missing))
+    walker = Walker(covering, look, limit, 0, most)
+    for some in _batches(missing, most):
         averages.put(*walker.walk(some)[:2])
         yield Progress(0.95, "Following streamlines")
 
 
-def _batches(seeds: np.ndarray) -> list[np.ndarray]:
-    """Equal parts of at most `TOGETHER`."""
-    count = -(-len(seeds) // TOGETHER)
-    return np.array_split(seeds, count) if count else []
+def _together(reach: int) -> int:
+    """How many streamlines of so many steps each way walk side by side."""
+    return max(min(TOGETHER, ROOM // reach), 1)
+
+
+def _batches(seeds: np.ndarray, most: int) -> list[np.ndarray]:
+    """Equal parts of at most so many."""
+    return np.array_split(seeds, -(-len(seeds) // most)) if len(seeds) else []
 
 
 def _on_lattice(covering: Covering, averages: _Averages, every: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from .covering import END, OPEN, Covering, joined
 from .look import Look
 
 #: Steps after which those that have ended are left out, if they are many.
-COMPACTED = 16
+COMPACTED = 8
 
 #: The share of the slope across a streamline that counts. Differences over two pixels tell the
 #: change over half of one only in part; this much gives streaks the width that brute force gives.
@@ -99,6 +99,7 @@ class Walker:
         start = _scattered(len(seeds))
         position = np.concatenate([start, start])
         before = None
+        total = np.zeros((lanes, covering.channels), dtype=np.complex64)
         # Those that have not ended, once many have; the others' rows stay as they are.
         live, lives = None, np.full(lanes, self._reach)
         alive = lives
@@ -108,7 +109,8 @@ class Walker:
             record = records.take(state, mode="clip").view(np.int16).astype(np.float32)
             record = record.view(np.complex64).reshape(len(cell), -1)
             ahead = record[:, 0].copy()
-            self._store(number, live, lanes, state, position, ahead, record[:, 1:])
+            total += record[:, 1:]
+            self._store(number, live, lanes, state, position, ahead, total)
             if number == self._reach:
                 break
             # The method of Adams and Bashforth, 3/2 d - 1/2 d_before.
@@ -131,15 +133,14 @@ class Walker:
             angle += turn
             if number % COMPACTED == COMPACTED - 1:
                 left = np.flatnonzero(cell)
-                if len(left) < 0.8 * len(cell):
+                if len(left) < 0.9 * len(cell):
                     live = np.arange(lanes) if live is None else live
                     lives[live] = alive
                     if not len(left):
                         return lives, number
-                    live, alive, cell, sheet, turn, angle, position, before = (
-                        values[left]
-                        for values in (live, alive, cell, sheet, turn, angle, position, before)
-                    )
+                    live, alive, cell, sheet = live[left], alive[left], cell[left], sheet[left]
+                    turn, angle, position = turn[left], angle[left], position[left]
+                    before, total = before[left], total[left]
         if live is not None:
             lives[live] = alive
         return lives, self._reach
@@ -167,17 +168,15 @@ class Walker:
         state: np.ndarray,
         position: np.ndarray,
         ahead: np.ndarray,
-        gathered: np.ndarray,
+        total: np.ndarray,
     ) -> None:
         """Write row `number` of the room, for all streamlines or the live ones alone."""
-        before, sums = self._sums[max(number - 1, 0), :lanes], self._sums[number, :lanes]
-        if live is not None:
-            sums[...] = before
-            sums[live] = before[live] + gathered
-        elif number:
-            np.add(before, gathered, out=sums)
+        sums = self._sums[number, :lanes]
+        if live is None:
+            sums[...] = total
         else:
-            sums[...] = gathered
+            sums[...] = self._sums[number - 1, :lanes]
+            sums[live] = total
         if number > self._served:
             return
         aside = position.imag * ahead.real

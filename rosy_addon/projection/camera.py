@@ -83,8 +83,21 @@ class Camera:
 
         The geometric mean of both directions where pixels are not square.
         """
-        scale = np.linalg.det(self.projection[:2, :2]) * self.width * self.height / 4
+        scale = _determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
+
+    @property
+    def across_axis(self) -> np.ndarray:
+        """(2, 2): x and y in clip space to x and y at depth 1, or at any if orthographic."""
+        # In closed form: linear algebra libraries wake all their threads for any system.
+        (a, b), (c, d) = self.projection[:2, :2]
+        return np.array([[d, -b], [-c, a]]) / _determinant(self.projection)
+
+
+def _determinant(projection: np.ndarray) -> float:
+    """Of how a projection maps x and y."""
+    (a, b), (c, d) = projection[:2, :2]
+    return float(a * d - b * c)
 
 
 def _checked_matrix(matrix: np.ndarray, what: str, name: str) -> np.ndarray:
@@ -99,7 +112,7 @@ def _checked_matrix(matrix: np.ndarray, what: str, name: str) -> np.ndarray:
 def _checked_view(view: np.ndarray, name: str) -> np.ndarray:
     view = _checked_matrix(view, "view", name)
     turn = view[:3, :3]
-    if np.linalg.det(turn) < 0:
+    if np.cross(turn[0], turn[1]) @ turn[2] < 0:
         raise RosyError(f"camera '{name}' is mirrored: one of its scales is negative")
     rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
     if not rigid or not np.allclose(view[3], (0, 0, 0, 1), atol=1e-6):
@@ -116,8 +129,7 @@ def _checked_projection(projection: np.ndarray, name: str) -> np.ndarray:
         projection = projection / last[3]
     else:
         raise RosyError(f"camera '{name}' is neither perspective nor orthographic")
-    area = np.linalg.det(projection[:2, :2])
-    if area <= 0:
+    if _determinant(projection) <= 0:
         raise RosyError(f"camera '{name}' is mirrored or flat: its projection turns pictures over")
     return projection
 
@@ -142,7 +154,7 @@ def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarra
     shift = projection[:2, 2] if camera.is_perspective else -projection[:2, 3]
     across = (2.0 / camera.width) * (column + 0.5) + (shift[0] - 1.0)
     upward = (2.0 / camera.height) * (row + 0.5) + (shift[1] - 1.0)
-    inverse = np.linalg.inv(projection[:2, :2])
+    inverse = camera.across_axis
     if inverse[0, 1] == 0 and inverse[1, 0] == 0:
         return inverse[0, 0] * across, inverse[1, 1] * upward
     return (

@@ -166,8 +166,7 @@ def _slopes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """`_Window.depth`, `along`, `upward` and `tolerance` of some pixels."""
     camera, normal, z = buffer.camera, buffer.plane_normal[pixels].T, buffer.position[pixels, 2]
-    inverse = np.linalg.inv(camera.projection[:2, :2])
-    inverse = (inverse * (2.0 / camera.width, 2.0 / camera.height)).astype(np.float32)
+    inverse = (camera.across_axis * (2.0 / camera.width, 2.0 / camera.height)).astype(np.float32)
     along = normal[0] * inverse[0, 0] + normal[1] * inverse[1, 0]
     upward = normal[0] * inverse[0, 1] + normal[1] * inverse[1, 1]
     per_unit = np.float32(camera.pixels_per_unit)

@@ -12,6 +12,8 @@ Also read are
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 
@@ -22,6 +24,7 @@ from ..field.frames import carry, dot, tangent_frame, unit
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface, mean_over_faces
+from ..reuse import Kept, digest
 from .capabilities import has_properties, is_editable
 from .meshes import flush_edit_mode, mesh_surface, read_values
 
@@ -66,6 +69,7 @@ def read_mesh_field(
     *,
     undefined: str = "error",
     owner: str | None = None,
+    kept: Kept | None = None,
 ) -> RosyField:
     """The field of a mesh.
 
@@ -83,6 +87,8 @@ def read_mesh_field(
         What to do about NaN and infinite values: refuse them, or call them undefined.
     owner : str, optional
         What to call the mesh in messages.
+    kept : Kept, optional
+        Where surface and field are found if they have not changed.
 
     Raises
     ------
@@ -92,7 +98,7 @@ def read_mesh_field(
     """
     owner = f"mesh '{mesh.name}'" if owner is None else owner
     flush_edit_mode(mesh)
-    surface = mesh_surface(mesh, owner) if surface is None else surface
+    surface = mesh_surface(mesh, owner, kept=kept) if surface is None else surface
     wanted = name or attribute_name(mesh)
     degree = check_degree(field_degree(mesh) if degree is None else degree)
     if wanted not in mesh.attributes and "dir0" in mesh.attributes:
@@ -104,16 +110,27 @@ def read_mesh_field(
         )
     source = f"{owner}, attribute '{wanted}'"
     values = _values(attribute, source, mesh)
-    if attribute.data_type == _FLOAT:
-        return _from_angles(surface, values, degree, source, undefined)
-    if attribute.domain == "CORNER":
-        return _from_corners(surface, values, degree, source, undefined)
-    domain = {"FACE": "face", "POINT": "vertex"}[attribute.domain]
-    return checked_field(surface, values, degree, source, undefined, domain)
+
+    def make() -> RosyField:
+        if attribute.data_type == _FLOAT:
+            return _from_angles(surface, values, degree, source, undefined)
+        if attribute.domain == "CORNER":
+            return _from_corners(surface, values, degree, source, undefined)
+        domain = {"FACE": "face", "POINT": "vertex"}[attribute.domain]
+        return checked_field(surface, values, degree, source, undefined, domain)
+
+    kind = attribute.domain, attribute.data_type
+    return _found_or_made(kept, surface, make, "given", *kind, values, degree, source, undefined)
 
 
 def read_carried_field(
-    mesh: bpy.types.Mesh, name: str, degree: int, surface: Surface, undefined: str, owner: str
+    mesh: bpy.types.Mesh,
+    name: str,
+    degree: int,
+    surface: Surface,
+    undefined: str,
+    owner: str,
+    kept: Kept | None = None,
 ) -> RosyField:
     """The field of an evaluated mesh, whose faces a modifier may have made anew.
 
@@ -128,18 +145,39 @@ def read_carried_field(
         If values are not finite.
     """
     source = f"{owner}, attribute '{name}'"
-    vectors = _values(mesh.attributes[name], source, mesh).astype(np.float64)
+    values = _values(mesh.attributes[name], source, mesh)
+    former = read_values(mesh, FACE_NORMAL, np.float32, 3)
+
+    def make() -> RosyField:
+        return RosyField(degree, _carried(values, former, surface, source, undefined))
+
+    return _found_or_made(kept, surface, make, "carried", values, former, degree, source, undefined)
+
+
+def _carried(
+    values: np.ndarray, former: np.ndarray | None, surface: Surface, source: str, undefined: str
+) -> np.ndarray:
+    vectors = values.astype(np.float64)
     settle_undefined(vectors, source, "face", undefined)
     normal = tangent_normals(surface, "face")
-    former = read_values(mesh, FACE_NORMAL, np.float32, 3)
     if former is not None:
         former = unit(former.astype(np.float64))
         # A mirrored face has turned over: its plane is what matters.
         former *= np.where(dot(former, normal) < 0, -1.0, 1.0)[:, None]
         vectors = into_planes(vectors, former, 180.0, source, "face")
         vectors = carry(vectors, former, normal)
-    vectors = into_planes(vectors, normal, 180.0, source, "face")
-    return RosyField(degree, vectors)
+    return into_planes(vectors, normal, 180.0, source, "face")
+
+
+def _found_or_made(
+    kept: Kept | None, surface: Surface, make: Callable[[], RosyField], *given: object
+) -> RosyField:
+    """The field made of a surface and what else is given, or that made of the same before."""
+    if kept is None:
+        return make()
+    key = "field", id(surface), digest(*given)
+    # With the surface, so that this number stays its own.
+    return kept.find_or_make(key, lambda: (surface, make()))[1]
 
 
 def write_mesh_field(

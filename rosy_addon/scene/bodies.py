@@ -13,7 +13,7 @@ from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import Body
-from ..reuse import Kept, digest
+from ..reuse import Kept
 from .attributes import (
     FACE_NORMAL,
     attribute_name,
@@ -122,8 +122,9 @@ def read_scene(
     if not objects:
         raise RosyError("no visible object has a RoSy field: make or import one first")
     shown = set(_shown_objects(view_layer))
-    with _prepared(depsgraph, objects, undefined) as names:
-        reader = _Reader(names, undefined, Kept() if kept is None else kept)
+    kept = Kept() if kept is None else kept
+    with _prepared(depsgraph, objects, undefined, kept) as names:
+        reader = _Reader(names, undefined, kept)
         for instance in depsgraph.object_instances:
             if _is_seen(instance, shown):
                 reader.add(instance)
@@ -176,9 +177,8 @@ class _Reader:
             name, degree = name_and_degree
             owner = f"object '{thing.name}'"
             surface = mesh_surface(mesh, owner, rest=True, kept=self.kept)
-            field = read_carried_field(mesh, name, degree, surface, self.undefined, owner)
-            return surface, self.kept.find_or_make(
-                ("field", field.degree, digest(field.vectors)), lambda: field
+            return surface, read_carried_field(
+                mesh, name, degree, surface, self.undefined, owner, self.kept
             )
         finally:
             thing.to_mesh_clear()
@@ -213,7 +213,10 @@ def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
 
 @contextmanager
 def _prepared(
-    depsgraph: bpy.types.Depsgraph, objects: Sequence[bpy.types.Object], undefined: str
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object],
+    undefined: str,
+    kept: Kept,
 ) -> Iterator[dict[bpy.types.Object, tuple[str, int]]]:
     """Have Blender carry what a field needs through the modifiers, and take it away afterwards.
 
@@ -227,14 +230,15 @@ def _prepared(
     try:
         for thing in objects:
             mesh = thing.data
-            names[thing] = _checked_name(thing, undefined, lent)
+            names[thing] = _checked_name(thing, undefined, lent, kept)
             deforms = bool(own_modifiers(thing) or mesh.shape_keys)
             if deforms and is_editable(thing) and not thing.add_rest_position_attribute:
                 thing.add_rest_position_attribute = True
                 switched.append(thing)
             if deforms and FACE_NORMAL not in mesh.attributes and _may_lend(mesh):
                 lent.append(mesh)
-                _lend(mesh, FACE_NORMAL, mesh_surface(mesh, thing.name).face_normal)
+                surface = mesh_surface(mesh, f"object '{thing.name}'", kept=kept)
+                _lend(mesh, FACE_NORMAL, surface.face_normal)
         if switched or lent:
             depsgraph.update()
         yield names
@@ -251,14 +255,14 @@ def _prepared(
 
 
 def _checked_name(
-    thing: bpy.types.Object, undefined: str, lent: list[bpy.types.Mesh]
+    thing: bpy.types.Object, undefined: str, lent: list[bpy.types.Mesh], kept: Kept
 ) -> tuple[str, int]:
     """Which attribute holds an object's field as vectors on faces, and its degree."""
     mesh, owner = thing.data, f"object '{thing.name}'"
     name = attribute_name(mesh)
     if mesh.is_editmode and is_native(mesh):
         return name, field_degree(mesh)  # only its evaluated mesh can be read
-    field = read_mesh_field(mesh, undefined=undefined, owner=owner)
+    field = read_mesh_field(mesh, undefined=undefined, owner=owner, kept=kept)
     if is_native(mesh):
         return name, field.degree
     if not _may_lend(mesh):

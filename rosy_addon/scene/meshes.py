@@ -48,30 +48,26 @@ def mesh_surface(
     if not faces:
         has = "only points and loose edges" if len(mesh.vertices) else "nothing in it"
         raise RosyError(f"{name}: the mesh has no faces to draw on, {has}")
-    corners = len(mesh.loops)
-    face_start = np.empty(faces + 1, dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", face_start[:-1])
-    face_start[-1] = corners
-    triangles = len(mesh.loop_triangles)
-    flat = np.ones(faces, dtype=bool) if plain else read_values(mesh, "sharp_face", bool, 1)
     parts = {
-        "vertices": _get(mesh.vertices, "co", np.float32, 3),
-        "corner_vertex": _get(mesh.loops, "vertex_index", np.int32),
-        "face_start": face_start,
+        "vertices": _quickly(mesh, "position", mesh.vertices, "co", np.float32, 3),
+        "corner_vertex": _quickly(mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32),
+        "face_start": _face_starts(mesh),
         "name": name,
         "sharp_edges": None if plain else _sharp_edges(mesh),
-        "flat_faces": flat,
-        "corner_normal": _get(mesh.corner_normals, "vector", np.float32, 3),
-        "triangles": _get(mesh.loop_triangles, "loops", np.int32, 3) if triangles else None,
-        "triangle_face": (
-            _get(mesh.loop_triangle_polygons, "value", np.int32) if triangles else None
+        "flat_faces": (
+            np.ones(faces, dtype=bool) if plain else read_values(mesh, "sharp_face", bool, 1)
         ),
+        "corner_normal": _get(mesh.corner_normals, "vector", np.float32, 3),
         "rest": read_values(mesh, REST, np.float32, 3) if rest else None,
     }
+
+    def build() -> Surface:
+        return build_surface(**parts, **_triangles(mesh))
+
     if kept is None:
-        return build_surface(**parts)
-    key = "surface", digest(*parts.values())
-    return kept.find_or_make(key, lambda: build_surface(**parts))
+        return build()
+    # Triangles are slow to read, and follow from the rest.
+    return kept.find_or_make(("surface", digest(*parts.values())), build)
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
@@ -92,11 +88,54 @@ def read_values(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> n
     return _get(attribute.data, "vector" if columns == 3 else "value", dtype, columns)
 
 
+def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(F + 1,) int32: the first corner of each face, and the end."""
+    faces, corners = len(mesh.polygons), len(mesh.loops)
+    if corners == 3 * faces:
+        return np.arange(0, corners + 1, 3, dtype=np.int32)
+    starts = np.empty(faces + 1, dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts[:-1])
+    starts[-1] = corners
+    return starts
+
+
+def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
+    """Blender's own, so that RoSy draws what it draws; none if there are none yet."""
+    faces = len(mesh.polygons)
+    if len(mesh.loops) == 3 * faces:
+        face = np.arange(faces, dtype=np.int32)
+        return {"triangles": np.arange(3 * faces, dtype=np.int32), "triangle_face": face}
+    if not len(mesh.loop_triangles):
+        return {}
+    return {
+        "triangles": _get(mesh.loop_triangles, "loops", np.int32, 3),
+        "triangle_face": _get(mesh.loop_triangle_polygons, "value", np.int32),
+    }
+
+
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray | None:
     sharp = read_values(mesh, "sharp_edge", bool, 1)
     if sharp is None or not sharp.any():
         return None
-    return _get(mesh.edges, "vertices", np.int32, 2)[sharp]
+    return _quickly(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[sharp]
+
+
+def _quickly(
+    mesh: bpy.types.Mesh,
+    attribute: str,
+    collection: bpy.types.bpy_prop_collection,
+    key: str,
+    dtype: type,
+    columns: int = 1,
+) -> np.ndarray:
+    """Values of a collection, from the attribute that holds them if it is readable.
+
+    Blender copies attributes whole; from collections it asks item by item, a thousand times slower.
+    """
+    values = read_values(mesh, attribute, dtype, columns)
+    if values is None or len(values) != len(collection):
+        return _get(collection, key, dtype, columns)
+    return values
 
 
 def _get(collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1):

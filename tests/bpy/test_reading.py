@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -353,3 +354,21 @@ def test_degenerate_faces_are_undefined(scene, camera):
     add_field(thing, kind="axis")
     (body,) = read_bodies(depsgraph())
     np.testing.assert_array_equal(body.field.magnitude > 0, [True, False, False])
+
+
+@pytest.mark.parametrize("shape", ["mixed", "triangles"])
+def test_triangles_are_those_of_blender(monkey, shape):
+    mesh = monkey.data
+    if shape == "triangles":
+        edited = bmesh.new()
+        edited.from_mesh(mesh)
+        bmesh.ops.triangulate(edited, faces=edited.faces)
+        edited.to_mesh(mesh)
+        edited.free()
+    else:
+        assert {len(face.vertices) for face in mesh.polygons} == {3, 4}
+    surface = mesh_surface(mesh)
+    mesh.calc_loop_triangles()
+    np.testing.assert_array_equal(surface.triangles, [list(t.loops) for t in mesh.loop_triangles])
+    face = [triangle.polygon_index for triangle in mesh.loop_triangles]
+    np.testing.assert_array_equal(surface.triangle_face, face)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from shapes import from_quads, from_triangles, icosphere, plane, torus
 
+from rosy_addon.compositor.flow import planar_flow
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import Body
@@ -198,3 +199,17 @@ def test_a_frame_that_is_all_covered_has_no_links_around_its_border():
     assert (bits[:, -1] & 0b100100100 == 0).all()
     assert (bits[0] & 0b000000111 == 0).all()
     assert (bits[-1] & 0b111000000 == 0).all()
+
+
+def test_streamlines_end_at_the_frame_and_at_holes():
+    size = 7
+    angles = np.zeros((size, size))
+    angles[3, 2:5] = np.nan
+    flow = planar_flow(angles, 4)
+    defined = np.isfinite(angles)
+    for row, column in np.ndindex(size, size):
+        for bit, (dx, dy) in enumerate(OFFSETS):
+            there = row + dy, column + dx
+            inside = 0 <= there[0] < size and 0 <= there[1] < size
+            wanted = inside and bool(defined[row, column] and defined[there])
+            assert (flow.joined[row * size + column] >> bit & 1 == 1) == wanted

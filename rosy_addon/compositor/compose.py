@@ -178,9 +178,12 @@ def _frame(
     rows = np.empty((len(pixel), 4), dtype=np.float32)
     rows[:, :3] = colour
     rows[:, 3] = 1
-    rgba = np.zeros((height * width, 4), dtype=np.float32)
-    # Four numbers of a pixel at once, as one of their size.
-    rgba.view(np.complex128)[:, 0][pixel] = rows.view(np.complex128)[:, 0]
+    if len(pixel) == height * width:
+        rgba = rows
+    else:
+        rgba = np.zeros((height * width, 4), dtype=np.float32)
+        # Four numbers of a pixel at once, as one of their size.
+        rgba.view(np.complex128)[:, 0][pixel] = rows.view(np.complex128)[:, 0]
     s = supersampling
     if s == 1:
         return rgba.reshape(height, width, 4)

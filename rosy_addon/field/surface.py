@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +14,9 @@ from .triangulate import triangulate
 
 #: Corner normals that differ by no more from that of their fan are the fan's.
 SAME_NORMAL = 1e-6
+
+#: Faces or corners that are worked on at once: bounds memory, and fits the caches.
+BLOCK = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +84,12 @@ class Surface:
     @cached_property
     def fans_share_normals(self) -> bool:
         """Whether no corner normal differs from that of its fan, as custom ones may."""
-        shared = self.fan_normal.take(self.corner_fan, axis=0)
-        return bool(np.abs(self.corner_normal - shared).max() <= SAME_NORMAL)
+        for start in range(0, len(self.corner_fan), BLOCK):
+            part = slice(start, start + BLOCK)
+            apart = self.corner_normal[part] - self.fan_normal.take(self.corner_fan[part], axis=0)
+            if np.abs(apart).max() > SAME_NORMAL:
+                return False
+        return True
 
     @cached_property
     def face_normal(self) -> np.ndarray:
@@ -190,9 +198,29 @@ def face_area_vectors(
     Positions are taken relative to each face's first corner, so that a mesh far from the origin
     loses no digits.
     """
+    area = np.empty((len(face_start) - 1, 3))
+    for faces, corners, starts in _blocks(face_start):
+        points = _from_first(vertices, corner_vertex[corners], starts)
+        twice = sum_over_faces(np.cross(points, points[next_corners(starts)]), starts)
+        np.multiply(twice, 0.5, out=area[faces])
+    return area
+
+
+def _from_first(
+    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
+) -> np.ndarray:
+    """(C, 3) corners of faces relative to the first of each."""
     points = vertices[corner_vertex]
-    points = points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
-    return 0.5 * sum_over_faces(np.cross(points, points[next_corners(face_start)]), face_start)
+    return points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
+
+
+def _blocks(face_start: np.ndarray) -> Iterator[tuple[slice, slice, np.ndarray]]:
+    """Some faces at once, which bounds memory: they, their corners, and starts among these."""
+    count = len(face_start) - 1
+    for first in range(0, count, BLOCK):
+        faces = slice(first, min(first + BLOCK, count))
+        starts = face_start[faces.start : faces.stop + 1]
+        yield faces, slice(int(starts[0]), int(starts[-1])), starts - starts[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,19 +345,21 @@ def _fan_normals(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
     """(C, 3) face normals averaged over each fan, weighted by the angle at the corner."""
-    points = vertices[corner_vertex]
-    following = next_corners(face_start)
-    preceding = np.empty_like(following)
-    preceding[following] = np.arange(len(following), dtype=np.int32)
-    ahead, behind = unit(points[following] - points), unit(points[preceding] - points)
-    angle = np.arccos(np.clip(dot(ahead, behind), -1, 1))
-    face_normal = unit(face_area_vectors(vertices, corner_vertex, face_start))[
-        corner_faces(face_start)
-    ]
-    total = mix_over_fans(face_normal * angle[:, None], corner_fan)
-    normal = unit(total)[corner_fan]
+    angle = np.empty(len(corner_vertex))
+    for _, corners, starts in _blocks(face_start):
+        points = _from_first(vertices, corner_vertex[corners], starts)
+        following = next_corners(starts)
+        ahead = unit(points[following] - points)
+        behind = np.empty_like(ahead)
+        behind[following] = -ahead
+        angle[corners] = np.arccos(np.clip(dot(ahead, behind), -1, 1))
+    face_normal = unit(face_area_vectors(vertices, corner_vertex, face_start))
+    face = corner_faces(face_start)
+    fans = int(corner_fan.max()) + 1
+    total = [np.bincount(corner_fan, angle * column[face], fans) for column in face_normal.T]
+    normal = unit(np.stack(total, axis=1))[corner_fan]
     lost = ~normal.any(axis=1)
-    normal[lost] = face_normal[lost]
+    normal[lost] = face_normal[face[lost]]
     normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
     return normal
 

@@ -6,6 +6,7 @@
 #   make check     formatting, lint, import rules and unit tests: seconds
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
+#   make bench     every claim about speed, measured: minutes; dist/bench.json
 #   make clean     everything made here, but for the environments (make distclean: these too)
 
 PYTHON ?= python3.11
@@ -18,7 +19,7 @@ BPY42  = .venv-bpy42/bin/python
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: demo test test-all test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery clean distclean
+.PHONY: demo test test-all test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -53,6 +54,9 @@ zip: .venv-bpy42/ready
 
 gallery: .venv-gallery/ready
 	.venv-gallery/bin/python -m tools.gallery
+
+bench: .venv-bench/ready
+	.venv-bench/bin/python bench/run.py --json dist/bench.json
 
 # An environment is ready once all that its list of requirements names is installed.
 .venv/ready: tools/requirements/unit.txt

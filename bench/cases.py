@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import lru_cache
 
 import numpy as np
@@ -70,15 +71,28 @@ def body(triangles: int, degree: int) -> Body:
     return Body(surface, np.eye(4), axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
-def camera(size: int = SIZE, azimuth: float = 0.0) -> Camera:
-    """Of which the ball covers 85 % of the frame."""
-    eye = 2.43 * np.array([np.sin(azimuth), -np.cos(azimuth), 0.35])
-    return perspective_camera(look_at(eye, (0, 0, 0), (0, 0, 1)), size, size, fov=0.8)
+def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -> Camera:
+    """One of whose square frame the ball covers 85 %."""
+    eye = 2.33 * np.array([np.sin(azimuth), -np.cos(azimuth), 0.35])
+    view = look_at(eye, (0, 0, 0), (0, 0, 1))
+    return perspective_camera(view, width, width if height is None else height, fov=0.8)
+
+
+def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
+    """A frame of a mesh that has not been drawn before: what a camera does not change is found."""
+    fresh = body(triangles, degree)
+    gbuffer = project([Body(_fresh(fresh.surface), fresh.matrix, fresh.field)], camera(size))
+    return compose(gbuffer, look).rgba
+
+
+def _fresh(surface: Surface) -> Surface:
+    """Without what has been worked out since it was built."""
+    return Surface(**{entry.name: getattr(surface, entry.name) for entry in fields(surface)})
 
 
 def frame(
     triangles: int, degree: int, look: Look = LOOK, size: int = SIZE, azimuth: float = 0.0
 ) -> np.ndarray:
     """A mesh with a field to a picture: all that is done when the camera has moved."""
-    gbuffer = project([body(triangles, degree)], camera(size, azimuth), look.display)
+    gbuffer = project([body(triangles, degree)], camera(size, azimuth=azimuth), look.display)
     return compose(gbuffer, look).rgba

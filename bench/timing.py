@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
+import argparse
+import importlib.metadata
+import json
 import os
 import platform
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
+
+#: Runs of each way that a ratio is the median of.
+RUNS = 7
 
 
 @dataclass(frozen=True)
 class Case:
-    """One line of a bench: how many times as long one thing takes as another.
+    """One line of a bench: how many times as much one thing takes as another.
 
     Attributes
     ----------
     name : str
     ratio : float
-        Median over the runs of the time of one over that of the other, right after each other.
+        Median over the runs of what one takes over what the other takes, right after each other.
     low, high : float
         The least and the largest.
     target : float or None
         What it is to be.
     higher_is_better : bool
-    milliseconds : tuple of float
+    amounts : tuple of float
         Medians of both, for reference.
+    unit : str
+        Of the amounts.
     """
 
     name: str
@@ -35,7 +45,8 @@ class Case:
     high: float
     target: float | None
     higher_is_better: bool
-    milliseconds: tuple[float, float]
+    amounts: tuple[float, float]
+    unit: str = "ms"
 
     @property
     def reached(self) -> bool:
@@ -46,16 +57,13 @@ class Case:
 
     def line(self) -> str:
         """As it is printed."""
-        first, second = self.milliseconds
         wanted = ""
         if self.target is not None:
             sign = "at least" if self.higher_is_better else "at most"
-            wanted = f"{sign} {self.target:g}: {'yes' if self.reached else 'NO'}"
-        spread = f"{self.low:.2f} to {self.high:.2f}"
-        return (
-            f"{self.name:58} {self.ratio:7.2f}  ({spread:15}) "
-            f"{first:8.1f} ms / {second:7.1f} ms  {wanted}"
-        )
+            wanted = f"  {sign} {self.target:g}: {'yes' if self.reached else 'NO'}"
+        spread = f"({self.low:.2f} to {self.high:.2f})"
+        amounts = " / ".join(f"{amount:.4g}" for amount in self.amounts)
+        return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{wanted}"
 
     def entry(self) -> dict[str, object]:
         """As it is written to a file."""
@@ -69,7 +77,8 @@ def compare(
     *,
     target: float | None = None,
     higher_is_better: bool = True,
-    runs: int = 5,
+    runs: int = RUNS,
+    cold: bool = False,
 ) -> Case:
     """Time two things in turn, after each has run once.
 
@@ -82,8 +91,12 @@ def compare(
     higher_is_better : bool
     runs : int
         Of each, beside the first.
+    cold : bool
+        Time the first run of `one` too: it is slow, and leaves nothing for the next.
     """
-    one(), other()
+    if not cold:
+        one()
+    other()
     times = np.array([(_seconds(one), _seconds(other)) for _ in range(runs)])
     ratios = times[:, 0] / times[:, 1]
     first, second = np.median(times, axis=0) * 1e3
@@ -94,7 +107,7 @@ def compare(
         high=float(ratios.max()),
         target=target,
         higher_is_better=higher_is_better,
-        milliseconds=(float(first), float(second)),
+        amounts=(float(first), float(second)),
     )
     print(case.line(), flush=True)
     return case
@@ -106,16 +119,58 @@ def _seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def machine() -> dict[str, object]:
-    """What the times were measured on."""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "threads": 1,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "system": platform.system(),
-    }
+def main(
+    about: str | None,
+    measure: Callable[[int], Iterable[Case]],
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """A bench as a program: what it measures is printed, and written if so asked.
+
+    Parameters
+    ----------
+    about : str
+        Its help.
+    measure : function
+        From the number of runs to the cases.
+    arguments : sequence of str, optional
+        Those of the program if not given.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
+    parser.add_argument("--runs", type=int, default=RUNS, help="of each way (%(default)s)")
+    chosen = parser.parse_args(arguments)
+    print(machine(), flush=True)
+    cases = list(measure(chosen.runs))
+    if chosen.json:
+        write(chosen.json, [case.entry() for case in cases])
+    return 0
+
+
+def write(path: Path, entries: Sequence[dict[str, object]]) -> None:
+    """Cases as a list of objects, each with the machine it was measured on."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    named = [{**entry, "machine": machine()} for entry in entries]
+    path.write_text(json.dumps(named, indent=1) + "\n", encoding="utf-8")
+
+
+def machine() -> str:
+    """What is measured on: processor, cores, threads in use, versions."""
+    versions = [f"Python {platform.python_version()}"]
+    for package in ("numpy", "rlic", "vtk", "bpy"):
+        try:
+            versions.append(f"{package} {importlib.metadata.version(package)}")
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    cores = f"{os.cpu_count()} cores, 1 thread in use"
+    return f"{_processor()}, {cores}, {platform.system()}, {', '.join(versions)}"
+
+
+def use_one_core() -> None:
+    """Keep this process to one core, so that a library's threads have no more than RoSy's one."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    else:
+        print("this system keeps no process to one core: peers may use more", file=sys.stderr)
 
 
 def _processor() -> str:

@@ -1,0 +1,91 @@
+"""A bake in Blender after another that differs in one setting of the look, over a first bake."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.projection.camera import Camera
+
+from . import cases
+from .timing import Case, compare, main
+
+#: What a user turns, by turns.
+CHANGES: dict[str, tuple[object, ...]] = {
+    "gain": (3.0, 3.5),
+    "shading": (0.5, 0.6),
+    "colour_map": ("magma", "grey"),
+    "seed": (1, 2),
+    "grain": (2.0, 2.5),
+    "density": (0.2, 0.3),
+    "noise": ("colour", "grey"),
+    "length": (30, 50),
+    "guiding_angle": (0.2, 0.4),
+    "crease_angle": (0.8, 0.9),
+}
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """Bakes of the ball as Blender's mesh."""
+    try:
+        import bpy
+    except ImportError:
+        print("changes of a look: left out, there is no bpy here", file=sys.stderr)
+        return
+    from rosy_addon.bake import bake
+    from rosy_addon.reuse import KEPT
+
+    for triangles in (12_000, 200_000):
+        scene = _scene(bpy, triangles)
+        view = cases.camera()
+
+        def baked(look: Look, scene: object = scene, view: Camera = view) -> None:
+            bake(scene, look=look, cameras=[view])
+
+        def first(baked=baked) -> None:
+            KEPT.clear()
+            baked(cases.LOOK)
+
+        for setting, values in CHANGES.items():
+            turn = itertools.cycle(values)
+
+            def changed(setting=setting, turn=turn, baked=baked) -> None:
+                baked(replace(cases.LOOK, **{setting: next(turn)}))
+
+            yield compare(
+                f"bake after a change of {setting} / first bake, {triangles // 1000}K",
+                changed,
+                first,
+                target=0.5,
+                higher_is_better=False,
+                runs=runs,
+            )
+
+
+def _scene(bpy, triangles: int) -> object:
+    """The ball with a field of degree 4, alone in Blender."""
+    from rosy_addon.scene.attributes import write_mesh_field
+    from rosy_addon.ui.properties import ensure_registered
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    ensure_registered()
+    surface = cases.ball(triangles)
+    mesh = bpy.data.meshes.new("Ball")
+    corners = surface.corner_vertex[surface.triangles]
+    mesh.from_pydata(surface.vertices.tolist(), [], corners.tolist())
+    mesh.shade_smooth()
+    write_mesh_field(mesh, cases.body(triangles, 4).field)
+    thing = bpy.data.objects.new("Ball", mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    bpy.context.view_layer.update()
+    assert np.allclose(thing.matrix_world, np.eye(4))
+    return bpy.context.scene
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

@@ -1,0 +1,79 @@
+"""The most memory that large pictures and meshes take, over what is allowed, each on its own."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from rosy_addon.compositor.compose import compose
+from rosy_addon.projection.project import project
+
+from . import cases
+from .timing import Case, main
+
+ROOT = Path(__file__).resolve().parents[1]
+
+#: Gigabytes.
+ALLOWED = 8.0
+
+WIDE = 3840, 2160
+
+#: Names, triangles, N, and settings of the look.
+CASES: dict[str, tuple[int, int, dict[str, object]]] = {
+    "3840 x 2160, N = 4": (12_000, 4, {}),
+    "3840 x 2160, N = 7, colour noise": (12_000, 7, {"noise": "colour"}),
+    "3840 x 2160, N = 4, 2 x 2 samples a pixel": (12_000, 4, {"supersampling": 2}),
+    "3840 x 2160, N = 4, brute": (12_000, 4, {"method": "brute", "length": 4}),
+    "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
+}
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """One run each: memory is not noisy."""
+    for name in CASES:
+        command = [sys.executable, "-m", "bench.memory", "--draw", name]
+        done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        peak = float(done.stdout.split()[-1])
+        ratio = peak / ALLOWED
+        case = Case(
+            name=f"peak memory / {ALLOWED:g} GB, {name}",
+            ratio=ratio,
+            low=ratio,
+            high=ratio,
+            target=1.0,
+            higher_is_better=False,
+            amounts=(peak, ALLOWED),
+            unit="GB",
+        )
+        print(case.line(), flush=True)
+        yield case
+
+
+def draw(name: str) -> float:
+    """Draw a case, mesh and all; return the gigabytes that this process held at most."""
+    import resource
+
+    triangles, degree, settings = CASES[name]
+    look = replace(cases.LOOK, **settings)
+    width, height = (size * look.supersampling for size in WIDE)
+    gbuffer = project([cases.body(triangles, degree)], cases.camera(width, height), look.display)
+    compose(gbuffer, look)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak * (1 if sys.platform == "darwin" else 1024) / 1e9
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--draw", choices=CASES)
+    chosen, rest = parser.parse_known_args()
+    if chosen.draw:
+        print(draw(chosen.draw))
+        sys.exit()
+    if os.name == "nt":
+        sys.exit("memory: this system does not say how much a process has held")
+    sys.exit(main(__doc__, measure, rest))

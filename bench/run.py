@@ -1,0 +1,68 @@
+"""All benches, each in a process of its own; --quick for the paper's Table 1 alone.
+
+A ratio is the median over alternating runs, and stands beside the least and the largest. With
+--json FILE all cases are written there as a list of objects.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+
+from bench.table1 import quick  # noqa: E402
+from bench.timing import RUNS, machine, write  # noqa: E402
+
+#: In the order in which they are run.
+SCRIPTS = ("table1", "scaling", "stages", "planar_rlic", "surface_vtk", "again", "memory")
+
+#: Runs of each way with --quick: a minute in all.
+QUICK_RUNS = 3
+
+
+def main() -> int:
+    """What the command line asks for."""
+    about, _, more = (__doc__ or "").partition("\n")
+    parser = argparse.ArgumentParser(description=about, epilog=more.strip())
+    parser.add_argument("script", nargs="*", help=f"{', '.join(SCRIPTS)}; all if not given")
+    parser.add_argument("--quick", action="store_true", help="only Table 1, without the peers")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
+    parser.add_argument("--runs", type=int, help=f"of each way ({RUNS}; --quick: {QUICK_RUNS})")
+    chosen = parser.parse_args()
+    unknown = [name for name in chosen.script if name not in SCRIPTS]
+    if unknown:
+        parser.error(f"there is no '{unknown[0]}', only {', '.join(SCRIPTS)}")
+    if chosen.quick:
+        print(machine(), flush=True)
+        cases = list(quick(chosen.runs or QUICK_RUNS, cold=True))
+        if chosen.json:
+            write(chosen.json, [case.entry() for case in cases])
+        return 0
+    entries = []
+    for name in chosen.script or SCRIPTS:
+        print(f"--- {name}", flush=True)
+        entries += _run(name, chosen.runs or RUNS)
+    if chosen.json:
+        chosen.json.parent.mkdir(parents=True, exist_ok=True)
+        chosen.json.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _run(name: str, runs: int) -> list[dict[str, object]]:
+    """The entries of one script."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "cases.json"
+        command = [sys.executable, "-m", f"bench.{name}", "--runs", str(runs), "--json", str(file)]
+        subprocess.run(command, cwd=ROOT, check=True)
+        return json.loads(file.read_text(encoding="utf-8")) if file.exists() else []
+
+
+if __name__ == "__main__":
+    sys.exit(main())

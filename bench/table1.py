@@ -1,0 +1,73 @@
+"""The paper's Table 1: our way over the paper's two, by N, for pictures and for whole frames."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+from . import cases
+from .timing import Case, compare, main
+
+#: What is to be reached, for each degree: the LIC stage, and frames of few and of many triangles.
+LIC = {2: 4.0, 3: 8.0, 4: 12.0, 6: 16.0}
+FRAMES = {
+    12_000: {2: 2.5, 3: 5.0, 4: 7.0, 6: 10.0},
+    200_000: {2: 2.0, 3: 4.0, 4: 6.0, 6: 8.0},
+}
+MEMBERS = 4.0
+
+BRUTE = replace(cases.LOOK, method="brute")
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """All rows."""
+    yield from quick(runs)
+    for triangles, targets in FRAMES.items():
+        for degree, target in targets.items():
+            yield compare(
+                f"brute / sheets, first frame of a mesh, {_thousands(triangles)}, N = {degree}",
+                lambda t=triangles, d=degree: cases.first_frame(t, d, BRUTE),
+                lambda t=triangles, d=degree: cases.first_frame(t, d),
+                target=target,
+                runs=runs,
+            )
+    for triangles in FRAMES:
+        yield compare(
+            f"members / sheets, frame, {_thousands(triangles)}, N = 4",
+            lambda t=triangles: cases.frame(t, 4, replace(cases.LOOK, method="members")),
+            lambda t=triangles: cases.frame(t, 4),
+            target=MEMBERS,
+            runs=runs,
+        )
+
+
+def quick(runs: int, cold: bool = False) -> Iterator[Case]:
+    """The rows of the table itself: the camera has moved since the last frame."""
+    for degree, target in LIC.items():
+        yield compare(
+            f"brute / sheets, LIC stage, N = {degree}",
+            lambda d=degree: cases.compose_lic("brute", d),
+            lambda d=degree: cases.compose_lic("sheets", d),
+            target=target,
+            runs=runs,
+            cold=cold,
+        )
+    for triangles, targets in FRAMES.items():
+        for degree, target in targets.items():
+            yield compare(
+                f"brute / sheets, frame, {_thousands(triangles)}, N = {degree}",
+                lambda t=triangles, d=degree: cases.frame(t, d, BRUTE),
+                lambda t=triangles, d=degree: cases.frame(t, d),
+                target=target,
+                runs=runs,
+                cold=cold,
+            )
+
+
+def _thousands(triangles: int) -> str:
+    return f"{triangles // 1000}K triangles"
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

@@ -45,23 +45,40 @@ def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -
 
 
 @lru_cache(maxsize=8)
-def ball(triangles: int) -> Surface:
-    """A bumpy ball of about so many triangles, of even density."""
+def ball(triangles: int, bumps: float = 0.06) -> Surface:
+    """A bumpy ball of about so many triangles, of even density; round without bumps."""
     rows = round(np.sqrt(triangles / 4))
     columns = 2 * rows
     up = np.linspace(0, np.pi, rows + 1)[:, None]
     around = np.arange(columns) * (2 * np.pi / columns)
-    bumps = 1 + 0.06 * np.sin(up) ** 3 * np.sin(5 * around) * np.sin(4 * up)
-    point = bumps[..., None] * np.stack(
+    out = 1 + bumps * np.sin(up) ** 3 * np.sin(5 * around) * np.sin(4 * up)
+    point = out[..., None] * np.stack(
         [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up) + 0 * around], axis=-1
     )
+    return _surface("ball", point)
+
+
+@lru_cache(maxsize=8)
+def torus(triangles: int, tube: float = 0.45) -> Surface:
+    """A torus about the z axis, of about so many triangles."""
+    rows = round(np.sqrt(triangles / 4))
+    across = np.linspace(0, -2 * np.pi, rows + 1)[:, None]
+    around = np.arange(2 * rows) * (np.pi / rows)
+    out, up = 1 + tube * np.cos(across), tube * np.sin(across) + 0 * around
+    return _surface("torus", np.stack([out * np.cos(around), out * np.sin(around), up], axis=-1))
+
+
+def _surface(name: str, point: np.ndarray) -> Surface:
+    """Triangles between rows of points from above; each row is a ring."""
+    rows, columns = point.shape[0] - 1, point.shape[1]
     here = np.arange(rows)[:, None] * columns + np.arange(columns)
     right = np.roll(here, -1, axis=1)
     below = np.stack([here, here + columns, right + columns], axis=-1)
     above = np.stack([here, right + columns, right], axis=-1)
     corners = np.concatenate([below.reshape(-1, 3), above.reshape(-1, 3)]).astype(np.int32)
     starts = np.arange(0, corners.size + 1, 3)
-    return build_surface(point.reshape(-1, 3), corners.ravel(), starts, name=f"ball {len(corners)}")
+    points = point.reshape(-1, 3)
+    return build_surface(points, corners.ravel(), starts, name=f"{name} {len(corners)}")
 
 
 @lru_cache(maxsize=16)

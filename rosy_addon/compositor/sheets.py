@@ -9,7 +9,7 @@ streamlines side by side in arrays (`walker`); a state costs a few steps, whatev
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -57,8 +57,8 @@ MOST_ROUNDS = 8
 #: From which neighbours those take it: so many pixels along their line, so many to its left.
 BESIDE = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
-#: Directions are not interpolated on the way, which blurs streaks a little: they vary by as much
-#: more than those of brute force.
+#: Directions are not interpolated on the way, which would blur streaks a little: without this they
+#: would vary by as much more than those of brute force.
 CONTRAST = 0.99
 
 #: States of a strip of the picture, which bounds the memory.
@@ -75,6 +75,7 @@ def sheets_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     noise : (P, K) float32 ndarray
     """
     count, channels = noise.shape
+    noise = noise - np.float32(MEAN)
     line = line_of_member(flow.degree)
     members = np.empty((len(line), count, channels), dtype=np.float32)
     samples = np.empty(count, dtype=np.float32)
@@ -135,7 +136,8 @@ def _average(known: np.ndarray, look: Look, members: np.ndarray) -> None:
             sums, samples = line[start : start + BLOCK, :-1], line[start : start + BLOCK, -1].copy()
             mean = member[start : start + BLOCK]
             np.divide(sums, samples[:, None], out=mean)
-            mean += (MEAN - mean) * np.float32(1 - CONTRAST)
+            mean *= np.float32(CONTRAST)
+            mean += np.float32(MEAN)
             if samples.min() < whole:
                 mean[...] = even_out(mean, samples, look)
 
@@ -208,9 +210,17 @@ class _Averages:
         self._values[:, cell, :-1] = noise
         self._values[:, cell, -1] = 1
 
-    def put(self, line: np.ndarray, values: np.ndarray) -> None:
-        """Write sums and samples of some lines; of several for one line the last stay."""
-        put(self._flat, line, values)
+    def put(self, steps: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+        """Write what streamlines have gathered, as `Walker.walk` yields it.
+
+        Of several that pass one line, those that are near to it there stay.
+        """
+        near_line, near_values = [], []
+        for line, values, near in steps:
+            put(self._flat, line, values)
+            near_line.append(line.take(near))
+            near_values.append(values.take(near, axis=0))
+        put(self._flat, np.concatenate(near_line), np.concatenate(near_values))
         # Streamlines that have ended pass this one.
         self._values[:, END, -1] = -1
 
@@ -250,9 +260,8 @@ def _pass_all(
     for _ in range(MOST_ROUNDS):
         steps = 0
         for some in _batches(seeds, most):
-            line, values, taken = walker.walk(some)
-            averages.put(line, values)
-            steps += taken
+            averages.put(walker.walk(some))
+            steps += walker.taken
             yield Progress(1 - len(missing) / total, "Following streamlines")
         missing = averages.missing()
         if len(missing) <= LEFT * total:
@@ -266,7 +275,7 @@ def _pass_all(
     most = min(_together(look.length), len(missing))
     walker = Walker(covering, look, limit, 0, most)
     for some in _batches(missing, most):
-        averages.put(*walker.walk(some)[:2])
+        averages.put(walker.walk(some))
         yield Progress(0.95, "Following streamlines")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from .covering import END, OPEN, Covering, joined
@@ -13,6 +15,9 @@ COMPACTED = 8
 #: The share of the slope across a streamline that counts. Differences over two pixels tell the
 #: change over half of one only in part; this much gives streaks the width that brute force gives.
 LATERAL = 0.7
+
+#: How far, in pixels, the streamlines may be from the centre of a pixel that serve it best.
+NEAR = 0.25
 
 
 class Walker:
@@ -41,36 +46,53 @@ class Walker:
         step, tone, slope = covering.units
         self._step, self._tone = np.float32(1.5 * step), np.float32(tone)
         self._lateral = np.float32(LATERAL * slope / look.step * step)
+        self._near = np.float32(NEAR * look.step / step)
         self._limit = None if limit is None else np.tile(limit, covering.lines)
         lanes, channels = 2 * most, covering.channels
         self._sums = np.empty((self._reach + 1, lanes, channels), dtype=np.complex64)
         self._state = np.empty((served + 1, lanes), dtype=np.int32)
         self._aside = np.empty((served + 1, lanes), dtype=np.float32)
-        self._values = np.empty((served + 1) * lanes * (channels + 1), dtype=np.float32)
+        #: Steps that the streamlines of the last walk took before their end, of those that serve.
+        self.taken = 0
 
-    def walk(self, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """All lines that some streamlines pass, and what they have gathered there.
+    def walk(self, seeds: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Lines that some streamlines pass, step by step, and what they have gathered there.
 
         Parameters
         ----------
         seeds : (n,) intp ndarray
             Entries of lines.
 
-        Returns
-        -------
-        line : (m,) int32 ndarray
+        Yields
+        ------
+        line : (2 n,) int32 ndarray
             Of the cell `END` where streamlines have ended.
-        values : (m, K + 1) float32 ndarray
-            The sum of the noise of each channel around there, and its samples. Both arrays are
-            overwritten by the next walk.
-        steps : int
-            Taken by them all before their end, of those that serve.
+        values : (2 n, K + 1) float32 ndarray
+            The sum of the noise of each channel around there, and its samples. Overwritten by the
+            next step.
+        near : (m,) intp ndarray
+            Which of the streamlines pass close to the centre of the pixel.
         """
         alive, steps = self._follow(seeds)
-        rows = min(steps, self._served) + 1
-        line = self._covering.line_of(self._state[:rows, : 2 * len(seeds)])
-        values = self._gathered(alive, line, steps)
-        return line.reshape(-1), values, int(np.minimum(alive, self._served).sum())
+        self.taken = int(np.minimum(alive, self._served).sum())
+        lanes, channels = 2 * len(seeds), self._covering.channels
+        alive = alive.astype(np.float32)
+        other = np.roll(alive, lanes // 2)
+        values = np.empty((lanes, channels + 1), dtype=np.float32)
+        for number in range(min(steps, self._served) + 1):
+            line = self._covering.line_of(self._state[number, :lanes])
+            length = self._length if self._limit is None else self._limit.take(line)
+            last, first = np.minimum(number + length, steps), np.maximum(number - length, -steps)
+            between = self._sums_to(last, lanes) - self._sums_before(first, lanes)
+            # A streamline passes beside the centre of a pixel, not through it, by up to half a
+            # pixel: each sum is moved to the centre by its slope across the streamline.
+            aside = self._aside[number, :lanes]
+            np.multiply(between.real, self._tone, out=values[:, :-1])
+            values[:, :-1] -= (aside * self._lateral)[:, None] * between.imag
+            samples = np.minimum(alive, last, dtype=np.float32, casting="same_kind")
+            samples += np.minimum(other, -first, dtype=np.float32, casting="same_kind")
+            np.add(samples, np.float32(1), out=values[:, -1])
+            yield line, values, np.flatnonzero(np.abs(aside) < self._near)
 
     def _follow(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
         """Fill the room: row i is step i, of n streamlines forward and then of them backward.
@@ -189,43 +211,6 @@ class Walker:
             self._state[number, live] = state
             self._aside[number, :lanes] = 0
             self._aside[number, live] = aside
-
-    def _gathered(self, alive: np.ndarray, line: np.ndarray, steps: int) -> np.ndarray:
-        """What streamlines have gathered around each of their steps.
-
-        A streamline passes beside the centre of a pixel, not through it, by up to half a pixel:
-        each sum is moved to the centre by its slope across the streamline.
-
-        Parameters
-        ----------
-        alive : (2 n,) intp ndarray
-        line : (i, 2 n) int32 ndarray
-            Entries of lines.
-        steps : int
-            As `_follow` returns them.
-
-        Returns
-        -------
-        (2 i n, K + 1) float32 ndarray
-            Around step i as many before and after it as count, if there are.
-        """
-        lanes, channels = len(alive), self._covering.channels
-        alive = alive.astype(np.float32)
-        other = np.roll(alive, lanes // 2)
-        size = line.size * (channels + 1)
-        values = self._values[:size].reshape(len(line), lanes, channels + 1)
-        for number, row in enumerate(values):
-            length = self._length if self._limit is None else self._limit.take(line[number])
-            last, first = np.minimum(number + length, steps), np.maximum(number - length, -steps)
-            between = self._sums_to(last, lanes) - self._sums_before(first, lanes)
-            aside = self._aside[number, :lanes] * self._lateral
-            lateral = aside[:, None] * between.imag
-            np.multiply(between.real, self._tone, out=row[:, :-1])
-            row[:, :-1] -= lateral
-            samples = np.minimum(alive, last, dtype=np.float32, casting="same_kind")
-            samples += np.minimum(other, -first, dtype=np.float32, casting="same_kind")
-            np.add(samples, np.float32(1), out=row[:, -1])
-        return values.reshape(-1, channels + 1)
 
     def _sums_to(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64: sums up to some step, included."""

@@ -18,8 +18,8 @@ PAGES = {
     "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how well N can be read"),
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
-#: What is drawn beside the figures: the README's picture, and the page of looks.
-OTHERS = ("hero", "looks-page")
+#: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
+OTHERS = ("hero", "looks-page", "performance")
 
 
 def main() -> int:

@@ -1,0 +1,121 @@
+"""The pictures of docs/performance.md: sheets beside the other two ways, pixel by pixel.
+
+`python -m tools.gallery.performance FOLDER` also draws those of meshes and fields of others, from
+a folder with `meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.fieldfile import read_field
+from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.meshfile import read_mesh
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface, build_surface
+
+from .page import ROOT
+from .plane import PlanarField, points, singularity
+from .shapes import sphere, torus
+from .sheet import Panel, display, magnified, save, sheet
+from .solid import around_field, compose_view, smoothed, view
+
+IMAGES = ROOT / "docs" / "images"
+
+#: One sample a pixel, so that nothing is hidden.
+LOOK = Look(length=40, gain=2.5)
+#: The paper's noise and contrast, in which grain and breaking points show most.
+PLAIN = Look(length=40, gain=1.5, density=0.5, high_pass=0.0)
+
+METHODS = ("brute", "members", "sheets")
+SIDE, CLOSE = 400, 128
+
+
+def write() -> None:
+    """Draw and save what needs no files."""
+    _singularities()
+    ball, ring = sphere(), torus()
+    rows = [_planar_row(_pair, 4, "Singularities of index 1/4 and -1/4 in the plane, N = 4")]
+    rows += [
+        _surface_row(ball, axis_field(ball, 6, (0.3, 0.2, 1.0)), (20, 30), "A sphere, N = 6"),
+        _surface_row(ring, around_field(ring, 4), (24, 44), "A torus, N = 4"),
+    ]
+    save(sheet(rows), IMAGES / "performance-surfaces.png")
+
+
+def write_others(folder: Path) -> None:
+    """Draw and save the bunny and the vase."""
+    bunny = _upright(read_mesh(folder / "meshes" / "stanford-bunny.obj"))
+    vase = read_mesh(folder / "meshes" / "vase.off")
+    curved = smoothed(bunny, curvature_field(bunny, 4), 20)
+    rows = [
+        _surface_row(bunny, curved, (25, 12), "The Stanford bunny, N = 4"),
+        _surface_row(
+            vase,
+            read_field(folder / "fields" / "vase-4.rawfield", vase),
+            (-30, 35),
+            "A vase, N = 4",
+        ),
+    ]
+    save(sheet(rows), IMAGES / "performance-meshes.png")
+
+
+def _upright(surface: Surface) -> Surface:
+    """A surface whose y axis points up, standing."""
+    x, y, z = surface.vertices.T
+    points = np.stack([x, -z, y], axis=1)
+    return build_surface(points, surface.corner_vertex, surface.face_start, name=surface.name)
+
+
+def _singularities() -> None:
+    """Close to singularities, where the ways differ, twice as large."""
+    rows = []
+    for degree, index in ((3, 1), (4, 1), (4, -1), (6, -1)):
+        z = singularity(index)(points(SIDE))
+        panels = []
+        for method in METHODS:
+            look = PLAIN.with_settings({"method": method})
+            shown = display(compose_planar(np.angle(z) / degree, degree, look).rgba)
+            inner = slice((SIDE - CLOSE) // 2, (SIDE + CLOSE) // 2)
+            sign = "-" if index < 0 else ""
+            label = f"{method}, N = {degree}, index {sign}1/{degree}"
+            panels.append(Panel(magnified(shown[inner, inner], 2), label))
+        rows.append(panels)
+    save(sheet(rows), IMAGES / "performance-singularities.png")
+
+
+def _pair(p: np.ndarray) -> np.ndarray:
+    left, right = p + SIDE / 6, p - SIDE / 6
+    return left / np.abs(left) * (right / np.abs(right)).conj() * np.exp(0.6j)
+
+
+def _planar_row(field: PlanarField, degree: int, about: str) -> list[Panel]:
+    angles = np.angle(field(points(SIDE))) / degree
+    return [
+        Panel(
+            display(compose_planar(angles, degree, LOOK.with_settings({"method": method})).rgba),
+            f"{about}: {method}",
+        )
+        for method in ("brute", "sheets")
+    ]
+
+
+def _surface_row(
+    surface: Surface, field: RosyField, angles: tuple[float, float], about: str
+) -> list[Panel]:
+    camera = view(surface, angles, (SIDE, SIDE), 1)
+    panels = []
+    for method in ("brute", "sheets"):
+        look = LOOK.with_settings({"method": method})
+        shown = display(compose_view(surface, field, look, camera).rgba)
+        panels.append(Panel(shown, f"{about}: {method}"))
+    return panels
+
+
+if __name__ == "__main__":
+    write_others(Path(sys.argv[1]))

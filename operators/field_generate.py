@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 
-from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.generate import KINDS, generate
+from ..rosy_addon.field.generate import KINDS, generating
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
+from ..rosy_addon.progress import Work, part
 from ..rosy_addon.scene.meshes import mesh_surface
 from .meshes import can_change_fields, give_fields, selected_meshes
+from .ticking import Ticking
 
 
-class ROSY_OT_field_generate(bpy.types.Operator):
+class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
     """Make a field on the selected meshes, one direction and its rotations a face"""
 
     bl_idname = "rosy.field_generate"
@@ -48,21 +51,22 @@ class ROSY_OT_field_generate(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return can_change_fields(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        meshes = dict.fromkeys(thing.data for thing in selected_meshes(context))
-        axis = tuple(self.axis)
-        try:
-            made = {
-                mesh: generate(mesh_surface(mesh), self.kind, self.degree, axis=axis)
-                for mesh in meshes
-            }
-            give_fields(self, context, made, self.attribute)
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        faces = sum(len(field.vectors) for field in made.values())
-        self.report({"INFO"}, f"Made a field of degree {self.degree} on {faces:,} faces")
-        return {"FINISHED"}
+    def work(self, context: bpy.types.Context) -> Work[int]:
+        """Make all fields, then give them to the meshes; the number of faces comes back."""
+        meshes = list(self.needed(context))
+        surfaces = [mesh_surface(mesh) for mesh in meshes]
+        made = {}
+        for number, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
+            making = generating(surface, self.kind, self.degree, axis=tuple(self.axis))
+            made[mesh] = yield from part(making, number / len(meshes), (number + 1) / len(meshes))
+        give_fields(self, context, made, self.attribute)
+        return sum(len(field.vectors) for field in made.values())
+
+    def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return dict.fromkeys(thing.data for thing in selected_meshes(context))
+
+    def finish(self, context: bpy.types.Context, result: int) -> None:
+        self.report({"INFO"}, f"Made a field of degree {self.degree} on {result:,} faces")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -1,18 +1,21 @@
-"""Two plain generators, so that any mesh has a field at once."""
+"""Where a field can come from: the kinds of fields that are made, by name, and two plain ones."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..errors import RosyError
+from ..progress import Progress, Work, drain
 from .corners import corner_angles, corner_rotations, smooth_faces
 from .frames import dot
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
+from .smoothest import finding_smoothest
 from .surface import Surface, build_surface, sum_over_faces
 
 #: What can be generated, in the words a user meets.
 KINDS = {
+    "smoothest": "As smooth as can be, with as few singularities as the shape allows (any degree)",
     "curvature": "Along the principal directions of curvature (degree 2 and 4)",
     "axis": "Along a direction, projected to the surface",
 }
@@ -28,13 +31,35 @@ def generate(
     *,
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
 ) -> RosyField:
+    """Make the field of one of `KINDS`; see `generating`."""
+    return drain(generating(surface, kind, degree, axis=axis))
+
+
+def generating(
+    surface: Surface,
+    kind: str,
+    degree: int,
+    *,
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+) -> Work[RosyField]:
     """Make the field of one of `KINDS`.
+
+    Parameters
+    ----------
+    surface : Surface
+    kind : str
+    degree : int
+    axis : 3 floats
+        For the kind "axis" alone.
 
     Raises
     ------
     RosyError
-        If there is no such kind, or it does not make fields of this degree.
+        If there is no such kind, it does not make fields of this degree, or not on this surface.
     """
+    yield Progress(0.0, "making a field")
+    if kind == "smoothest":
+        return (yield from finding_smoothest(surface, degree))
     if kind == "axis":
         return axis_field(surface, degree, axis)
     if kind == "curvature":

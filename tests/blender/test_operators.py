@@ -15,7 +15,17 @@ def member_vectors(mesh, name="rosy"):
 
 
 @pytest.mark.parametrize(
-    ("kind", "degree"), [("curvature", 2), ("curvature", 4), ("axis", 1), ("axis", 6), ("axis", 12)]
+    ("kind", "degree"),
+    [
+        ("curvature", 2),
+        ("curvature", 4),
+        ("axis", 1),
+        ("axis", 6),
+        ("axis", 12),
+        ("smoothest", 1),
+        ("smoothest", 4),
+        ("smoothest", 7),
+    ],
 )
 def test_generate(suzanne, kind, degree):
     assert bpy.ops.rosy.field_generate(kind=kind, degree=degree) == {"FINISHED"}

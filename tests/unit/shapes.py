@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rosy_addon.field.surface import Surface, build_surface
 
@@ -23,8 +24,9 @@ def from_quads(vertices: np.ndarray, quads: np.ndarray, **more) -> Surface:
     return build_surface(vertices, quads.ravel(), np.arange(0, quads.size + 1, 4), **more)
 
 
-def from_triangles(vertices: np.ndarray, triangles: np.ndarray, **more) -> Surface:
+def from_triangles(vertices: ArrayLike, triangles: ArrayLike, **more) -> Surface:
     """A surface of triangles."""
+    triangles = np.asarray(triangles)
     return build_surface(vertices, triangles.ravel(), np.arange(0, triangles.size + 1, 3), **more)
 
 

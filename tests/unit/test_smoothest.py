@@ -1,0 +1,263 @@
+"""Smoothest fields: closed forms, SciPy's solvers, invariances, and meshes that nobody wants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+from scipy.sparse.linalg import eigsh, spsolve
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+from shapes import from_triangles, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.connection import connect, laplacian
+from rosy_addon.field.frames import dot
+from rosy_addon.field.meshfile import read_mesh
+from rosy_addon.field.representation import face_frames, to_representation
+from rosy_addon.field.singularities import euler_characteristic, singularities
+from rosy_addon.field.smoothest import smallest, smoothest_field
+from rosy_addon.field.sparse import cycle, from_entries, hierarchy, product
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import drain
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "meshes"
+
+
+def as_scipy(matrix):
+    shape = len(matrix), matrix.columns
+    return sparse.csr_matrix((matrix.value, matrix.column, matrix.start), shape=shape)
+
+
+def random_sphere(count, seed=1):
+    points = np.random.default_rng(seed).standard_normal((count, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    triangles = ConvexHull(points).simplices
+    a, b, c = points[triangles].swapaxes(0, 1)
+    inward = dot(np.cross(b - a, c - a), a) < 0
+    triangles[inward] = triangles[inward, ::-1]
+    return from_triangles(points, triangles)
+
+
+def bumpy(surface, amount=0.15):
+    """Without any symmetry, so that the smallest eigenvalue is a single one."""
+    x, y, z = surface.vertices.T
+    out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
+    points = surface.vertices * out[:, None] * (1.0, 1.2, 1.5)
+    return build_surface(points, surface.corner_vertex, surface.face_start)
+
+
+def angles_apart(surface, one, other, degree):
+    """(F,) radians between members of two arrays of vectors on the faces."""
+    x, y = face_frames(surface)
+    z, w = (to_representation(vectors, x, y, degree) for vectors in (one, other))
+    return np.abs(np.angle(z * w.conj())) / degree
+
+
+# --- matrices --------------------------------------------------------------------------------------
+
+
+def random_rows(rows, columns, seed):
+    random = np.random.default_rng(seed)
+    count = 4 * rows
+    row = np.concatenate([np.arange(rows), random.integers(rows, size=count)])
+    column = random.integers(columns, size=len(row))
+    value = random.standard_normal(len(row)) + 1j * random.standard_normal(len(row))
+    return from_entries(row, column, value, rows, columns)
+
+
+def test_products_of_sparse_matrices():
+    a, b = random_rows(60, 40, 0), random_rows(40, 25, 1)
+    dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
+    np.testing.assert_allclose(as_scipy(product(a, b)).toarray(), dense, atol=1e-12)
+    vector = np.arange(40) * (1 + 2j)
+    np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
+
+
+def test_the_adjoint():
+    a = random_rows(60, 20, 2)
+    np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
+
+
+@pytest.mark.parametrize("degree", [1, 4, 6])
+def test_cycles_of_multigrid_approach_the_solution(degree):
+    connection = connect(bumpy(icosphere(5)))
+    matrix = laplacian(connection, degree, 0.1)
+    levels = drain(hierarchy(matrix))
+    assert len(levels) > 2
+    right = np.random.default_rng(0).standard_normal(len(matrix)) + 0j
+    expected = spsolve(as_scipy(matrix).tocsc(), right)
+    found = np.zeros_like(right)
+    errors = []
+    for _ in range(12):
+        found += cycle(levels, right - matrix @ found)
+        errors.append(np.linalg.norm(found - expected))
+    assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
+
+
+# --- the connection --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 4, 7])
+def test_a_constant_direction_in_the_plane_costs_nothing(degree):
+    surface = plane(6)
+    random = np.random.default_rng(3)
+    inside = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
+    moved = surface.vertices + inside[:, None] * (0.05, 0.05, 0) * random.standard_normal((1, 3))
+    surface = build_surface(moved, surface.corner_vertex, surface.face_start)
+    connection = connect(surface)
+    edge = np.roll(surface.vertices[surface.triangle_vertex], -1, axis=1)
+    edge = (edge - surface.vertices[surface.triangle_vertex]).reshape(-1, 3)
+    # In the map of a node the x axis lies as far from an edge as it does in the plane.
+    angle = connection.along - np.arctan2(edge[:, 1], edge[:, 0])
+    z = np.empty(connection.count, dtype=complex)
+    z[connection.node] = np.exp(1j * degree * angle)
+    np.testing.assert_allclose(z[connection.node], np.exp(1j * degree * angle), atol=1e-9)
+    np.testing.assert_allclose(laplacian(connection, degree) @ z, 0, atol=1e-9)
+
+
+def test_vertices_where_umbrellas_meet_are_cut():
+    bowtie = from_triangles(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]]
+    )
+    assert connect(bowtie).count == 6
+
+
+# --- fields ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_energies_on_the_unit_sphere():
+    """The smallest eigenvalue on the round sphere is N."""
+    connection = connect(random_sphere(25_000))
+    for degree in (1, 2, 4, 6):
+        _, energy = drain(smallest(connection, degree))
+        assert energy == pytest.approx(degree, rel=0.01)
+
+
+def shapes_with_one_answer():
+    yield "ball", bumpy(icosphere(4))
+    yield "torus", bumpy(torus(60, 30))
+    for name in ("spot.obj", "vase.off", "dome.off", "cheburashka.off", "stanford-bunny.obj"):
+        if (DATA / name).exists():
+            yield name, read_mesh(DATA / name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [1, 4])
+def test_the_eigenvector_is_that_of_scipy(degree):
+    for name, surface in shapes_with_one_answer():
+        connection = connect(surface)
+        z, energy = drain(smallest(connection, degree))
+        below = -1e-6 / connection.mass.sum()
+        found, vectors = eigsh(
+            as_scipy(laplacian(connection, degree)),
+            k=2,
+            M=sparse.diags(connection.mass),
+            sigma=below,
+        )
+        assert energy[0] == pytest.approx(found[0], rel=1e-4), name
+        if found[1] > 1.03 * found[0]:
+            overlap = np.abs(np.vdot(vectors[:, 0], connection.mass * z))
+            assert overlap / np.sqrt(connection.mass @ np.abs(z) ** 2) > 1 - 1e-5, name
+
+
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_indices_add_up_to_the_euler_characteristic(degree):
+    for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
+        _, index = singularities(surface, smoothest_field(surface, degree))
+        assert index.sum() == degree * euler_characteristic(surface)
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_a_sphere_has_no_more_singularities_than_it_must(degree):
+    _, index = singularities(icosphere(4), smoothest_field(icosphere(4), degree))
+    assert (index == 1).all()
+    assert len(index) == 2 * degree
+
+
+@pytest.mark.parametrize("degree", [2, 4, 5])
+def test_the_field_does_not_depend_on_numbers_or_place(degree):
+    surface = bumpy(icosphere(3))
+    expected = smoothest_field(surface, degree).vectors
+    triangles = surface.corner_vertex.reshape(-1, 3)
+
+    order = np.random.default_rng(5).permutation(len(surface.vertices))
+    place = np.argsort(order)
+    renumbered = from_triangles(surface.vertices[order], place[triangles])
+    found = smoothest_field(renumbered, degree).vectors
+    assert angles_apart(surface, found, expected, degree).max() < 0.02
+
+    turned = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
+    found = smoothest_field(turned, degree).vectors
+    assert angles_apart(surface, found, expected, degree).max() < 0.02
+
+    rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+    moved = from_triangles(3 * surface.vertices @ rotation.T + (1, 2, 3), triangles)
+    found = smoothest_field(moved, degree).vectors @ rotation
+    assert angles_apart(surface, found, expected, degree).max() < 0.02
+
+
+def test_each_piece_has_its_own():
+    one, other = bumpy(icosphere(3)), bumpy(torus(24, 12))
+    points = np.concatenate([one.vertices, 0.3 * other.vertices + 5])
+    corners = np.concatenate([one.corner_vertex, other.corner_vertex + len(one.vertices)])
+    starts = np.concatenate([one.face_start, other.face_start[1:] + one.face_start[-1]])
+    both = connect(build_surface(points, corners, starts))
+    _, energy = drain(smallest(both, 4))
+    alone = [drain(smallest(connect(surface), 4))[1][0] for surface in (one, other)]
+    np.testing.assert_allclose(energy, [alone[0], alone[1] / 0.09], rtol=1e-4)
+
+
+def cube():
+    points = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
+    return build_surface(points, quads, range(0, 25, 4), name="cube")
+
+
+def moebius(count=24):
+    angle = np.repeat(np.arange(count) * (2 * np.pi / count), 2)
+    out = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
+    up = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
+    points = np.stack([out * np.cos(angle), out * np.sin(angle), up], axis=1)
+    triangles = []
+    for step in range(count):
+        a, b = 2 * step, 2 * step + 1
+        c, d = (a + 2, b + 2) if step < count - 1 else (1, 0)
+        triangles += [[a, c, b], [b, c, d]]
+    return from_triangles(points, triangles)
+
+
+def with_faces_without_area(count=1000):
+    ball = icosphere(2)
+    points = np.concatenate([ball.vertices, np.zeros((3, 3))])
+    flat = np.tile(len(ball.vertices) + np.arange(3), (count, 1))
+    return from_triangles(points, np.concatenate([ball.corner_vertex.reshape(-1, 3), flat]))
+
+
+def fan():
+    points = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0.5, 0], [-1, -0.5, 0]]
+    return from_triangles(points, [[0, 1, 2], [0, 1, 3], [1, 0, 4]])
+
+
+def triangle():
+    return from_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+@pytest.mark.parametrize("degree", [1, 3, 4, 12])
+@pytest.mark.parametrize("make", [cube, moebius, with_faces_without_area, fan, triangle, plane])
+def test_meshes_that_are_not_closed_smooth_manifolds(make, degree):
+    surface = make()
+    field = smoothest_field(surface, degree)
+    length = np.linalg.norm(field.vectors, axis=1)
+    has_area = surface.face_normal.any(axis=1)
+    np.testing.assert_allclose(length, has_area, atol=1e-6)
+    assert np.abs(dot(field.vectors, surface.face_normal)).max() < 1e-6
+
+
+def test_no_area_at_all_is_an_error():
+    flat = from_triangles([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+    with pytest.raises(RosyError, match="no face has an area"):
+        smoothest_field(flat, 4)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import pi
 
 import bpy
 
-from ..rosy_addon.field.generate import KINDS, generating
+from ..rosy_addon.field.generate import KINDS, Recipe, generating
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Work, part
-from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.scene.meshes import MARKS, marked_edges, mesh_surface
+from ..rosy_addon.ui.generators import settings_of_kind
 from .meshes import can_change_fields, give_fields, selected_meshes
 from .ticking import Ticking
 
@@ -35,6 +37,33 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         max=MAX_DEGREE,
         default=4,
     )
+    reach: bpy.props.FloatProperty(
+        name="Reach",
+        description="How far clearly curved parts reach into those that are hardly curved, as a "
+        "share of the size of the mesh; at 0 every face has its own curvature's directions",
+        min=0.0,
+        max=10.0,
+        soft_max=0.2,
+        precision=3,
+        step=1,
+        default=0.0,
+    )
+    edges: bpy.props.EnumProperty(
+        name="Edges",
+        description="Which edges the field runs along",
+        items=[
+            ("FEATURES", "Borders and Sharp Angles", "Found by the shape of the mesh"),
+            *((mark, name, text) for mark, (_, name, text) in MARKS.items()),
+        ],
+    )
+    sharp_angle: bpy.props.FloatProperty(
+        name="Sharp Angle",
+        description="By how much the surface bends at a sharp edge, at least",
+        subtype="ANGLE",
+        min=0.0,
+        max=pi,
+        default=pi / 6,
+    )
     axis: bpy.props.FloatVectorProperty(
         name="Axis",
         description="Direction in the object's own space that is projected to the surface",
@@ -57,10 +86,15 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         surfaces = [mesh_surface(mesh) for mesh in meshes]
         made = {}
         for number, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
-            making = generating(surface, self.kind, self.degree, axis=tuple(self.axis))
+            making = generating(surface, self._recipe(mesh), self.degree)
             made[mesh] = yield from part(making, number / len(meshes), (number + 1) / len(meshes))
         give_fields(self, context, made, self.attribute)
         return sum(len(field.vectors) for field in made.values())
+
+    def _recipe(self, mesh: bpy.types.Mesh) -> Recipe:
+        marked = self.kind == "features" and self.edges != "FEATURES"
+        edges = marked_edges(mesh, self.edges) if marked else None
+        return Recipe(self.kind, tuple(self.axis), self.reach, self.sharp_angle, edges)
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(thing.data for thing in selected_meshes(context))
@@ -74,8 +108,8 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         layout.use_property_decorate = False
         layout.prop(self, "kind")
         layout.prop(self, "degree")
-        if self.kind == "axis":
-            layout.prop(self, "axis")
+        for name in settings_of_kind(self.kind):
+            layout.prop(self, name)
         layout.prop(self, "attribute")
 
 

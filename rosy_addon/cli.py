@@ -22,7 +22,7 @@ from .compositor.png import write_png
 from .compositor.presets import load_preset, preset_names
 from .errors import RosyError
 from .field.fieldfile import read_field, write_field
-from .field.generate import KINDS, generate
+from .field.generate import KINDS, Recipe, generate
 from .field.meshfile import read_mesh
 from .field.rosy_field import RosyField, check_degree
 from .field.singularities import euler_characteristic, singularities
@@ -184,7 +184,8 @@ def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
         return surface, read_field(options.field, surface, options.degree, undefined)
     degree = 4 if options.degree is None else options.degree
     kind = options.generate or ("curvature" if degree in (2, 4) else "axis")
-    return surface, generate(surface, kind, degree, axis=options.axis)
+    recipe = Recipe(kind, options.axis, options.reach, np.radians(options.sharp_angle))
+    return surface, generate(surface, recipe, degree)
 
 
 def _look(options: argparse.Namespace, default: Look) -> Look:
@@ -324,6 +325,20 @@ def _add_mesh(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--axis", type=_numbers(3, "X,Y,Z"), default=(0.0, 0.0, 1.0), metavar="X,Y,Z")
     verb.add_argument(
+        "--reach",
+        type=_number(0.0, 10.0),
+        default=0.0,
+        metavar="SHARE",
+        help="of the size of the mesh: how far curvature reaches into parts that are hardly curved",
+    )
+    verb.add_argument(
+        "--sharp-angle",
+        type=_number(0.0, 180.0),
+        default=30.0,
+        metavar="DEGREES",
+        help="by which the surface bends at a sharp edge, for --generate features (%(default)g)",
+    )
+    verb.add_argument(
         "--undefined", action="store_true", help="take NaN and infinite vectors for undefined"
     )
 
@@ -357,6 +372,19 @@ def _numbers(count: int, form: str) -> Callable[[str], tuple[float, ...]]:
         if len(values) != count:
             raise argparse.ArgumentTypeError(f"{text!r} is not {form}")
         return values
+
+    return convert
+
+
+def _number(low: float, high: float) -> Callable[[str], float]:
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {low:g} to {high:g}")
+        return value
 
     return convert
 

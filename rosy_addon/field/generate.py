@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..errors import RosyError
 from ..progress import Progress, Work, drain
 from .corners import corner_angles, corner_rotations, smooth_faces
-from .frames import dot
+from .frames import dot, unit
+from .guided import finding_guided
+from .guides import along_edges, feature_edges
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import finding_smoothest
@@ -15,8 +19,9 @@ from .surface import Surface, build_surface, sum_over_faces
 
 #: What can be generated, in the words a user meets.
 KINDS = {
-    "smoothest": "As smooth as can be, with as few singularities as the shape allows (any degree)",
-    "curvature": "Along the principal directions of curvature (degree 2 and 4)",
+    "smoothest": "As smooth as can be, with as few singularities as the shape allows",
+    "curvature": "Along the principal directions of curvature (even degrees)",
+    "features": "Along borders and sharp edges, and smooth between them",
     "axis": "Along a direction, projected to the surface",
 }
 
@@ -24,47 +29,79 @@ KINDS = {
 SMOOTHING = 2
 
 
-def generate(
-    surface: Surface,
-    kind: str,
-    degree: int,
-    *,
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
-) -> RosyField:
-    """Make the field of one of `KINDS`; see `generating`."""
-    return drain(generating(surface, kind, degree, axis=axis))
+@dataclass(frozen=True)
+class Recipe:
+    """How a field is made.
+
+    Attributes
+    ----------
+    kind : str
+        One of `KINDS`.
+    axis : 3 floats
+        Of the kind "axis": object space.
+    reach : float
+        Of the kind "curvature": how far, as a share of the surface's size, clearly curved parts
+        reach into those that are not; 0 leaves every face what its own curvature says.
+    sharp_angle : float
+        Of the kind "features": radians by which the surface bends at a sharp edge, at least.
+    edges : (E, 2) int ndarray or None
+        Of the kind "features": which edges to follow, instead of borders and sharp ones.
+    """
+
+    kind: str
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    reach: float = 0.0
+    sharp_angle: float = np.pi / 6
+    edges: np.ndarray | None = None
 
 
-def generating(
-    surface: Surface,
-    kind: str,
-    degree: int,
-    *,
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
-) -> Work[RosyField]:
-    """Make the field of one of `KINDS`.
+def generate(surface: Surface, recipe: Recipe | str, degree: int) -> RosyField:
+    """Make a field; see `generating`."""
+    return drain(generating(surface, recipe, degree))
+
+
+def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[RosyField]:
+    """Make a field.
 
     Parameters
     ----------
     surface : Surface
-    kind : str
+    recipe : Recipe or str
+        A kind alone is a recipe with nothing else changed.
     degree : int
-    axis : 3 floats
-        For the kind "axis" alone.
 
     Raises
     ------
     RosyError
         If there is no such kind, it does not make fields of this degree, or not on this surface.
     """
+    recipe = Recipe(recipe) if isinstance(recipe, str) else recipe
     yield Progress(0.0, "making a field")
-    if kind == "smoothest":
+    if recipe.kind == "smoothest":
         return (yield from finding_smoothest(surface, degree))
-    if kind == "axis":
-        return axis_field(surface, degree, axis)
-    if kind == "curvature":
-        return curvature_field(surface, degree)
-    raise RosyError(f"no generator is named '{kind}'; there are {', '.join(KINDS)}")
+    if recipe.kind == "axis":
+        return axis_field(surface, degree, recipe.axis)
+    if recipe.kind == "curvature":
+        field = curvature_field(surface, degree)
+        if not recipe.reach:
+            return field
+        size = np.ptp(surface.vertices, axis=0).max()
+        weight = (field.magnitude / (recipe.reach * size)) ** 2
+        return (yield from finding_guided(surface, degree, unit(field.vectors), weight))
+    if recipe.kind == "features":
+        return (yield from _following_features(surface, recipe, degree))
+    raise RosyError(f"no generator is named '{recipe.kind}'; there are {', '.join(KINDS)}")
+
+
+def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[RosyField]:
+    degree = check_degree(degree)
+    ends = recipe.edges
+    if ends is None:
+        ends = feature_edges(surface, recipe.sharp_angle)
+    guides = along_edges(surface, ends, degree)
+    if not guides.any():
+        raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
+    return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
 
 
 def axis_field(
@@ -102,7 +139,9 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     """Members along the principal directions of curvature.
 
     Degree 2 follows the direction in which the surface bends most toward its inside (the greater
-    signed curvature), degree 4 both principal directions.
+    signed curvature), degree 4 both principal directions. Of other even degrees one member follows
+    the former: of degree 6 it is one of three lines. A principal direction has no head, so there is
+    none of an odd degree.
 
     The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``: 0 at umbilics
     and in planes, where there is no principal direction, 1 on cylinders and saddles. k0, a
@@ -112,7 +151,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     Raises
     ------
     RosyError
-        If the degree is neither 2 nor 4.
+        If the degree is odd.
 
     References
     ----------
@@ -121,8 +160,8 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     here for polygons; representations are then averaged over the vertices.
     """
     degree = check_degree(degree)
-    if degree not in (2, 4):
-        raise RosyError(f"a curvature field has degree 2 or 4, not {degree}")
+    if degree % 2:
+        raise RosyError(f"a curvature field has an even degree, not {degree}")
     # Shading does not matter here: a mesh shown flat or with sharp edges bends all the same.
     whole = build_surface(
         surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name

@@ -208,20 +208,33 @@ def vectors_on_faces(
 ) -> np.ndarray:
     """(F, 3) unit members on the faces of values at the nodes."""
     x, y = face_frames(surface)
+    turn = corner_turns(surface, connection, x, y)
+    mean = sum_on_faces(surface, connection, z, turn, degree)
+    size = np.abs(mean)
+    mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
+    return from_representation(mean, x, y, degree)
+
+
+def corner_turns(
+    surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """(3 T,) radians from the map of each corner's node to the frame x, y of its face.
+
+    The middle of a corner is the same direction in both.
+    """
     face = surface.triangle_face
-    corner = surface.triangle_vertex
-    points = surface.vertices[corner]
+    points = surface.vertices[surface.triangle_vertex]
     edge = np.roll(points, -1, axis=1) - points
     first = np.arctan2(dot(edge, y[face][:, None]), dot(edge, x[face][:, None])).ravel()
-    # The middle of a corner is the same direction on the face and in the map of the node.
-    turn = first + 0.5 * connection.opening - connection.middle
+    return first + 0.5 * connection.opening - connection.middle
+
+
+def sum_on_faces(
+    surface: Surface, connection: Connection, z: np.ndarray, turn: np.ndarray, degree: int
+) -> np.ndarray:
+    """(F,) complex: values at the corners of each face, summed with the areas of triangles."""
     on_corner = z[connection.node] * np.exp(1j * degree * turn)
-    weight = np.repeat(connection.area, 3)
-    owner = np.repeat(face, 3)
-    count = surface.face_count
-    total = np.bincount(owner, weight * on_corner.real, count) + 1j * np.bincount(
-        owner, weight * on_corner.imag, count
-    )
-    size = np.abs(total)
-    total = np.divide(total, size, out=np.zeros_like(total), where=size > 0)
-    return from_representation(total, x, y, degree)
+    on_corner *= np.repeat(connection.area, 3)
+    owner, count = np.repeat(surface.triangle_face, 3), surface.face_count
+    real = np.bincount(owner, on_corner.real, count)
+    return real + 1j * np.bincount(owner, on_corner.imag, count)

@@ -9,6 +9,13 @@ from ..errors import RosyError
 from ..field.surface import Surface, build_surface
 from ..reuse import Kept, digest
 
+#: What edges may be marked as: the property, its name, and what it does.
+MARKS = {
+    "SELECTED": ("select", "Selected", "Those that are selected in edit mode"),
+    "SHARP": ("use_edge_sharp", "Marked Sharp", "Those that are marked sharp"),
+    "SEAM": ("use_seam", "Seams", "Those that are marked as seams of a UV map"),
+}
+
 #: Attribute that Blender writes for objects with `add_rest_position_attribute`.
 REST = "rest_position"
 
@@ -68,6 +75,22 @@ def mesh_surface(
         return build()
     # Triangles are slow to read, and follow from the rest.
     return kept.find_or_make(("surface", digest(*parts.values())), build)
+
+
+def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
+    """(E, 2) int32: the vertices of the edges that have one of `MARKS`.
+
+    Raises
+    ------
+    RosyError
+        If there are none.
+    """
+    attribute, name, _ = MARKS[mark]
+    chosen = np.empty(len(mesh.edges), dtype=bool)
+    mesh.edges.foreach_get(attribute, chosen)
+    if not chosen.any():
+        raise RosyError(f"{mesh.name}: no edge is marked: {name}")
+    return _quickly(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[chosen]
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:

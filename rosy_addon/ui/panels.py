@@ -13,6 +13,7 @@ from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
 from . import status
+from .generators import settings_of_kind
 
 #: Settings of a look, in the groups in which a user looks for them.
 GROUPS = {
@@ -105,14 +106,14 @@ def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     column = layout.column()
     column.prop(settings, "kind")
     column.prop(settings, "degree")
-    if settings.kind == "axis":
-        column.prop(settings, "axis")
+    for name in settings_of_kind(settings.kind):
+        column.prop(settings, name)
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.field_generate", icon="FORCE_VORTEX")
-    if settings.kind == "curvature" and settings.degree not in (2, 4):
+    if settings.kind == "curvature" and settings.degree % 2:
         row.enabled = False
-        layout.label(text="Curvature: degree 2 or 4 only", icon="ERROR")
+        layout.label(text="Curvature: even degrees only", icon="ERROR")
 
 
 def _draw_picture(

@@ -25,6 +25,7 @@ def member_vectors(mesh, name="rosy"):
         ("smoothest", 1),
         ("smoothest", 4),
         ("smoothest", 7),
+        ("features", 4),
     ],
 )
 def test_generate(suzanne, kind, degree):

@@ -6,6 +6,8 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.field.generate import Recipe, generate
 from rosy.rosy_addon.field.representation import face_frames, face_representation
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.projection.project import project
@@ -13,7 +15,7 @@ from rosy.rosy_addon.scene.attributes import has_field, read_mesh_field, write_m
 from rosy.rosy_addon.scene.bodies import STAND_IN, read_bodies, rosy_objects
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.lights import read_lights
-from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.meshes import MARKS, marked_edges, mesh_surface
 from scenes import (
     add_field,
     add_mesh,
@@ -372,3 +374,23 @@ def test_triangles_are_those_of_blender(monkey, shape):
     np.testing.assert_array_equal(surface.triangles, [list(t.loops) for t in mesh.loop_triangles])
     face = [triangle.polygon_index for triangle in mesh.loop_triangles]
     np.testing.assert_array_equal(surface.triangle_face, face)
+
+
+@pytest.mark.parametrize("mark", ["SELECTED", "SHARP", "SEAM"])
+def test_marked_edges(scene, mark):
+    mesh = add_plane(cuts=4).data
+    for edge in mesh.edges:
+        edge.select = edge.use_edge_sharp = edge.use_seam = False
+    with pytest.raises(RosyError, match="no edge is marked"):
+        marked_edges(mesh, mark)
+    for number in (3, 7):
+        setattr(mesh.edges[number], MARKS[mark][0], True)
+    found = marked_edges(mesh, mark)
+    np.testing.assert_array_equal(found, [list(mesh.edges[number].vertices) for number in (3, 7)])
+    surface = mesh_surface(mesh)
+    field = generate(surface, Recipe("features", edges=found), 2)
+    along = surface.vertices[found[:, 1]] - surface.vertices[found[:, 0]]
+    on = [np.isin(surface.corner_vertex.reshape(-1, 4), ends).sum(axis=1) == 2 for ends in found]
+    for direction, faces in zip(along, on, strict=True):
+        cosine = field.vectors[faces] @ direction / np.linalg.norm(direction)
+        np.testing.assert_allclose(np.abs(cosine), 1, atol=1e-6)

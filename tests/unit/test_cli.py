@@ -169,7 +169,7 @@ REFUSED = {
     "degree 1000": (["info", "{mesh}", "--degree", "1000"], "degree 1000 is not"),
     "curvature 3": (
         ["info", "{mesh}", "--degree", "3", "--generate", "curvature"],
-        "2 or 4, not 3",
+        "even degree, not 3",
     ),
     "axis": (["info", "{mesh}", "--generate", "axis", "--axis", "0,0,0"], "not a direction"),
     "both": (["info", "{mesh}", "a.rosy", "--generate", "axis"], "not both"),

@@ -226,8 +226,8 @@ def test_an_axis_without_a_direction_is_refused(axis):
 
 
 def test_generators_are_refused_by_name():
-    with pytest.raises(RosyError, match="degree 2 or 4, not 6"):
-        generate(plane(), "curvature", 6)
+    with pytest.raises(RosyError, match="even degree, not 3"):
+        generate(plane(), "curvature", 3)
     with pytest.raises(RosyError, match="magic"):
         generate(plane(), "magic", 4)
 

@@ -21,7 +21,16 @@ from bench.table1 import quick  # noqa: E402
 from bench.timing import RUNS, machine, write  # noqa: E402
 
 #: In the order in which they are run.
-SCRIPTS = ("table1", "scaling", "stages", "planar_rlic", "surface_vtk", "again", "memory")
+SCRIPTS = (
+    "table1",
+    "scaling",
+    "stages",
+    "planar_rlic",
+    "surface_vtk",
+    "again",
+    "memory",
+    "fields",
+)
 
 #: Runs of each way with --quick: a minute in all.
 QUICK_RUNS = 3

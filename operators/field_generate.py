@@ -11,7 +11,7 @@ from ..rosy_addon.field.generate import KINDS, Recipe, generating
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Work, part
 from ..rosy_addon.scene.meshes import MARKS, marked_edges, mesh_surface
-from ..rosy_addon.ui.generators import settings_of_kind
+from ..rosy_addon.ui.generators import settings_of_generator
 from .meshes import can_change_fields, give_fields, selected_meshes
 from .ticking import Ticking
 
@@ -52,7 +52,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         name="Edges",
         description="Which edges the field runs along",
         items=[
-            ("FEATURES", "Borders and Sharp Angles", "Found by the shape of the mesh"),
+            ("FEATURES", "By Angle", "Borders, and where the surface bends sharply"),
             *((mark, name, text) for mark, (_, name, text) in MARKS.items()),
         ],
     )
@@ -108,7 +108,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         layout.use_property_decorate = False
         layout.prop(self, "kind")
         layout.prop(self, "degree")
-        for name in settings_of_kind(self.kind):
+        for name in settings_of_generator(self):
             layout.prop(self, name)
         layout.prop(self, "attribute")
 

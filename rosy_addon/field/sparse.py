@@ -7,6 +7,7 @@ along a tree within it, and is smoothed: smoothed aggregation (Vanek, Mandel and
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -75,23 +76,57 @@ def from_entries(
     row: np.ndarray, column: np.ndarray, value: np.ndarray, rows: int, columns: int
 ) -> Rows:
     """A matrix of entries in any order; those at one place are added up. No row may be empty."""
-    key = row * columns + column
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
-    row, column = np.divmod(key[first], columns)
-    start = np.searchsorted(row, np.arange(rows + 1))
-    return Rows(start, column, np.add.reduceat(value[order], first), columns)
+    key, value = _added_up(row * columns + column, value)
+    row, column = np.divmod(key, columns)
+    return Rows(np.searchsorted(row, np.arange(rows + 1)), column, value, columns)
 
 
 def product(a: Rows, b: Rows) -> Rows:
     """a b."""
-    count = np.diff(b.start).take(a.column)
-    entry = np.repeat(np.arange(len(a.column)), count)
-    within = np.arange(len(entry)) - np.repeat(np.cumsum(count) - count, count)
-    there = b.start.take(a.column).take(entry) + within
-    value = a.value.take(entry) * b.value.take(there)
-    return from_entries(a.row.take(entry), b.column.take(there), value, len(a), b.columns)
+    return _by_rows(a, b.columns, lambda part: _product_entries(a, b, part))
+
+
+def _product_entries(a: Rows, b: Rows, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and values of what some entries of `a` add to a product."""
+    through = a.column[part]
+    first = b.start.take(through)
+    count = b.start.take(through + 1) - first
+    entry = np.repeat(np.arange(len(through)), count)
+    first -= np.cumsum(count) - count
+    there = first.take(entry)
+    there += np.arange(len(entry))
+    value = a.value[part].take(entry)
+    value *= b.value.take(there)
+    return a.row[part].take(entry), b.column.take(there), value
+
+
+def _by_rows(
+    matrix: Rows,
+    columns: int,
+    entries: Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]],
+) -> Rows:
+    """A matrix of as many rows, whose entries come from those of some rows at a time.
+
+    Sorting them stays in a core's cache.
+    """
+    keys, values = [], []
+    for first in range(0, len(matrix), BLOCK):
+        last = min(first + BLOCK, len(matrix))
+        row, column, value = entries(slice(matrix.start[first], matrix.start[last]))
+        key, value = _added_up(row * columns + column, value)
+        keys.append(key)
+        values.append(value)
+    row, column = np.divmod(np.concatenate(keys), columns)
+    start = np.searchsorted(row, np.arange(len(matrix) + 1))
+    return Rows(start, column, np.concatenate(values), columns)
+
+
+def _added_up(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Keys in ascending order, each once, and the sums of their values."""
+    order = np.argsort(key, kind="stable")
+    key = key.take(order)
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
+    return key.take(first), np.add.reduceat(value.take(order), first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +191,20 @@ def _smoothed(
     matrix: Rows, weight: np.ndarray, aggregate: np.ndarray, count: int, phase: np.ndarray
 ) -> Rows:
     """Aggregates as columns, after a Jacobi step toward what the matrix calls smooth."""
-    plain = Rows(np.arange(len(matrix) + 1), aggregate, phase, count)
-    change = product(matrix, plain)
-    row = np.concatenate([plain.row, change.row])
-    column = np.concatenate([plain.column, change.column])
-    value = np.concatenate([plain.value, -weight.take(change.row) * change.value])
-    return from_entries(row, column, value, len(matrix), count)
+    own = np.arange(len(matrix))
+
+    def entries(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        row, column = matrix.row[part], matrix.column[part]
+        value = matrix.value[part] * phase.take(column)
+        value *= -weight.take(row)
+        here = own[row[0] : row[-1] + 1]
+        return (
+            np.concatenate([row, here]),
+            np.concatenate([aggregate.take(column), aggregate.take(here)]),
+            np.concatenate([value, phase.take(here)]),
+        )
+
+    return _by_rows(matrix, count, entries)
 
 
 def _aggregates(matrix: Rows) -> tuple[np.ndarray, int, np.ndarray]:

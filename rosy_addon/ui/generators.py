@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-_SETTINGS = {
-    "axis": ("axis",),
-    "curvature": ("reach",),
-    "features": ("edges", "sharp_angle"),
-}
+from typing import Any
+
+_SETTINGS = {"axis": ("axis",), "curvature": ("reach",), "features": ("edges", "sharp_angle")}
 
 
-def settings_of_kind(kind: str) -> tuple[str, ...]:
-    """Names of the operator's properties that a kind of field depends on."""
-    return _SETTINGS.get(kind, ())
+def settings_of_generator(chosen: Any) -> tuple[str, ...]:
+    """Names of the settings that what has been chosen depends on.
+
+    Parameters
+    ----------
+    chosen : bpy.types.OperatorProperties or operator
+        Of ``rosy.field_generate``.
+    """
+    names = _SETTINGS.get(chosen.kind, ())
+    if "edges" in names and chosen.edges != "FEATURES":
+        return ("edges",)
+    return names

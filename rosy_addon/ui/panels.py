@@ -13,7 +13,7 @@ from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
 from . import status
-from .generators import settings_of_kind
+from .generators import settings_of_generator
 
 #: Settings of a look, in the groups in which a user looks for them.
 GROUPS = {
@@ -106,7 +106,7 @@ def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     column = layout.column()
     column.prop(settings, "kind")
     column.prop(settings, "degree")
-    for name in settings_of_kind(settings.kind):
+    for name in settings_of_generator(settings):
         column.prop(settings, name)
     row = layout.row()
     row.scale_y = 1.5

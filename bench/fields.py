@@ -1,0 +1,70 @@
+"""The smoothest field by multigrid in numpy over SciPy's sparse LU, and how its time grows."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+
+from rosy_addon.field.connection import Connection, connect, laplacian
+from rosy_addon.field.smoothest import smallest, smoothest_field
+from rosy_addon.field.sparse import Rows
+from rosy_addon.progress import drain
+
+from . import cases
+from .timing import Case, compare, main
+
+DEGREE = 4
+
+#: Steps of inverse iteration: so many bring the energy within a thousandth.
+ITERATIONS = 20
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """Both ratios; both ways start from the same connection of the mesh."""
+    try:
+        import scipy.sparse.linalg
+    except ImportError:
+        print("SciPy's LU: left out, there is no scipy here", file=sys.stderr)
+        return
+    connection = connect(cases.ball(200_000))
+    matrix = laplacian(connection, DEGREE)
+
+    def theirs() -> None:
+        shifted = _csc(matrix, connection)
+        inverse = scipy.sparse.linalg.splu(shifted)
+        z = np.random.default_rng(0).standard_normal(connection.count).astype(complex)
+        for _ in range(ITERATIONS):
+            z = inverse.solve(connection.mass * z)
+            z /= np.sqrt(connection.mass @ np.abs(z) ** 2)
+
+    yield compare(
+        f"smoothest field / SciPy's LU and {ITERATIONS} iterations, 200K triangles, N = {DEGREE}",
+        lambda: drain(smallest(connection, DEGREE)),
+        theirs,
+        target=1.5,
+        higher_is_better=False,
+        runs=runs,
+    )
+    yield compare(
+        f"smoothest field, 800K / 200K triangles, N = {DEGREE}",
+        lambda: smoothest_field(cases.ball(800_000), DEGREE),
+        lambda: smoothest_field(cases.ball(200_000), DEGREE),
+        target=5.0,
+        higher_is_better=False,
+        runs=runs,
+    )
+
+
+def _csc(matrix: Rows, connection: Connection) -> object:
+    """For SciPy, positive definite."""
+    import scipy.sparse
+
+    shape = len(matrix), matrix.columns
+    whole = scipy.sparse.csr_matrix((matrix.value, matrix.column, matrix.start), shape)
+    return (whole + 1e-8 * scipy.sparse.diags(connection.mass)).tocsc()
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

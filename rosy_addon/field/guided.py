@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
+from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
 from .connection import Connection, connect, laplacian
 from .representation import face_frames, from_representation, to_representation
@@ -72,6 +73,7 @@ def finding_guided(
         If there is no guide on any face with an area.
     """
     degree = check_degree(degree)
+    keep_freed_memory()
     yield Progress(0.0, "connecting the vertices")
     x, y = face_frames(surface)
     wish = to_representation(np.asarray(guides, dtype=np.float64), x, y, degree)

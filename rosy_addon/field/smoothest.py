@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
+from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
 from .connection import Connection, connect, laplacian
 from .frames import dot
@@ -20,6 +21,9 @@ from .surface import Surface
 #: Change of the eigenvector, as a sine, at which it counts as found.
 FOUND = 1e-4
 MOST_ROUNDS = 200
+
+#: Rounds on coarser levels, which save some on the finest.
+COARSE_ROUNDS = 12
 
 #: Of the matrix that multigrid inverts, in eigenvalues of a sphere of the same area.
 SHIFT = 0.02
@@ -54,6 +58,7 @@ def finding_smoothest(surface: Surface, degree: int) -> Work[RosyField]:
         If no face has an area.
     """
     degree = check_degree(degree)
+    keep_freed_memory()
     yield Progress(0.0, "connecting the vertices")
     connection = connect(surface)
     if not connection.mass.any():
@@ -92,7 +97,7 @@ def smallest(connection: Connection, degree: int) -> Work[tuple[np.ndarray, np.n
     z = random.standard_normal(count) + 1j * random.standard_normal(count)
     for number in reversed(range(len(levels))):
         last = number == 0
-        rounds = MOST_ROUNDS if last or number == len(levels) - 1 else 4
+        rounds = MOST_ROUNDS if last or number == len(levels) - 1 else COARSE_ROUNDS
         descent = _descend(levels[number:], masses[number], pieces[number], z, rounds)
         z, energy = yield from part(descent, 0.4 if number else 0.5, 0.5 if number else 1.0)
         if not last:

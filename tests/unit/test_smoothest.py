@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sparse
+from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import eigsh, spsolve
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -41,11 +42,11 @@ def random_sphere(count, seed=1):
     return from_triangles(points, triangles)
 
 
-def bumpy(surface, amount=0.15):
+def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
     """Without any symmetry, so that the smallest eigenvalue is a single one."""
     x, y, z = surface.vertices.T
     out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
-    points = surface.vertices * out[:, None] * (1.0, 1.2, 1.5)
+    points = surface.vertices * out[:, None] * stretch
     return build_surface(points, surface.corner_vertex, surface.face_start)
 
 
@@ -164,6 +165,61 @@ def test_the_eigenvector_is_that_of_scipy(degree):
         if found[1] > 1.03 * found[0]:
             overlap = np.abs(np.vdot(vectors[:, 0], connection.mass * z))
             assert overlap / np.sqrt(connection.mass @ np.abs(z) ** 2) > 1 - 1e-5, name
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_the_field_of_another_library(degree):
+    """geometry-central's connection Laplacian, raised to N; it shares no code with this one.
+
+    It flips edges to be Delaunay, and lays out borders differently: so a closed Delaunay mesh.
+    """
+    potpourri3d = pytest.importorskip("potpourri3d")
+    surface = bumpy(icosphere(4), 0.08, (1.0, 1.05, 1.1))
+    triangles = surface.corner_vertex.reshape(-1, 3)
+    connection = connect(surface)
+    assert connection.weight.min() > 0
+    vertex = np.empty(connection.count, dtype=int)
+    vertex[connection.node] = triangles.ravel()
+    solver = potpourri3d.MeshVectorHeatSolver(surface.vertices, triangles)
+    theirs = sparse.csr_matrix(solver.get_connection_laplacian())
+    here, there = vertex[connection.here], vertex[connection.there]
+    entry = np.asarray(theirs[here, there]).ravel()
+    np.testing.assert_allclose(np.abs(entry), connection.weight, rtol=1e-6)
+
+    # Their frames differ from these by an angle at each vertex, found along a tree of edges.
+    count = connection.count
+    ends = np.concatenate([here, there]), np.concatenate([there, here])
+    turn = -entry / np.abs(entry) * np.exp(-1j * connection.turn)
+    between = sparse.csr_matrix((np.concatenate([turn, turn.conj()]), ends), (count, count))
+    frames = np.ones(count, dtype=complex)
+    order, before = breadth_first_order(abs(between), 0, directed=False)
+    ours = sparse.csr_matrix(
+        (np.exp(1j * np.concatenate([connection.turn, -connection.turn])), ends), (count, count)
+    )
+    for one in order[1:]:
+        toward = ours[one, before[one]]
+        there_too = between[one, before[one]] * toward
+        frames[one] = there_too * frames[before[one]] * toward.conj()
+    carried = frames[here] * np.exp(1j * connection.turn) * frames[there].conj()
+    np.testing.assert_allclose(-entry / np.abs(entry), carried, atol=1e-6)
+
+    turned = np.concatenate([carried**degree, carried.conj() ** degree])
+    weight = np.tile(np.abs(entry), 2)
+    raised = sparse.diags(theirs.diagonal()) - sparse.csr_matrix((weight * turned, ends))
+    mass = np.empty(count)
+    mass[vertex] = connection.mass
+    found, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
+    expected = vectors[:, np.argmin(found)]
+    z, energy = drain(smallest(connection, degree))
+    assert energy[0] == pytest.approx(found.min(), rel=1e-5)
+    mine = np.empty(count, dtype=complex)
+    mine[vertex] = z
+    apart = mine * frames**degree * expected.conj()
+    apart *= np.conj(apart.sum()) / abs(apart.sum())
+    # Close to singularities both are small, and their angles anything.
+    clear = np.abs(mine) > 0.02 * np.abs(mine).max()
+    assert clear.mean() > 0.9
+    assert np.degrees(np.abs(np.angle(apart[clear]))).max() / degree < 1
 
 
 @pytest.mark.parametrize("degree", range(1, 13))

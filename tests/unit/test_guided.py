@@ -8,7 +8,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 from shapes import from_quads, from_triangles, icosphere, plane, torus
-from test_smoothest import angles_apart, as_scipy, bumpy, cube
+from test_smoothest import DATA, angles_apart, as_scipy, bumpy, cube
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field.connection import connect, laplacian
@@ -16,9 +16,12 @@ from rosy_addon.field.frames import dot, unit
 from rosy_addon.field.generate import Recipe, generate
 from rosy_addon.field.guided import guided_field
 from rosy_addon.field.guides import along_edges, feature_edges
+from rosy_addon.field.meshfile import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.singularities import euler_characteristic, singularities
 from rosy_addon.field.smoothest import corner_turns
+
+BUNNY = DATA / "stanford-bunny.obj"
 
 
 def some_guides(surface, count, seed=0):
@@ -82,6 +85,37 @@ def test_a_field_follows_strokes_within_two_degrees():
         apart = angles_apart(surface, field.vectors, guides, degree)
         for number in range(10):
             assert np.degrees(apart[stroke == number]).mean() < 2
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not BUNNY.exists(), reason="the bunny is not here")
+def test_ten_strokes_on_the_bunny():
+    surface = read_mesh(BUNNY)
+    centre, size = surface.face_centre, np.ptp(surface.vertices, axis=0).max()
+    random = np.random.default_rng(0)
+    guides = np.zeros((surface.face_count, 3))
+    stroke = np.full(surface.face_count, -1)
+    while stroke.max() < 9:
+        start = random.integers(surface.face_count)
+        normal = surface.face_normal[start]
+        along = unit(np.cross(normal, random.standard_normal(3))[None])[0]
+        away = centre - centre[start]
+        length = np.sqrt(dot(away, away))
+        aside = np.abs(away @ np.cross(normal, along))
+        near = (
+            (aside < 0.004 * size) & (length < 0.05 * size) & (surface.face_normal @ normal > 0.5)
+        )
+        if near.sum() < 20 or (stroke[length < 0.1 * size] >= 0).any():
+            continue
+        tangent = along - (surface.face_normal[near] @ along)[:, None] * surface.face_normal[near]
+        guides[near], stroke[near] = unit(tangent), stroke.max() + 1
+    for degree in (1, 2, 4, 6):
+        field = guided_field(surface, degree, guides, 1 / (0.002 * size) ** 2)
+        apart = np.degrees(angles_apart(surface, field.vectors, guides, degree))
+        for number in range(10):
+            assert apart[stroke == number].mean() < 2
+        field = guided_field(surface, degree, guides, 0.0, stroke >= 0)
+        assert angles_apart(surface, field.vectors, guides, degree)[stroke >= 0].max() < 1e-6
 
 
 @pytest.mark.parametrize("degree", [2, 5])

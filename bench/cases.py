@@ -7,10 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from rosy_addon.compositor.compose import METHODS, compose
+from rosy_addon.compositor.compose import METHODS, compose, look_noise
 from rosy_addon.compositor.flow import Flow, planar_flow
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.noise import image_noise
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.progress import drain
@@ -32,10 +31,7 @@ def plane(degree: int, size: int = SIZE) -> tuple[Flow, np.ndarray]:
     plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
     minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
     flow = planar_flow((plus - minus) / degree + 0.3, degree)
-    noise = image_noise(
-        flow.pixel, size, LOOK.grain, 0, 1, density=LOOK.density, high_pass=LOOK.high_pass
-    )
-    return flow, noise
+    return flow, look_noise(flow, LOOK)
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:

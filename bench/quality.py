@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.compositor.compose import METHODS
+from rosy_addon.compositor.compose import METHODS, look_noise
 from rosy_addon.compositor.flow import Flow, nearest_member, planar_flow, surface_flow
 from rosy_addon.compositor.images import Images
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.noise import image_noise
 from rosy_addon.field.fieldfile import read_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.meshfile import read_mesh
@@ -106,15 +105,7 @@ def _measured(flows: Sequence[Flow], look: Look) -> Measured:
     """Means over some seeds of the noise, or over some flows with one of them each."""
     found = []
     for seed, flow in zip(SEEDS, flows * len(SEEDS) if len(flows) == 1 else flows, strict=True):
-        noise = image_noise(
-            flow.pixel,
-            flow.width,
-            look.grain,
-            seed,
-            1,
-            density=look.density,
-            high_pass=look.high_pass,
-        )
+        noise = look_noise(flow, replace(look, seed=seed))
         found.append(_measured_in(flow, drain(METHODS[look.method](flow, look, noise))))
     return Measured(
         *(

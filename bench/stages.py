@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rosy_addon.compositor.compose import METHODS, compose
+from rosy_addon.compositor.compose import METHODS, compose, look_noise
 from rosy_addon.compositor.flow import surface_flow
-from rosy_addon.compositor.noise import image_noise
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.progress import drain
 from rosy_addon.projection.carried import carrying
@@ -42,19 +41,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     look, camera, body = cases.LOOK, cases.camera(), cases.body(triangles, DEGREE)
     gbuffer = project([body], camera, look.display)
     flow = surface_flow(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
-
-    def noise() -> np.ndarray:
-        return image_noise(
-            flow.pixel,
-            flow.width,
-            look.grain,
-            look.seed,
-            1,
-            density=look.density,
-            high_pass=look.high_pass,
-        )
-
-    grain = noise()
+    grain = look_noise(flow, look)
     points = np.column_stack([body.surface.vertices, np.ones(len(body.surface.vertices))])
     clip = points @ (camera.projection @ camera.view).T
     triangle = body.surface.triangle_vertex
@@ -67,7 +54,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
         "compose": lambda: compose(replace(gbuffer, made={}), look),
         "  of which links": lambda: links(gbuffer, look.crease_angle, look.cross_creases),
         "  of which axes on screen": lambda: screen_axes(gbuffer),
-        "  of which noise": noise,
+        "  of which noise": lambda: look_noise(flow, look),
         "  of which streamlines": lambda: drain(METHODS[look.method](flow, look, grain)),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+
+import numpy as np
 
 from . import cases
 from .timing import Case, compare, main
@@ -23,15 +25,7 @@ BRUTE = replace(cases.LOOK, method="brute")
 def measure(runs: int) -> Iterator[Case]:
     """All rows."""
     yield from quick(runs)
-    for triangles, targets in FRAMES.items():
-        for degree, target in targets.items():
-            yield compare(
-                f"brute / sheets, first frame of a mesh, {_thousands(triangles)}, N = {degree}",
-                lambda t=triangles, d=degree: cases.first_frame(t, d, BRUTE),
-                lambda t=triangles, d=degree: cases.first_frame(t, d),
-                target=target,
-                runs=runs,
-            )
+    yield from _frames("first frame of a mesh", cases.first_frame, runs)
     for triangles in FRAMES:
         yield compare(
             f"members / sheets, frame, {_thousands(triangles)}, N = 4",
@@ -53,12 +47,19 @@ def quick(runs: int, cold: bool = False) -> Iterator[Case]:
             runs=runs,
             cold=cold,
         )
+    yield from _frames("frame", cases.frame, runs, cold)
+
+
+def _frames(
+    name: str, frame: Callable[..., np.ndarray], runs: int, cold: bool = False
+) -> Iterator[Case]:
+    """Few and many triangles, every degree."""
     for triangles, targets in FRAMES.items():
         for degree, target in targets.items():
             yield compare(
-                f"brute / sheets, frame, {_thousands(triangles)}, N = {degree}",
-                lambda t=triangles, d=degree: cases.frame(t, d, BRUTE),
-                lambda t=triangles, d=degree: cases.frame(t, d),
+                f"brute / sheets, {name}, {_thousands(triangles)}, N = {degree}",
+                lambda t=triangles, d=degree: frame(t, d, BRUTE),
+                lambda t=triangles, d=degree: frame(t, d),
                 target=target,
                 runs=runs,
                 cold=cold,

@@ -141,17 +141,21 @@ def _images(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Ima
     """LIC images of the members, by the look's method."""
     keep_freed_memory()
     if noise is None:
-        channels = 3 if look.noise == "colour" else 1
-        noise = image_noise(
-            flow.pixel,
-            flow.width,
-            look.grain,
-            look.seed,
-            channels,
-            density=look.density,
-            high_pass=look.high_pass,
-        )
+        noise = look_noise(flow, look)
     return (yield from METHODS[look.method](flow, look, noise))
+
+
+def look_noise(flow: Flow, look: Look) -> np.ndarray:
+    """(P, K) float32: the noise that a look asks for, at the pixels of a flow."""
+    return image_noise(
+        flow.pixel,
+        flow.width,
+        look.grain,
+        look.seed,
+        3 if look.noise == "colour" else 1,
+        density=look.density,
+        high_pass=look.high_pass,
+    )
 
 
 def _layers(flow: Flow, look: Look, images: Images) -> Layers:

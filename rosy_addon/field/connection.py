@@ -12,11 +12,12 @@ with cotangents as weights and masses lumped.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from .sparse import Rows, from_entries
-from .surface import Surface, surface_edges
+from .surface import Surface, connected, next_corners, surface_edges
 
 #: Cotangents of the sharpest angles are held to this, or slivers would outweigh everything.
 STEEPEST = 1e3
@@ -61,6 +62,11 @@ class Connection:
     turn: np.ndarray
     weight: np.ndarray
 
+    @cached_property
+    def piece(self) -> np.ndarray:
+        """(n,) int32: the connected piece of each node."""
+        return connected(self.count, np.stack([self.here, self.there], axis=1))
+
 
 def connect(surface: Surface) -> Connection:
     """The connection of a surface as it is, triangulated."""
@@ -68,9 +74,8 @@ def connect(surface: Surface) -> Connection:
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
     edges = surface_edges(vertex, start)
     corner = np.arange(len(vertex), dtype=np.int32)
-    following, preceding = corner + 1, corner + 2
-    for turned in (following, preceding):
-        turned[turned // 3 > corner // 3] -= 3
+    following = next_corners(start)
+    preceding = following[following]
     twin = np.full(len(vertex), -1, dtype=np.int32)
     a, b = edges.sides[:, 0], edges.sides[:, 1]
     twin[a], twin[b] = b, a
@@ -79,9 +84,9 @@ def connect(surface: Surface) -> Connection:
     # Around a vertex, counter-clockwise: the corner before lies across the edge that leaves here.
     before = np.where(twin >= 0, following[np.maximum(twin, 0)], -1)
     first, closed = _first_corners(before, int(np.bincount(vertex).max()))
-    offset = _sum_from_first(before, first, opening)
+    root, offset = _back_to_first(before, first, opening)
     number = np.cumsum(first) - 1
-    node = number[_root(before, first)].astype(np.int32)
+    node = number[root].astype(np.int32)
     count = int(number[-1]) + 1
     around = np.bincount(node, opening, count)
     stretch = np.ones(count)
@@ -172,22 +177,14 @@ def _first_corners(before: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarra
     return first, closed[first]
 
 
-def _root(before: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """(C,) the corner that the umbrella of each begins with."""
-    way = np.where(first, np.arange(len(before)), before)
-    while True:
-        further = way[way]
-        if np.array_equal(further, way):
-            return way
-        way = further
-
-
-def _sum_from_first(before: np.ndarray, first: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """(C,) sums of the angles from the first corner of each umbrella on, without the corner's own."""
+def _back_to_first(
+    before: np.ndarray, first: np.ndarray, angle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(C,) the corner that the umbrella of each begins with, and the angles from there on to it."""
     way = np.where(first, np.arange(len(before)), before)
     total = np.where(first, 0.0, angle[way])
     while True:
         further = way[way]
         if np.array_equal(further, way):
-            return total
+            return way, total
         total, way = total + total[way], further

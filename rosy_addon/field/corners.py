@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .frames import carry, dot, tangent_frame
-from .representation import power
+from .representation import complex_sums, power
 from .surface import Surface
 
 
@@ -44,9 +44,7 @@ def mix_fans(values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray) ->
     """
     fans = int(corner_fan.max()) + 1
     total = np.bincount(corner_fan, weights, fans)
-    real = np.bincount(corner_fan, weights * values.real, fans)
-    imaginary = np.bincount(corner_fan, weights * values.imag, fans)
-    mean = (real + 1j * imaginary) / np.where(total > 0, total, 1)
+    mean = complex_sums(corner_fan, weights * values, fans) / np.where(total > 0, total, 1)
     return mean[corner_fan]
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
-from .connection import Connection, connect, laplacian
-from .representation import face_frames, from_representation, to_representation
+from .connection import connect, laplacian
+from .representation import complex_sums, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import corner_turns, sum_on_faces
 from .sparse import Rows, cycle, from_entries, hierarchy
@@ -86,11 +86,12 @@ def finding_guided(
     toward_node = np.exp(-1j * degree * turn)
     owner = np.repeat(surface.triangle_face, 3)
     share = np.repeat(connection.area / 3, 3)
-    pull = _at_nodes(connection, share * weight[owner])
-    right = _at_nodes(connection, share * (weight * wish)[owner] * toward_node)
+    node, count = connection.node, connection.count
+    pull = np.bincount(node, share * weight[owner], count)
+    right = complex_sums(node, share * (weight * wish)[owner] * toward_node, count)
     # Nodes between faces that must be followed take the mean, and none where these contradict.
-    given = _at_nodes(connection, share * (hard * wish)[owner] * toward_node)
-    most = _at_nodes(connection, share * (hard * np.abs(wish))[owner])
+    given = complex_sums(node, share * (hard * wish)[owner] * toward_node, count)
+    most = np.bincount(node, share * (hard * np.abs(wish))[owner], count)
     firm = np.abs(given) > 1e-6 * most
     given[~firm] = 0
     given[firm] /= np.abs(given[firm])
@@ -107,15 +108,6 @@ def finding_guided(
     found = np.divide(found, size, out=np.zeros_like(found), where=known)
     found[hard] = wish[hard] / np.abs(wish[hard])
     return RosyField(degree, from_representation(found, x, y, degree))
-
-
-def _at_nodes(connection: Connection, values: np.ndarray) -> np.ndarray:
-    """(n,) sums of the values of corners."""
-    node, count = connection.node, connection.count
-    if np.iscomplexobj(values):
-        real = np.bincount(node, values.real, count)
-        return real + 1j * np.bincount(node, values.imag, count)
-    return np.bincount(node, values, count)
 
 
 def _reduced(

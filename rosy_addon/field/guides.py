@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .frames import dot, unit
-from .representation import face_frames, from_representation, to_representation
+from .representation import complex_sums, face_frames, from_representation, to_representation
 from .surface import Surface, surface_edges
 
 
@@ -39,9 +39,7 @@ def along_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
     # In the plane of a face that is not flat an edge is shorter, but counts no less.
     edge -= dot(edge, surface.face_normal[face])[:, None] * surface.face_normal[face]
     z = to_representation(unit(edge), x[face], y[face], degree)
-    total = np.bincount(face, z.real, surface.face_count) + 1j * np.bincount(
-        face, z.imag, surface.face_count
-    )
+    total = complex_sums(face, z, surface.face_count)
     size = np.abs(total)
     total = np.divide(total, size, out=np.zeros_like(total), where=size > 1e-6)
     return from_representation(total, x, y, degree)

@@ -25,6 +25,12 @@ def power(numbers: np.ndarray, degree: int) -> np.ndarray:
         numbers = numbers * numbers
 
 
+def complex_sums(group: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
+    """(count,) complex sums of the numbers of each group: `bincount`, of complex weights."""
+    real = np.bincount(group, numbers.real, count)
+    return real + 1j * np.bincount(group, numbers.imag, count)
+
+
 def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
     """z of member vectors in the frames x, y.
 

@@ -13,7 +13,7 @@ from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
 from .connection import Connection, connect, laplacian
 from .frames import dot
-from .representation import face_frames, from_representation
+from .representation import complex_sums, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .sparse import Level, cycle, hierarchy
 from .surface import Surface
@@ -79,7 +79,7 @@ def smallest(connection: Connection, degree: int) -> Work[tuple[np.ndarray, np.n
     energy : (pieces,) float64 ndarray
         e.
     """
-    piece = _pieces(connection)
+    piece = connection.piece
     mass = np.maximum(connection.mass, 1e-12 * max(float(connection.mass.mean()), 1e-300))
     shift = SHIFT * 4 * np.pi / mass.sum()
     levels = yield from part(hierarchy(laplacian(connection, degree, shift)), 0.1, 0.4)
@@ -176,8 +176,7 @@ def _sums(piece: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     """(count,) complex sums over each piece."""
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
-    real = np.bincount(piece, values.real, count)
-    return real + 1j * np.bincount(piece, values.imag, count)
+    return complex_sums(piece, values, count)
 
 
 def _along_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
@@ -185,7 +184,7 @@ def _along_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarr
 
     An eigenvector may be turned by any angle; this one depends on nothing but the mesh.
     """
-    piece = _pieces(connection)
+    piece = connection.piece
     count = int(piece.max()) + 1
     node = connection.node
     own = np.exp(1j * degree * connection.along) * np.repeat(connection.area, 3)
@@ -193,19 +192,6 @@ def _along_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarr
     size = np.abs(total)
     turn = np.divide(total, size, out=np.ones_like(total), where=size > 0)
     return z * turn[piece]
-
-
-def _pieces(connection: Connection) -> np.ndarray:
-    """(n,) intp number of the connected piece of each node."""
-    root = np.arange(connection.count)
-    a, b = connection.here, connection.there
-    while True:
-        low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
-        if (low == high).all():
-            return np.unique(root, return_inverse=True)[1].ravel()
-        np.minimum.at(root, high, low)
-        while not np.array_equal(root[root], root):
-            root = root[root]
 
 
 def vectors_on_faces(
@@ -241,5 +227,4 @@ def sum_on_faces(
     on_corner = z[connection.node] * np.exp(1j * degree * turn)
     on_corner *= np.repeat(connection.area, 3)
     owner, count = np.repeat(surface.triangle_face, 3), surface.face_count
-    real = np.bincount(owner, on_corner.real, count)
-    return real + 1j * np.bincount(owner, on_corner.imag, count)
+    return complex_sums(owner, on_corner, count)

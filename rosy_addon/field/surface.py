@@ -151,7 +151,7 @@ def build_surface(
     smooth_pairs = _smooth_corner_pairs(
         vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
     )
-    corner_fan = _connected(len(corner_vertex), smooth_pairs)
+    corner_fan = connected(len(corner_vertex), smooth_pairs)
     if corner_normal is None:
         corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(
@@ -320,7 +320,7 @@ def _smooth_corner_pairs(
     )
 
 
-def _connected(count: int, pairs: np.ndarray) -> np.ndarray:
+def connected(count: int, pairs: np.ndarray) -> np.ndarray:
     """(count,) int32 number of the connected component of each node, from 0 without gaps.
 
     Every node points at the smallest node known to be connected with it; pairs hook the roots

@@ -16,11 +16,15 @@ from functools import cached_property
 
 import numpy as np
 
+from .frames import dot
 from .sparse import Rows, from_entries
 from .surface import Surface, connected, next_corners, surface_edges
 
 #: Cotangents of the sharpest angles are held to this, or slivers would outweigh everything.
 STEEPEST = 1e3
+
+#: Triangles that are worked on at once: bounds memory, and fits the caches.
+BLOCK = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +84,7 @@ def connect(surface: Surface) -> Connection:
     a, b = edges.sides[:, 0], edges.sides[:, 1]
     twin[a], twin[b] = b, a
 
-    opening, cotangent, area = _shapes(surface.vertices[vertex].reshape(-1, 3, 3))
+    opening, cotangent, area = _shapes(surface.vertices, surface.triangle_vertex)
     # Around a vertex, counter-clockwise: the corner before lies across the edge that leaves here.
     before = np.where(twin >= 0, following[np.maximum(twin, 0)], -1)
     first, closed = _first_corners(before, int(np.bincount(vertex).max()))
@@ -145,21 +149,26 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> Rows:
     )
 
 
-def _shapes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(3 T,) angles and cotangents at the corners of (T, 3, 3) triangles, and (T,) areas."""
-    ahead = np.roll(points, -1, axis=1) - points
-    behind = np.roll(points, 1, axis=1) - points
-    cross = np.cross(ahead[:, 0], behind[:, 0])
-    twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
-    along = np.einsum("ijk,ijk->ij", ahead, behind)
-    opening = np.arctan2(twice[:, None], along)
-    limit = STEEPEST * twice[:, None]
-    steep = np.abs(along) >= limit
-    cotangent = np.where(
-        steep, np.sign(along) * STEEPEST, along / np.where(steep, 1, twice[:, None])
-    )
-    cotangent[twice == 0] = 0
-    return opening.ravel(), cotangent.ravel(), twice / 2
+def _shapes(
+    vertices: np.ndarray, triangles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(3 T,) angles and cotangents at the corners of triangles, and (T,) areas."""
+    opening, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
+    area = np.empty(len(triangles))
+    for first in range(0, len(triangles), BLOCK):
+        part = slice(first, first + BLOCK)
+        points = [vertices.take(column, axis=0) for column in triangles[part].T]
+        edges = [points[(k + 1) % 3] - points[k] for k in range(3)]
+        cross = np.cross(edges[0], edges[1])
+        twice = np.sqrt(dot(cross, cross))
+        area[part] = twice / 2
+        for k in range(3):
+            along = -dot(edges[k], edges[k - 1])
+            opening[part, k] = np.arctan2(twice, along)
+            steep = np.abs(along) >= STEEPEST * twice
+            steepest = np.where(twice > 0, np.sign(along) * STEEPEST, 0)
+            cotangent[part, k] = np.where(steep, steepest, along / np.where(steep, 1, twice))
+    return opening.ravel(), cotangent.ravel(), area
 
 
 def _first_corners(before: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:

@@ -99,7 +99,8 @@ def smallest(connection: Connection, degree: int) -> Work[tuple[np.ndarray, np.n
         last = number == 0
         rounds = MOST_ROUNDS if last or number == len(levels) - 1 else COARSE_ROUNDS
         descent = _descend(levels[number:], masses[number], pieces[number], z, rounds)
-        z, energy = yield from part(descent, 0.4 if number else 0.5, 0.5 if number else 1.0)
+        start = 0.5 - 0.1 * number / len(levels)
+        z, energy = yield from part(descent, start, start + 0.1 / len(levels) if number else 1.0)
         if not last:
             z = levels[number - 1].prolongation @ z
     return z, energy - shift
@@ -121,10 +122,23 @@ def _descend(
                 found[:, j, i] = found[:, i, j].conj()
         return found
 
+    def spread(values: np.ndarray) -> np.ndarray:
+        """Of each piece, to its nodes."""
+        return values[piece] if count > 1 else values
+
     def scaled(vector: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """In place."""
         size = np.sqrt(_sums(piece, mass * (vector.real**2 + vector.imag**2), count).real)
-        factor = (1 / np.where(size > 0, size, 1))[piece]
-        return vector * factor, image * factor
+        factor = spread(1 / np.where(size > 0, size, 1))
+        vector *= factor
+        image *= factor
+        return vector, image
+
+    def mixed(vectors: list[np.ndarray], mixing: np.ndarray) -> np.ndarray:
+        total = vectors[0] * spread(mixing[:, 0])
+        for number, vector in enumerate(vectors[1:], 1):
+            total += vector * spread(mixing[:, number])
+        return total
 
     z, image = scaled(z, matrix @ z)
     ahead: list[tuple[np.ndarray, np.ndarray]] = []
@@ -132,21 +146,20 @@ def _descend(
     for number in range(rounds):
         # Twenty to fifty rounds are usual.
         yield Progress(1 - 0.95**number, "finding the smoothest field")
-        rest = image - energy[piece] * (mass * z)
+        rest = image - spread(energy) * (mass * z)
         way = cycle(levels, rest)
-        way = way - _sums(piece, mass * (z.conj() * way), count)[piece] * z
+        way -= spread(_sums(piece, mass * (z.conj() * way), count)) * z
         step = scaled(way, matrix @ way)
         basis = [(z, image), step, *ahead]
         vectors, images = [one for one, _ in basis], [one for _, one in basis]
         weighted = [mass * one for one in vectors]
         mixing, energy = _lowest(products(vectors, images), products(vectors, weighted))
-        mixing = mixing[piece]
-        z_change = sum(mixing[:, k] * vectors[k] for k in range(1, len(basis)))
-        i_change = sum(mixing[:, k] * images[k] for k in range(1, len(basis)))
+        own = np.stack([mixing[:, 0], np.ones(count)], axis=1)
+        z_change, i_change = mixed(vectors[1:], mixing[:, 1:]), mixed(images[1:], mixing[:, 1:])
         change = np.sqrt(
             _sums(piece, mass * (z_change.real**2 + z_change.imag**2), count).real.max()
         )
-        z, image = mixing[:, 0] * z + z_change, mixing[:, 0] * image + i_change
+        z, image = mixed([z, z_change], own), mixed([image, i_change], own)
         z, image = scaled(z, image)
         ahead = [scaled(z_change, i_change)]
         if change < FOUND:

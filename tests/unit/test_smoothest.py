@@ -19,7 +19,7 @@ from rosy_addon.field.frames import dot
 from rosy_addon.field.meshfile import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.singularities import euler_characteristic, singularities
-from rosy_addon.field.smoothest import smallest, smoothest_field
+from rosy_addon.field.smoothest import finding_smoothest, smallest, smoothest_field
 from rosy_addon.field.sparse import cycle, from_entries, hierarchy, product
 from rosy_addon.field.surface import build_surface
 from rosy_addon.progress import drain
@@ -319,3 +319,10 @@ def test_no_area_at_all_is_an_error():
     flat = from_triangles([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     with pytest.raises(RosyError, match="no face has an area"):
         smoothest_field(flat, 4)
+
+
+def test_progress_never_steps_back():
+    fractions = [step.fraction for step in finding_smoothest(icosphere(4), 4)]
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0] <= fractions[-1] <= 1
+    assert len(fractions) > 20

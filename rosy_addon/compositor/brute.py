@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Work
-from .flow import Flow, all_members, image_count
+from .flow import Flow, all_members
 from .images import Images, Walker, member_images
 from .look import Look
 from .streamlines import Direction, direction_table, interpolate
@@ -27,9 +27,9 @@ def brute_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     screen = np.zeros((len(flow.pixel) + 1, flow.degree, 4), dtype=np.float32)
     for number, member in enumerate(all_members(flow, look.guiding_angle)):
         fan[:-1, number] = member
-        directions = flow.on_screen(member, look.foreshorten)
+        directions = flow.on_screen(flow.direction(member), look.foreshorten)
         screen[:, number] = direction_table(flow, directions, member)
-    walkers = [_best_of(fan, screen, member) for member in range(image_count(flow.degree))]
+    walkers = [_best_of(fan, screen, member) for member in range(flow.lines)]
     return (yield from member_images(flow, look, noise, walkers))
 
 

@@ -14,6 +14,7 @@ from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
+from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
 from .members import members_images
@@ -30,7 +31,7 @@ METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
 }
 
 #: Settings of a look that LIC images do not depend on.
-AFTERWARDS = ("gain", "shading", "light", "colour_map")
+AFTERWARDS = ("gain", "shading", "light", "colour_map", "hue")
 
 
 def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
@@ -59,7 +60,7 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
         start, stop = count / len(degrees), (count + 1) / len(degrees)
         images = yield from part(_images_of(gbuffer, flow, finer), start, stop)
         layer = _layers(flow, finer, images)
-        colour[degree_of == degree] = _ink(flow, layer.tone, look)
+        colour[degree_of == degree] = _ink(flow, layer, finer)
         layers.append(layer)
     colour *= diffuse(gbuffer, look, lights)
     rgba = _frame(gbuffer.pixel, colour, camera.width, camera.height, look.supersampling)
@@ -102,7 +103,7 @@ def compose_planar(
         noise = np.asarray(noise, dtype=np.float32).reshape(len(flow.pixel), -1)
     look = replace(look, supersampling=1)
     layers = _layers(flow, look, drain(_images(flow, look, noise)))
-    colour = _ink(flow, layers.tone, look)
+    colour = _ink(flow, layers, look)
     return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
 
 
@@ -160,19 +161,23 @@ def look_noise(flow: Flow, look: Look) -> np.ndarray:
 
 def _layers(flow: Flow, look: Look, images: Images) -> Layers:
     """Images blended, with the contrast of one of them times the gain."""
-    gain = look.gain * blend_gain(flow.degree, images.samples, look)
+    gain = look.gain * blend_gain(flow.lines, images.samples, look)
     if look.supersampling > 1:
         gain *= np.float32(averaging_gain(look))
     tone = scale_contrast(images.blend, gain[:, None])
     return Layers(flow.degree, flow.pixel, images, tone)
 
 
-def _ink(flow: Flow, tone: np.ndarray, look: Look) -> np.ndarray:
-    """(P, 3) or (P, 1) linear light of the tones, coloured by magnitude if the look says so."""
-    if look.magnitude not in ("colour", "both"):
-        return to_linear(tone)
-    hue = map_colours(relative_magnitude(flow, look), look.colour_map)
-    return to_linear(hue * (1 + 1.5 * (tone - MEAN)))
+def _ink(flow: Flow, layers: Layers, look: Look) -> np.ndarray:
+    """(P, 3) or (P, 1) linear light of the tones, coloured by magnitude or family if so wished."""
+    hue = None
+    if look.magnitude in ("colour", "both"):
+        hue = map_colours(relative_magnitude(flow, look), look.colour_map)
+    elif look.hue == "families":
+        hue = family_hues(flow, layers.images, look)
+    if hue is None:
+        return to_linear(layers.tone)
+    return to_linear(hue * (1 + 1.5 * (layers.tone - MEAN)))
 
 
 def _frame(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .flow import image_count
 from .look import Look
 from .noise import MEAN, streak_statistics
 
@@ -31,7 +30,7 @@ def even_out(mean: np.ndarray, samples: np.ndarray, look: Look) -> np.ndarray:
     return MEAN + (mean - MEAN) * factor[:, None]
 
 
-def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:
+def blend_gain(images: int, samples: np.ndarray, look: Look) -> np.ndarray:
     """The factor that gives the mean of M member images the spread of one: about sqrt(M).
 
     Equation 6 of the paper takes the M values at a pixel for independent. They are not quite: all
@@ -42,8 +41,8 @@ def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:
 
     Parameters
     ----------
-    degree : int
-        N.
+    images : int
+        M.
     samples : (P,) float32 ndarray
         Of a streamline, mean over the M of a pixel.
     look : Look
@@ -54,7 +53,6 @@ def blend_gain(degree: int, samples: np.ndarray, look: Look) -> np.ndarray:
     (P,) float32 ndarray
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
-    images = image_count(degree)
     full = 2 * look.length + 1
     noise = (full * look.step, look.grain, look.high_pass)
     _, crossing = streak_statistics(*noise, images)

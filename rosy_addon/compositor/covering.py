@@ -10,6 +10,10 @@ step from (p, k) to the pixel q leads to the sheet
 a closed form for the best of all members. Sheets k and k + S / 2 are the two directions of one
 streamline, so that M = S / 2 *lines* pass through a pixel, one a member image.
 
+Directions that are no RoSy go from member to member as the RoSy does from which they deviate. If
+they come without their opposites, forward and backward are two coverings of N sheets each, and
+a streamline stays on its own: N sheets are *around* a pixel then, not S.
+
 A streamline waits for memory, not for arithmetic. So a state's record is as short as can be, and
 pixels are *cells* of a window of the frame, with a border: the next one is a sum away, and no
 table of neighbours is read.
@@ -21,8 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..field.directions import evaluate
 from ..trigonometry import angle_of, cosine_sine
-from .flow import OFFSETS, Flow
+from .flow import OFFSETS, Flow, phase
 from .look import Look
 
 #: Pixels unfolded at once, so that they stay in a core's cache.
@@ -49,12 +54,14 @@ class Covering:
     ----------
     sheets : int
         S.
+    around : int
+        How many of them make a full turn: S, or N.
     width : int
         Cells of a row of the window: one above another is so far away.
     place : (P,) int32 ndarray
         The cell of each pixel.
     turn : (C,) float32 ndarray
-        t in units of 2 pi / S, plus 2. The last nine bits, too fine to matter, hold what can be
+        t in parts of a full turn, `around` of them, plus 2. The last nine bits, too fine to matter, hold what can be
         got with `joined`: streamlines look both up at every step, so they lie together.
     records : (S C, 2 + 2 K) int16 ndarray
         A step on screen, and for each channel the noise and its slope to the left.
@@ -63,6 +70,7 @@ class Covering:
     """
 
     sheets: int
+    around: int
     width: int
     place: np.ndarray
     turn: np.ndarray
@@ -84,9 +92,21 @@ class Covering:
         """K."""
         return self.records.shape[1] // 2 - 1
 
-    def first_states(self, turns: int) -> np.ndarray:
-        """(2 turns S,) intp: the first state of sheet k mod S, at k + turns S."""
-        return np.tile(np.arange(self.sheets) * self.cells, 2 * turns)
+    def first_states(self, turns: int) -> tuple[np.ndarray, int]:
+        """The first states of sheets, for streamlines that wind no more often than `turns`.
+
+        Returns
+        -------
+        first : (n,) intp ndarray
+            That of sheet k at k + turns around.
+        back : int
+            How far from there the sheet of the opposite direction is.
+        """
+        once = np.arange(self.around) * self.cells
+        forward = np.tile(once, 2 * turns)
+        if self.around == self.sheets:
+            return forward, self.lines
+        return np.concatenate([forward, forward + self.lines * self.cells]), len(forward)
 
     def line_of(self, state: np.ndarray) -> np.ndarray:
         """Entries of the lines of states, in their place."""
@@ -122,18 +142,17 @@ class Covering:
         return (sheet + slip) % self.lines * self.cells + there
 
 
-def sheet_count(degree: int) -> int:
-    """S."""
-    return degree if degree % 2 == 0 else 2 * degree
+def sheets_around(flow: Flow) -> int:
+    """How many sheets make a full turn: S, or N of directions without their opposites."""
+    return flow.lines if flow.harmonics and not flow.is_paired else 2 * flow.lines
 
 
-def line_of_member(degree: int) -> np.ndarray:
+def line_of_member(flow: Flow) -> np.ndarray:
     """(M,) intp: which line is that of each member image.
 
-    Of an odd degree, sheet 2 i is member i, and sheet 2 i - N the other half of its line.
+    Of a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N the other half of its line.
     """
-    lines = sheet_count(degree) // 2
-    return np.arange(lines) * (1 + degree % 2) % lines
+    return np.arange(flow.lines) * (sheets_around(flow) // flow.degree) % flow.lines
 
 
 def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
@@ -148,8 +167,7 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
     noise : (P, K) float32 ndarray
     """
     degree, (count, channels) = flow.degree, noise.shape
-    sheets = sheet_count(degree)
-    half = sheets // 2
+    half, around = flow.lines, sheets_around(flow)
     place, width, cells = _window(flow)
     # Streamlines that have ended stay in `END`.
     turn = _with_bits(np.full(cells, 2, dtype=np.float32), 1 << 4)
@@ -160,21 +178,22 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
     brightest = max(float(np.abs(noise).max()), 1e-30)
     steepest = 2 * brightest * longest
     in_units = [np.float32(TOP / longest), np.float32(TOP / brightest), np.float32(TOP / steepest)]
-    records = np.zeros((sheets, cells, 2 + 2 * channels), dtype=np.int16)
+    records = np.zeros((2 * half, cells, 2 + 2 * channels), dtype=np.int16)
     for start in range(0, count, BLOCK):
         part = slice(start, min(start + BLOCK, count))
         here = place[part]
         right, up = _slopes(spread, here, width, flow.joined[part])
         right, up = right * in_units[2], up * in_units[2]
         base, x, y = _nearest(flow.representation[part], degree, look.guiding_angle)
-        base *= np.float32(sheets / (2 * np.pi))
+        base *= np.float32(around / (2 * np.pi))
         base += np.float32(2)
         turn[here] = _with_bits(base, flow.joined[part])
         rows = np.empty((len(here), 2 + 2 * channels), dtype=np.int16)
         rows[:, 2::2] = np.rint(noise[part] * in_units[1])
         for sheet in range(half):
-            angle = look.guiding_angle + 2 * np.pi * sheet / sheets
-            way_x, way_y = _on_screen(flow, part, *_rotated(x, y, angle), look.foreshorten)
+            angle = look.guiding_angle + 2 * np.pi * sheet / around
+            way = _deviating(flow, part, *_rotated(x, y, angle))
+            way_x, way_y = _on_screen(flow, part, *way, look.foreshorten)
             if look.foreshorten:
                 way_x, way_y = np.clip(way_x, -longest, longest), np.clip(way_y, -longest, longest)
             rows[:, 3::2] = np.rint(up * way_x[:, None] - right * way_y[:, None])
@@ -186,7 +205,8 @@ def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
                 np.negative(rows[:, column], out=rows[:, column])
             put(records[sheet + half], here, rows)
     return Covering(
-        sheets=sheets,
+        sheets=2 * half,
+        around=around,
         width=width,
         place=place,
         turn=turn,
@@ -259,6 +279,17 @@ def _rotated(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np
         return x, y
     cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     return cosine * x - sine * y, sine * x + cosine * y
+
+
+def _deviating(
+    flow: Flow, part: slice, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `Flow.direction`."""
+    if not flow.harmonics:
+        return x, y
+    member = x + 1j * y
+    way = phase(member * evaluate([(j, c[part]) for j, c in flow.harmonics], member))
+    return way.real, way.imag
 
 
 def _on_screen(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import cached_property
 
 import numpy as np
 
+from ..field.directions import evaluate
 from ..field.rosy_field import check_degree
+from ..projection.carried import Trait
 from ..projection.gbuffer import GBuffer
 from ..projection.steps import links, screen_axes
 from ..trigonometry import phase_of
@@ -35,6 +38,9 @@ class Flow:
     joined : (P,) uint16 ndarray
         To which of its 3 x 3 neighbours a streamline may step from each pixel: bit i is for
         `OFFSETS[i]`. Pixels where the field is undefined are joined to none.
+    traits : dict of Trait to (P,) complex64 ndarray
+        What the field has besides, in the view plane: by how much its directions deviate from the
+        members of the RoSy that tells them apart, and which line belongs to the stored member.
     """
 
     degree: int
@@ -44,6 +50,44 @@ class Flow:
     representation: np.ndarray
     axes: np.ndarray | None
     joined: np.ndarray
+    traits: dict[Trait, np.ndarray] = dataclass_field(default_factory=dict)
+
+    @cached_property
+    def harmonics(self) -> list[tuple[int, np.ndarray]]:
+        """Pairs of j and C_j, (P,) complex64, of `field.directions`; none of a RoSy."""
+        return [
+            (number, values)
+            for (kind, number), values in self.traits.items()
+            if kind == "deviation"
+        ]
+
+    @property
+    def is_paired(self) -> bool:
+        """Whether each direction has an opposite one, with which it shares its streamlines."""
+        return self.degree % 2 == 0 and not any(j % 2 for j, _ in self.harmonics)
+
+    @property
+    def lines(self) -> int:
+        """M, the images that show all directions: N, or N / 2 where opposite ones share one."""
+        return self.degree // 2 if self.is_paired else self.degree
+
+    def direction(self, member: np.ndarray) -> np.ndarray:
+        """The directions that belong to members.
+
+        Parameters
+        ----------
+        member : (P,) complex ndarray
+            Unit vectors in the view plane's frame, of the RoSy.
+
+        Returns
+        -------
+        (P,) complex ndarray
+            Unit vectors, likewise: of a RoSy the same.
+        """
+        if not self.harmonics:
+            return member
+        member = member.astype(np.complex128)
+        return phase(member * evaluate(self.harmonics, member))
 
     @cached_property
     def neighbours(self) -> np.ndarray:
@@ -149,6 +193,7 @@ def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creas
         representation=z,
         axes=axes[chosen],
         joined=joined,
+        traits={trait: values[chosen] for trait, values in gbuffer.traits.items()},
     )
 
 
@@ -240,8 +285,3 @@ def all_members(flow: Flow, guiding_angle: float) -> list[np.ndarray]:
     """N times (P,) complex64: the member nearest to a guiding angle, and its rotations."""
     nearest = nearest_member(flow, guiding_angle)
     return [turned(nearest, 2 * np.pi * k / flow.degree) for k in range(flow.degree)]
-
-
-def image_count(degree: int) -> int:
-    """M, the images that show all N directions: N, or N / 2 where opposite members share one."""
-    return degree if degree % 2 else degree // 2

@@ -84,6 +84,13 @@ class Look:
         grey="One channel",
         colour="Three channels, drawn separately: a plaid",
     )
+    hue: str = _choice(
+        "one",
+        "Whether families of directions differ in hue",
+        one="All the same",
+        families="A hue for each line that the field tells apart: of tensors the major and the "
+        "minor, of dir0, dir1 ... each, if they are the same lines all over the mesh",
+    )
     seed: int = _number(0, 0, 2**31 - 1, "Which noise")
     gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
     guiding_angle: float = _angle(

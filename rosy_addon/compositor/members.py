@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Work, part
-from .flow import Flow, all_members, blend_weights, image_count
+from .flow import Flow, all_members, blend_weights
 from .images import Images, Walker, member_images
 from .look import Look
 from .streamlines import direction_table, interpolate
@@ -55,10 +55,11 @@ def _walkers(flow: Flow, look: Look, angle: float) -> list[Walker]:
     if not look.view_plane:
         fields = _projected_fields(flow, angle)
         return [_along(direction_table(flow, field, field)) for field in fields]
-    members = all_members(flow, angle)[: image_count(flow.degree)]
+    members = all_members(flow, angle)[: flow.lines]
+    ways = [flow.on_screen(flow.direction(member), look.foreshorten) for member in members]
     return [
-        _along(direction_table(flow, flow.on_screen(member, look.foreshorten), member))
-        for member in members
+        _along(direction_table(flow, way, member))
+        for way, member in zip(ways, members, strict=True)
     ]
 
 
@@ -80,9 +81,11 @@ def _projected_fields(flow: Flow, angle: float) -> list[np.ndarray]:
     On a tilted surface their angles on screen are not 2 pi / N apart, so that the two sets of
     breaking points come close to each other and the weights no longer tell where they are.
     """
-    members = np.stack([flow.on_screen(member) for member in all_members(flow, 0.0)])
+    members = np.stack(
+        [flow.on_screen(flow.direction(member)) for member in all_members(flow, 0.0)]
+    )
     fields = []
-    for member in range(image_count(flow.degree)):
+    for member in range(flow.lines):
         guide = np.exp(-1j * (angle + 2 * np.pi * member / flow.degree))
         best = np.argmax((members * guide).real, axis=0)
         fields.append(np.take_along_axis(members, best[None], axis=0)[0])

@@ -23,7 +23,6 @@ from .covering import (
     Covering,
     line_of_member,
     put,
-    sheet_count,
     unfold,
     whole_rows,
 )
@@ -76,7 +75,7 @@ def sheets_images(flow: Flow, look: Look, noise: np.ndarray) -> Work[Images]:
     """
     count, channels = noise.shape
     noise = noise - np.float32(MEAN)
-    line = line_of_member(flow.degree)
+    line = line_of_member(flow)
     members = np.empty((len(line), count, channels), dtype=np.float32)
     samples = np.empty(count, dtype=np.float32)
     limit = limits(flow, look)
@@ -154,12 +153,12 @@ def _strips(flow: Flow, look: Look) -> Iterator[tuple[slice, slice, int]]:
         they would all change at once.
     """
     count = len(flow.pixel)
-    if count * sheet_count(flow.degree) <= STRIP:
+    if count * 2 * flow.lines <= STRIP:
         yield slice(0, count), slice(0, count), count
         return
     margin = int(look.length * look.step) + 2
     # So many rows that no strip does more for its surroundings than for itself.
-    rows = max(STRIP // sheet_count(flow.degree) // flow.width, 3 * margin)
+    rows = max(STRIP // (2 * flow.lines) // flow.width, 3 * margin)
     for start in range(0, flow.height, rows):
         stop = start + rows
         border = np.array([start - margin, start, stop, stop + margin, stop + 2 * margin])
@@ -182,6 +181,7 @@ def _cut(flow: Flow, wide: slice) -> Flow:
         representation=flow.representation[wide],
         axes=None if flow.axes is None else flow.axes[wide],
         joined=joined,
+        traits={trait: values[wide] for trait, values in flow.traits.items()},
     )
 
 

@@ -112,10 +112,10 @@ class Walker:
         records = covering.records.view(kind)[:, 0]
         # No streamline winds more often than once in four steps.
         turns = self._reach // 4 + 2
-        first_state = covering.first_states(turns)
+        first_state, back = covering.first_states(turns)
         sheet, cell = np.divmod(seeds, covering.cells)
         cell = np.concatenate([cell, cell])
-        sheet = np.concatenate([sheet, sheet + covering.lines]) + turns * covering.sheets
+        sheet = np.concatenate([sheet, sheet + back]) + turns * covering.around
         turn = covering.turn.take(cell)
         angle = turn + sheet.astype(np.float32)
         start = _scattered(len(seeds))

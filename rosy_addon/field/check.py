@@ -8,8 +8,22 @@ import numpy as np
 
 from ..errors import RosyError
 from .corners import corner_angles, corner_rotations
+from .directions import (
+    deviations_of,
+    directions_field,
+    harmonics_of,
+    is_rosy,
+    nearest_rosy,
+    with_families,
+)
 from .frames import dot, tangent_frame, unit
-from .representation import face_frames, from_representation, power, to_representation
+from .representation import (
+    face_frames,
+    from_representation,
+    power,
+    signed_power,
+    to_representation,
+)
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, mean_over_faces
 
@@ -23,6 +37,9 @@ VERTEX_TOLERANCE = 20.0
 
 #: So large a part of the vectors may be off by more (needles whose normal is rounding error, say).
 FEW = 0.01
+
+#: Numbers from here on are as good as infinite: a length made of them would be.
+HUGE = 5e153
 
 #: Smaller deviations, as sines, are the last bits of float64: such vectors stay as they are.
 ROUNDING = 1e-12
@@ -77,6 +94,90 @@ def checked_field(
         return RosyField(degree, into_planes(vectors, normal, FACE_TOLERANCE, source, "face"))
     vectors = into_planes(vectors, normal, VERTEX_TOLERANCE, source, "vertex")
     return RosyField(degree, _onto_faces(_at_rest(surface), vectors, normal, degree))
+
+
+def checked_directions(
+    surface: Surface,
+    directions: np.ndarray,
+    source: str,
+    undefined: str = "error",
+    domain: str | None = None,
+) -> RosyField:
+    """Make a field of N directions given on each face or vertex, a RoSy or not.
+
+    Parameters
+    ----------
+    surface : Surface
+    directions : (n, N, 3) array_like
+        In any order. If one of them is zero, all are undefined there.
+    source, undefined, domain
+        As for `checked_field`.
+
+    Returns
+    -------
+    RosyField
+        With deviations if they are not a RoSy; see `directions_field`.
+
+    Raises
+    ------
+    RosyError
+        As `checked_field`.
+    """
+    directions = np.array(directions, dtype=np.float64)
+    given = directions.copy() if field_domain(surface, len(directions)) == "face" else None
+    count, degree = directions.shape[:2]
+    lost = ~is_usable(directions).all(axis=(1, 2))
+    directions[lost] = np.nan
+    domain = field_domain(surface, count) if domain is None else domain
+    if domain is not None and count == _elements(surface, domain):
+        normal = tangent_normals(surface, domain)
+        x, y = tangent_frame(normal)
+        sound = np.where(lost[:, None, None], 0.0, directions)
+        w = dot(sound, x[:, None]) + 1j * dot(sound, y[:, None])
+    if domain is None or count != _elements(surface, domain) or is_rosy(w):
+        vectors = directions[:, 0].copy()
+        vectors[lost] = np.nan
+        vectors[~lost & ~directions.any(axis=2).all(axis=1)] = 0
+        field = checked_field(surface, vectors, degree, source, undefined, domain)
+        return replace(with_families(_at_rest(surface), field), given=given)
+    settle_undefined(directions.reshape(count, -1), source, domain, undefined)
+    tolerance = FACE_TOLERANCE if domain == "face" else VERTEX_TOLERANCE
+    flat, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
+    directions = into_planes(flat, normals, tolerance, source, domain).reshape(count, degree, 3)
+    surface = _at_rest(surface)
+    if domain == "face":
+        return replace(directions_field(surface, directions), given=given)
+    return with_families(surface, _directions_onto_faces(surface, directions, normal))
+
+
+def _directions_onto_faces(
+    surface: Surface, directions: np.ndarray, normal: np.ndarray
+) -> RosyField:
+    """The mean over each face's corners of directions on vertices, of z and of each harmonic."""
+    degree = directions.shape[1]
+    x, y = tangent_frame(normal)
+    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    first, rho, deviations = nearest_rosy(w)
+    face_x, face_y = face_frames(surface)
+    corner_normal = normal[surface.corner_vertex]
+    turn = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+
+    def mean(values: np.ndarray, order: int) -> np.ndarray:
+        back = values[surface.corner_vertex] * np.conj(signed_power(turn, order))
+        return mean_over_faces(back, surface.face_start)
+
+    z = mean(rho * np.exp(1j * degree * first), degree)
+    member = np.exp(1j * np.angle(z) / degree)
+    found = {
+        j: mean(values * np.exp(-1j * j * first), -j) * signed_power(member, j)
+        for j, values in harmonics_of(deviations).items()
+    }
+    vectors = from_representation(z, face_x, face_y, degree)
+    return RosyField(degree, vectors, deviations_of(found, degree))
+
+
+def _elements(surface: Surface, domain: str) -> int:
+    return surface.face_count if domain == "face" else len(surface.vertices)
 
 
 def field_domain(surface: Surface, count: int) -> str | None:
@@ -156,6 +257,12 @@ def settle_undefined(values: np.ndarray, source: str, domain: str, undefined: st
             f"{domain} {int(np.argmax(lost))}; ask for them to be undefined, or mend them"
         )
     values[lost] = 0.0
+
+
+def is_usable(values: np.ndarray) -> np.ndarray:
+    """Which numbers are finite, and their squares too."""
+    with np.errstate(invalid="ignore"):
+        return np.abs(values) < HUGE
 
 
 def _onto_faces(

@@ -1,24 +1,48 @@
-"""Fields from files and to files: `.rosy`, one member a row, and `.rawfield`, all of them."""
+"""Fields from files and to files, in the formats that other programs use."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
+from typing import NamedTuple
 
 from ..errors import RosyError
 from ..files import write_bytes
-from .check import checked_field, field_domain, tangent_normals
-from .formats.rows import Rows, read_rows, shown
-from .frames import dot, unit
-from .rosy_field import RosyField, check_degree
-from .surface import Surface
+from .check import checked_directions, checked_field, field_domain, is_usable
+from .directions import directions_of, tensor_field
+from .follow import follow
+from .formats.fieldgen import fieldgen_text, read_fieldgen
+from .formats.given import Given
+from .formats.plain import npy_bytes, read_npy, read_text, text_of
+from .formats.rosyfiles import rawfield_text, read_rawfield, read_rosy, rosy_text
+from .formats.sings import SINGULARITIES, sings_text
+from .meshfile import READERS as MESHES
+from .meshfile import SHARP_ANGLE, read_mesh
+from .rosy_field import RosyField
+from .singularities import singularities
+from .surface import Surface, build_surface
 
-#: How far the vectors of a .rawfield may be from a RoSy: degrees between neighbours, and relative
-#: difference in length. Files with six digits are a hundred times as good.
-ANGLE_TOLERANCE, LENGTH_TOLERANCE = 1.0, 0.01
+#: What is read, by the end of the name.
+_READERS: dict[str, Callable[[Path], Given]] = {
+    ".rosy": read_rosy,
+    ".rawfield": read_rawfield,
+    ".obj": read_fieldgen,
+    ".txt": read_text,
+    ".npy": read_npy,
+}
+READ = tuple(_READERS)
+WRITTEN = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITIES)
+
+#: Of files that say nothing of it.
+DEFAULT_DEGREE = 4
+
+
+class Loaded(NamedTuple):
+    """A field, and what the user should know of how it was read; empty if nothing."""
+
+    field: RosyField
+    note: str
 
 
 def read_field(
@@ -26,184 +50,177 @@ def read_field(
     surface: Surface,
     degree: int | None = None,
     undefined: str = "error",
+    mesh: str | os.PathLike[str] | None = None,
 ) -> RosyField:
-    """Read the field of a mesh from a `.rosy` or `.rawfield` file.
+    """The field of `load_field`."""
+    return load_field(path, surface, degree, undefined, mesh).field
 
-    A `.rosy` file holds a count, N, and that many rows x y z, one member each; a `.rawfield` holds
-    N, a count, and rows of all N members. White space may be any, and rows may belong to faces or
-    to vertices, which are then averaged onto the faces.
+
+def load_field(
+    path: str | os.PathLike[str],
+    surface: Surface,
+    degree: int | None = None,
+    undefined: str = "error",
+    mesh: str | os.PathLike[str] | None = None,
+) -> Loaded:
+    """Read the field of a mesh from a file.
+
+    ============  ==================================================================
+    `.rosy`       a count, N, and rows x y z: one member each
+    `.rawfield`   N, a count, and rows of all N directions, a RoSy or not
+    `.obj`        a mesh with the field in comments, as the program fieldgen writes it
+    `.txt`        rows of 3 numbers (a member each), of 3 N (all directions), or of 9
+                  that are symmetric 3 x 3 tensors
+    `.npy`        the same as an array, (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
+    ============  ==================================================================
+
+    White space may be any. Rows belong to faces or to vertices, which are then averaged onto the
+    faces; tensors to faces alone.
 
     Parameters
     ----------
     path : path-like
     surface : Surface
     degree : int, optional
-        What N has to be; any if not given.
+        What N has to be; any if not given. A plain file with one member a row does not say, and is
+        of degree `DEFAULT_DEGREE` then.
     undefined : {"error", "zero"}
         What to do about NaN and infinite vectors.
+    mesh : path-like, optional
+        The mesh file that the rows count by, if its faces are others than those of `surface`:
+        triangulated, say, or in another order. The field follows by position. If not given, and
+        the counts differ, a mesh file of the same name beside the field is taken.
+
+    Returns
+    -------
+    Loaded
 
     Raises
     ------
     RosyError
         If the file is missing, of another kind, damaged, of another degree or for another mesh, or
-        its vectors are not an N-RoSy on the surface.
+        its vectors are not tangent to the surface.
     """
     path = Path(path)
-    reader = _FORMATS.get(path.suffix.lower(), (None,))[0]
+    reader = _READERS.get(path.suffix.lower())
+    if path.suffix.lower() in SINGULARITIES:
+        raise RosyError(f"{path}: holds singularities, and no directions")
     if reader is None:
-        raise RosyError(f"{path}: fields are read from {_KINDS}, not from '{path.suffix}' files")
-    rows = read_rows(path, comment=None)
-    found, vectors = reader(rows, surface)
-    if degree is not None and found != degree:
-        raise RosyError(f"{path}: holds a field of degree {found}, not {degree}")
-    return checked_field(surface, vectors, found, str(path), undefined)
+        raise RosyError(
+            f"{path}: fields are read from {_listed(READ)}, not from '{path.suffix}' files"
+        )
+    given = reader(path)
+    if degree is not None and given.degree is not None and given.degree != degree:
+        raise RosyError(f"{path}: holds a field of degree {given.degree}, not {degree}")
+    own = _own_surface(path, given, surface, mesh)
+    if own is None:
+        return Loaded(_made(given, surface, degree, str(path), undefined), "")
+    field = follow(own, _made(given, own, degree, str(path), undefined), surface, str(path))
+    return Loaded(
+        field,
+        f"{path.name}: its {own.face_count:,} faces are not the {surface.face_count:,} of the mesh; "
+        f"the field followed by position, from {Path(own.name).name}",
+    )
+
+
+def _made(
+    given: Given, surface: Surface, degree: int | None, source: str, undefined: str
+) -> RosyField:
+    """The field of a file on the surface that its rows count by."""
+    _check_count(given, surface, source)
+    values = given.values
+    if given.tensors:
+        if not is_usable(values).all():
+            raise RosyError(f"{source}: holds tensors that are not finite")
+        if len(values) != surface.face_count:
+            raise RosyError(f"{source}: holds tensors on vertices; they are read on faces alone")
+        return tensor_field(surface, values)
+    if given.degree is None or values.shape[1] == 1:
+        found = given.degree or degree or DEFAULT_DEGREE
+        return checked_field(surface, values[:, 0], found, source, undefined, given.domain)
+    return checked_directions(surface, values, source, undefined, given.domain)
+
+
+def _check_count(given: Given, surface: Surface, source: str) -> None:
+    """Some writers put the number of vertices over rows for faces: the rows tell.
+
+    Any other disagreement between the two is an error.
+    """
+    found = len(given.values)
+    vertices_over_faces = given.says == len(surface.vertices) and found == surface.face_count
+    if given.says not in (None, found) and not vertices_over_faces:
+        raise RosyError(
+            f"{source}: says {given.says} rows of {given.columns} numbers, but holds {found}"
+        )
+    if given.domain is None and field_domain(surface, found) is None:
+        raise RosyError(
+            f"{source}: holds {found} rows, but the mesh {surface.name} has "
+            f"{surface.face_count} faces and {len(surface.vertices)} vertices"
+        )
+
+
+def _own_surface(
+    path: Path, given: Given, surface: Surface, mesh: str | os.PathLike[str] | None
+) -> Surface | None:
+    """The surface that a file's rows count by; None if it is that which wants the field."""
+    if mesh is not None:
+        return read_mesh(mesh)
+    count = len(given.values)
+    if given.polygons is not None:
+        own = len(given.polygons.vertices), given.polygons.face_count
+        if own == (len(surface.vertices), surface.face_count):
+            return None
+        return build_surface(*given.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    if count == surface.face_count:
+        return None
+    beside = [path.with_suffix(suffix) for suffix in MESHES if suffix != path.suffix.lower()]
+    found = next((other for other in beside if other.is_file()), None)
+    if found is None:
+        return None
+    own = read_mesh(found)
+    # As many rows as vertices may still be those of the faces of the mesh beside.
+    return own if count == own.face_count or field_domain(surface, count) is None else None
 
 
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
-    """Write a field to a `.rosy` or `.rawfield` file, one row a face.
+    """Write a field to a file, one row a face (`.obj`: one a vertex, with the mesh).
 
-    The numbers are the shortest that give the same float64 when read, so what is read again is the
-    same to the last bit.
+    Numbers are the shortest that give the same float64 when read, so that what is read again is the
+    same to the last bit; but for `.obj`, whose field is on vertices. Directions that came from a
+    file or from attributes are written as they came. `.sings` and `.sing` hold the singularities of
+    the field.
 
     Raises
     ------
     RosyError
-        If the name ends in neither, or the file cannot be written.
+        If the name ends in none of `WRITTEN`, the format has no room for such a field, or the file
+        cannot be written.
     """
     path = Path(path)
-    writer = _FORMATS.get(path.suffix.lower(), (None, None))[1]
-    if writer is None:
-        raise RosyError(f"{path}: fields are written to {_KINDS}, not to '{path.suffix}' files")
-    write_bytes(path, writer(field, surface).encode("ascii"))
-
-
-def _read_rosy(rows: Rows, surface: Surface) -> tuple[int, np.ndarray]:
-    count, degree, numbers = _header(rows, "count", "degree")
-    degree = _degree(rows, 1, degree)
-    vectors = _table(rows, numbers, 3, count, surface)
-    return degree, vectors
-
-
-def _read_rawfield(rows: Rows, surface: Surface) -> tuple[int, np.ndarray]:
-    degree, count, numbers = _header(rows, "degree", "count")
-    degree = _degree(rows, 0, degree)
-    members = _table(rows, numbers, 3 * degree, count, surface).reshape(-1, degree, 3)
-    check_members(str(rows.path), members, surface)
-    vectors = members[:, 0].copy()
-    vectors[~np.isfinite(members).all(axis=(1, 2))] = np.nan
-    return degree, vectors
-
-
-def _header(rows: Rows, *names: str) -> tuple[int, int, int]:
-    """The first two numbers, on one line or on two, and how many numbers follow."""
-    words = [word for line in rows.words[:2] for word in line][:2]
-    values = []
-    for number, name in enumerate(names):
-        try:
-            values.append(int(words[number]))
-        except IndexError:
-            raise RosyError(f"{rows.path}: ends before the {name}") from None
-        except ValueError:
-            row = rows.row_of_word(number)
-            found = shown(words[number])
-            raise rows.error(row, f"found {found}, wanted the {name}, a whole number") from None
-    return *values, sum(map(len, rows.words)) - 2
-
-
-def _degree(rows: Rows, word: int, degree: int) -> int:
-    try:
-        return check_degree(degree)
-    except RosyError as reason:
-        raise rows.error(rows.row_of_word(word), str(reason)) from None
-
-
-def _table(rows: Rows, numbers: int, columns: int, count: int, surface: Surface) -> np.ndarray:
-    """(n, columns) the numbers after the header. The rows tell how many there are.
-
-    Some writers put the number of vertices over rows for faces; any other disagreement between the
-    count and the rows is an error.
-    """
-    found, rest = divmod(numbers, columns)
-    vertices_over_faces = count == len(surface.vertices) and found == surface.face_count
-    if rest or (found != count and not vertices_over_faces):
-        part = " and a part of one" if rest else ""
+    kind = path.suffix.lower()
+    if kind not in WRITTEN:
         raise RosyError(
-            f"{rows.path}: says {count} rows of {columns} numbers, but holds {found}{part}"
+            f"{path}: fields are written to {_listed(WRITTEN)}, not to '{path.suffix}' files"
         )
-    if field_domain(surface, found) is None:
+    if kind in (".rosy", ".obj") and field.deviations is not None:
         raise RosyError(
-            f"{rows.path}: holds {found} rows, but the mesh {surface.name} has "
-            f"{surface.face_count} faces and {len(surface.vertices)} vertices"
+            f"{path}: a {kind} file has room for one member a row, but the directions of this "
+            "field are no RoSy: write a .rawfield, .txt or .npy file"
         )
-    return rows.floats("part of a vector")[2:].reshape(found, columns)
+    if kind == ".rosy":
+        data = rosy_text(field)
+    elif kind == ".obj":
+        data = fieldgen_text(surface, field)
+    elif kind in SINGULARITIES:
+        data = sings_text(field.degree, *singularities(surface, field))
+    else:
+        rows = field.given if field.given is not None else directions_of(surface, field)
+        if kind == ".npy":
+            write_bytes(path, npy_bytes(rows))
+            return
+        data = rawfield_text(rows) if kind == ".rawfield" else text_of(rows)
+    write_bytes(path, data.encode("ascii"))
 
 
-def check_members(source: str, members: np.ndarray, surface: Surface) -> None:
-    """Make sure that vectors given together are a RoSy, in whatever order.
-
-    Parameters
-    ----------
-    source : str
-        File or attributes, for messages.
-    members : (n, N, 3) ndarray
-        N vectors on each face or each vertex. Rows of zeros, and those that hold anything not
-        finite, are left out.
-    surface : Surface
-
-    Raises
-    ------
-    RosyError
-        If angles between neighbours or lengths differ by more than `ANGLE_TOLERANCE` and
-        `LENGTH_TOLERANCE`, with the largest deviations.
-    """
-    count, degree = members.shape[:2]
-    length = np.sqrt(dot(members, members))
-    rows = np.flatnonzero(np.isfinite(length).all(axis=1) & length.any(axis=1))
-    if degree == 1 or not len(rows):
-        return
-    members, length = members[rows], length[rows]
-    normal = tangent_normals(surface, field_domain(surface, count))[rows]
-    x = unit(members[:, 0] - dot(members[:, 0], normal)[:, None] * normal)
-    y = np.cross(normal, x)
-    angle = np.sort(
-        np.arctan2(dot(members, y[:, None]), dot(members, x[:, None])) % (2 * np.pi), axis=1
-    )
-    gap = np.diff(angle, axis=1, append=angle[:, :1] + 2 * np.pi)
-    off = np.degrees(np.abs(gap - 2 * np.pi / degree).max(axis=1))
-    spread = length.max(axis=1) / np.maximum(length.min(axis=1), 1e-300) - 1
-    usable = x.any(axis=1)
-    off, spread = off[usable], spread[usable]
-    if off.max(initial=0) > ANGLE_TOLERANCE or spread.max(initial=0) > LENGTH_TOLERANCE:
-        shorter, longer = length[usable].min(), length[usable].max()
-        worst = rows[usable][np.argmax(off)]
-        raise RosyError(
-            f"{source}: its vectors are not a RoSy of degree {degree}: the angles between neighbours "
-            f"deviate from {360 / degree:.4g} degrees by up to {off.max():.1f} (row {worst}) and "
-            f"lengths within a row by up to {100 * spread.max():.0f} % (all are {shorter:.2g} to "
-            f"{longer:.2g}); {ANGLE_TOLERANCE:g} degree and {100 * LENGTH_TOLERANCE:g} % are allowed"
-        )
-
-
-def _rosy_text(field: RosyField, surface: Surface) -> str:
-    return "\n".join([str(len(field.vectors)), str(field.degree), *_lines(field.vectors), ""])
-
-
-def _rawfield_text(field: RosyField, surface: Surface) -> str:
-    """Members counter-clockwise about the normal, the stored one first and untouched."""
-    across = np.cross(tangent_normals(surface, "face"), field.vectors)
-    turns = 2 * np.pi * np.arange(1, field.degree) / field.degree
-    members = [field.vectors]
-    members += [np.cos(turn) * field.vectors + np.sin(turn) * across for turn in turns]
-    rows = np.concatenate(members, axis=1)
-    return "\n".join([f"{field.degree} {len(rows)}", *_lines(rows), ""])
-
-
-def _lines(rows: np.ndarray) -> list[str]:
-    return [" ".join(map(repr, row)) for row in rows.tolist()]
-
-
-_FORMATS: dict[str, tuple[Callable, Callable]] = {
-    ".rosy": (_read_rosy, _rosy_text),
-    ".rawfield": (_read_rawfield, _rawfield_text),
-}
-_KINDS = " and ".join(_FORMATS)
+def _listed(kinds: tuple[str, ...]) -> str:
+    return f"{', '.join(kinds[:-1])} and {kinds[-1]}"

@@ -25,6 +25,14 @@ def power(numbers: np.ndarray, degree: int) -> np.ndarray:
         numbers = numbers * numbers
 
 
+def signed_power(numbers: np.ndarray, order: int) -> np.ndarray | int:
+    """`numbers`, of modulus 1 or 0, to a whole power; to a negative one by their conjugates."""
+    if order == 0:
+        return 1
+    found = power(numbers, abs(order))
+    return found if order > 0 else found.conj()
+
+
 def complex_sums(group: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
     """(count,) complex sums of the numbers of each group: `bincount`, of complex weights."""
     real = np.bincount(group, numbers.real, count)
@@ -87,3 +95,23 @@ def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
     """(F,) complex128: z of a field in `face_frames`."""
     x, y = face_frames(surface)
     return to_representation(field.vectors, x, y, field.degree)
+
+
+def matching_angles(
+    surface: Surface,
+    x: np.ndarray,
+    y: np.ndarray,
+    z: np.ndarray,
+    degree: int,
+    a: np.ndarray,
+    b: np.ndarray,
+) -> np.ndarray:
+    """(I,) radians from a member on side a to the nearest on side b, the two faces unfolded."""
+    from_face, to_face = surface.corner_face[a], surface.corner_face[b]
+    edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
+    here = dot(edge, x[from_face]) + 1j * dot(edge, y[from_face])
+    there = dot(edge, x[to_face]) + 1j * dot(edge, y[to_face])
+    unfold = there * here.conj()
+    size = np.abs(unfold)
+    unfold = np.divide(unfold, size, out=np.ones_like(unfold), where=size > 0)
+    return np.angle(z[to_face] * (z[from_face] * power(unfold, degree)).conj()) / degree

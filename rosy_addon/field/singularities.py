@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .frames import dot
-from .representation import face_frames, power, to_representation
+from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
 from .surface import Surface, surface_edges
 
@@ -45,7 +45,7 @@ def singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.nd
     z = to_representation(field.vectors, x, y, field.degree)
     edges = surface_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.sides[:, 0], edges.sides[:, 1]
-    matching = _matching_angles(surface, x, y, z, field.degree, a, b)
+    matching = matching_angles(surface, x, y, z, field.degree, a, b)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
     # Counter-clockwise around its head an edge is crossed from side a to side b, around its tail
@@ -64,26 +64,6 @@ def singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.nd
     whole[corner[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(whole & (index != 0)).astype(np.int32)
     return vertex, index[vertex]
-
-
-def _matching_angles(
-    surface: Surface,
-    x: np.ndarray,
-    y: np.ndarray,
-    z: np.ndarray,
-    degree: int,
-    a: np.ndarray,
-    b: np.ndarray,
-) -> np.ndarray:
-    """(I,) radians from a member on side a to the nearest on side b, the two faces unfolded."""
-    from_face, to_face = surface.corner_face[a], surface.corner_face[b]
-    edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
-    here = dot(edge, x[from_face]) + 1j * dot(edge, y[from_face])
-    there = dot(edge, x[to_face]) + 1j * dot(edge, y[to_face])
-    unfold = there * here.conj()
-    size = np.abs(unfold)
-    unfold = np.divide(unfold, size, out=np.ones_like(unfold), where=size > 0)
-    return np.angle(z[to_face] * (z[from_face] * power(unfold, degree)).conj()) / degree
 
 
 def _signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:

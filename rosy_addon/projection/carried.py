@@ -3,7 +3,8 @@
 A field is given on faces at rest. Each face's member is carried to where the face is now, and from
 the faces to the corners, where it is averaged over each smooth fan. Everything but the first step
 is done on the representation z = rho exp(i N t), so that nothing depends on which of the N members
-is stored.
+is stored. What a field has besides, the deviations of free directions and the line that the stored
+member is on, goes the same way, as complex numbers that turn with the frame as other powers.
 
 Vectors are kept and worked on by their components, which lie in a row each.
 """
@@ -16,8 +17,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..field.directions import harmonics
 from ..field.frames import dot_components, transformed
-from ..field.representation import power
+from ..field.representation import power, signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..progress import Progress, Work
@@ -30,6 +32,16 @@ BLOCK = 1 << 14
 SIMILAR = 2e-6
 
 Vectors = Sequence[np.ndarray]
+
+#: What a field may have besides z: ("deviation", j) is the harmonic C_j of `field.directions`,
+#: ("family", m) the representation, of degree N / m, of the line that the stored member is on.
+Trait = tuple[str, int]
+
+
+def order_of(trait: Trait, degree: int) -> int:
+    """To which power of a turn of the frame a trait turns; z does to the power N."""
+    kind, number = trait
+    return -number if kind == "deviation" else degree // number
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +62,8 @@ class Carried:
         n_0 . (n_1 x n_2).
     plane_normal : (3, T) ndarray
         Of the triangles themselves, from the order of their corners.
+    traits : dict of Trait to (3, T) complex ndarray
+        As z.
     """
 
     normal: np.ndarray
@@ -58,6 +72,7 @@ class Carried:
     dots: np.ndarray
     volume: np.ndarray
     plane_normal: np.ndarray
+    traits: dict[Trait, np.ndarray]
 
     def turned(self, rotation: np.ndarray) -> Carried:
         """The same in another space, given the (3, 3) rotation to there."""
@@ -100,6 +115,7 @@ def carrying(surface: Surface, matrix: np.ndarray, field: RosyField, display: st
         dots=np.empty((3, count), dtype=np.float32),
         volume=np.empty(count, dtype=np.float32),
         plane_normal=np.empty((3, count), dtype=np.float32),
+        traits={trait: np.empty((3, count), dtype=np.complex64) for trait in faces.traits},
     )
     custom = None
     if fans is not None and not surface.fans_share_normals:
@@ -125,11 +141,14 @@ class _Faces:
         In the `_frame` of that normal.
     angle : (C,) float32 ndarray or None
         Of each face at each of its corners.
+    traits : dict of Trait to (F,) complex64 ndarray
+        As z.
     """
 
     normal: np.ndarray
     z: np.ndarray
     angle: np.ndarray | None
+    traits: dict[Trait, np.ndarray]
 
 
 def _faces(
@@ -140,10 +159,16 @@ def _faces(
     `now` are the (3, V) vertices in world space, but for the shift.
     """
     count = surface.face_count
+    relative: dict[Trait, np.ndarray] = {
+        ("deviation", j): values for j, values in harmonics(field).items()
+    }
+    if field.families > 1:
+        relative["family", field.families] = np.ones(count)
     found = _Faces(
         normal=np.empty((3, count), dtype=np.float32),
         z=np.empty(count, dtype=np.complex64),
         angle=np.empty(len(surface.corner_vertex), dtype=np.float32) if angles else None,
+        traits={trait: np.empty(count, dtype=np.complex64) for trait in relative},
     )
     scale = _similarity(linear) if surface.rest is None else None
     rest = None
@@ -165,7 +190,11 @@ def _faces(
             member = _carried_member(_from_first(rest, corner_vertex), points, vectors, x, y)
         size = np.abs(member)
         member /= np.maximum(size, np.finfo(np.float64).tiny)
-        found.z[block] = power(member, field.degree) * (size * np.logical_or.reduce(normal))
+        exists = np.logical_or.reduce(normal)
+        found.z[block] = power(member, field.degree) * (size * exists)
+        for trait, values in relative.items():
+            turn = signed_power(member, order_of(trait, field.degree))
+            found.traits[trait][block] = values[block] * turn * exists
         if angles:
             for corner, angle in enumerate(_angles(points)):
                 found.angle[first + corner] = angle
@@ -308,10 +337,11 @@ def _cofactors(linear: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Fans:
-    """Smooth fans of corners: (3, K) float32 normals, (K,) complex64 z in their `_frame`."""
+    """Smooth fans of corners: (3, K) float32 normals, (K,) complex64 values in their `_frame`."""
 
     normal: np.ndarray
     z: np.ndarray
+    traits: dict[Trait, np.ndarray]
 
 
 def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _Fans:
@@ -324,7 +354,10 @@ def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _
     normal = normal.astype(np.float32)
     frame_x, frame_y = _frame(normal)
     count, fans = len(surface.corner_vertex), normal.shape[1]
-    real, imaginary, weight = (np.empty(count) for _ in range(3))
+    weight = np.empty(count)
+    values = [(faces.z, degree)]
+    values += [(own, order_of(trait, degree)) for trait, own in faces.traits.items()]
+    sums = [(np.empty(count), np.empty(count)) for _ in values]
     for start in range(0, count, BLOCK):
         part = slice(start, min(start + BLOCK, count))
         face, fan = surface.corner_face[part], surface.corner_fan[part].astype(np.intp)
@@ -334,17 +367,21 @@ def _fans(surface: Surface, linear: np.ndarray, faces: _Faces, degree: int) -> _
             [x.take(fan) for x in frame_x],
             [y.take(fan) for y in frame_y],
         )
-        z, angle = faces.z.take(face), faces.angle[part]
-        np.multiply(angle, z != 0, out=weight[part])
-        z *= power(turn, degree)
-        z *= angle
-        real[part], imaginary[part] = z.real, z.imag
+        np.multiply(faces.angle[part], faces.z.take(face) != 0, out=weight[part])
+        for (own, order), (real, imaginary) in zip(values, sums, strict=True):
+            z = own.take(face)
+            z *= signed_power(turn, order)
+            z *= weight[part]
+            real[part], imaginary[part] = z.real, z.imag
     total = np.bincount(surface.corner_fan, weight, fans)
     total[total == 0] = np.inf
-    z = np.empty(fans, dtype=np.complex64)
-    z.real = np.bincount(surface.corner_fan, real, fans) / total
-    z.imag = np.bincount(surface.corner_fan, imaginary, fans) / total
-    return _Fans(normal, z)
+    means = []
+    for real, imaginary in sums:
+        z = np.empty(fans, dtype=np.complex64)
+        z.real = np.bincount(surface.corner_fan, real, fans) / total
+        z.imag = np.bincount(surface.corner_fan, imaginary, fans) / total
+        means.append(z)
+    return _Fans(normal, means[0], dict(zip(faces.traits, means[1:], strict=True)))
 
 
 def _carried_turn(source: Vectors, target: Vectors, x: Vectors, y: Vectors) -> np.ndarray:
@@ -386,18 +423,29 @@ def _fill_triangles(
         plane_normal[:] = _normal(_from_first(now, vertices))
     if fans is None:
         normals = [[own.take(face) for own in faces.normal]] * 3
-        values = [faces.z.take(face)] * 3
+        turns = None
     else:
-        normals, values = _fan_values(surface, corners, fans, custom, degree)
+        fan = [surface.corner_fan.take(corner).astype(np.intp) for corner in corners]
+        normals, turns = _fan_normals(fan, corners, fans, custom)
     normals = [_completed(normal, plane_normal) for normal in normals]
     x, y = _frame(normals[0])
     # Values on faces where the field is undefined are so at all corners.
     defined = faces.z.take(face) != 0
-    for corner, (normal, z) in enumerate(zip(normals, values, strict=True)):
-        if corner and fans is not None:
-            z = z * power(_carried_turn(normal, normals[0], x, y), degree)
+    outs = [(carried.z, degree, faces.z, fans and fans.z)]
+    outs += [
+        (out, order_of(trait, degree), faces.traits[trait], fans and fans.traits[trait])
+        for trait, out in carried.traits.items()
+    ]
+    for corner, normal in enumerate(normals):
         carried.normal[corner, :, part] = normal
-        np.multiply(z, defined, out=carried.z[corner, part])
+        back = _carried_turn(normal, normals[0], x, y) if corner and fans is not None else None
+        for out, order, of_faces, of_fans in outs:
+            z = of_faces.take(face) if of_fans is None else of_fans.take(fan[corner])
+            if turns is not None:
+                z *= signed_power(turns[corner], order)
+            if back is not None:
+                z *= signed_power(back, order)
+            np.multiply(z, defined, out=out[corner, part])
     carried.axis[:, part] = x
     carried.plane_normal[:, part] = plane_normal
     for number, (one, other) in enumerate(((0, 1), (0, 2), (1, 2))):
@@ -417,24 +465,22 @@ def _completed(normal: list[np.ndarray], plane_normal: np.ndarray) -> list[np.nd
     return normal
 
 
-def _fan_values(
-    surface: Surface,
+def _fan_normals(
+    fan: Sequence[np.ndarray],
     corners: np.ndarray,
     fans: _Fans,
     custom: np.ndarray | None,
-    degree: int,
-) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
-    """Normals and values of the fans at corners; with custom normals, those and values there."""
-    normals, values = [], []
-    for corner in corners:
-        fan = surface.corner_fan.take(corner).astype(np.intp)
-        normal, z = [part.take(fan) for part in fans.normal], fans.z.take(fan)
-        if custom is not None:
-            own = [
-                part.astype(np.float32) for part in _unit([part.take(corner) for part in custom])
-            ]
-            z *= power(_carried_turn(normal, own, *_frame(own)), degree)
-            normal = own
-        normals.append(normal)
-        values.append(z)
-    return normals, values
+) -> tuple[list[list[np.ndarray]], list[np.ndarray] | None]:
+    """Normals at corners, and with custom ones the turns from the frames of the fans to theirs."""
+    normals = [[part.take(number) for part in fans.normal] for number in fan]
+    if custom is None:
+        return normals, None
+    own = [
+        [part.astype(np.float32) for part in _unit([part.take(corner) for part in custom])]
+        for corner in corners
+    ]
+    turns = [
+        _carried_turn(normal, there, *_frame(there))
+        for normal, there in zip(normals, own, strict=True)
+    ]
+    return own, turns

@@ -11,7 +11,7 @@ import numpy as np
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
-from .carried import Carried
+from .carried import Carried, Trait
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +74,9 @@ class GBuffer:
     front : (P,) bool ndarray
         Whether the side of the triangle is seen on which its corners run counter-clockwise. True
         throughout if not given.
+    traits : dict of Trait to (P,) complex64 ndarray
+        What some fields have besides (`carried.Trait`), in the same frame; elsewhere what a RoSy
+        would have.
     made : dict
         What has been made of it for a look, for the next one.
     """
@@ -92,6 +95,7 @@ class GBuffer:
     representation: np.ndarray
     plane_normal: np.ndarray | None = None
     front: np.ndarray | None = None
+    traits: dict[Trait, np.ndarray] = dataclass_field(default_factory=dict)
     made: dict[Any, Any] = dataclass_field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -14,11 +14,11 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.frames import carry_components, dot_components, transformed
-from ..field.representation import power
+from ..field.representation import signed_power
 from ..memory import keep_freed_memory
 from ..progress import Progress, Work, drain, part
 from .camera import Camera, pixel_rays
-from .carried import Carried, carrying
+from .carried import Carried, carrying, order_of
 from .gbuffer import Body, GBuffer
 from .raster import Fragments, rasterise
 from .steps import links, screen_axes
@@ -82,6 +82,7 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
         )
         carried = yield from part(_carried(bodies[number], display), start, middle)
         carried = carried.turned(camera.view[:3, :3])
+        _make_room(buffer, carried)
         for first in range(0, len(own), BLOCK):
             yield Progress(
                 middle + (stop - middle) * first / len(own), "turning the field into the view"
@@ -245,6 +246,14 @@ def _vectors(count: int) -> np.ndarray:
 # --- pixels --------------------------------------------------------------------------------------
 
 
+def _make_room(buffer: GBuffer, carried: Carried) -> None:
+    """Room for the traits of a body; elsewhere they are those of a RoSy."""
+    for trait in carried.traits:
+        if trait not in buffer.traits:
+            usual = 1 if trait == ("deviation", 0) else 0
+            buffer.traits[trait] = np.full(len(buffer.pixel), usual, dtype=np.complex64)
+
+
 def _fill(
     buffer: GBuffer,
     pixels: slice | np.ndarray,
@@ -266,17 +275,23 @@ def _fill(
     if not size.all():
         lost = size == 0
         normal[:, lost] = plane_normal[:, lost]
-    z = _interpolated_values(values, shown, weights, size, degree)
+    more = [
+        (buffer.traits[trait], z, order_of(trait, degree)) for trait, z in values.traits.items()
+    ]
     axis = carry_components(values.axis.take(shown, axis=1), corners[0], normal)
     if not front.all():
-        # The members stay where they are in space; seen from behind, angles run the other way.
-        np.conjugate(z, out=z, where=~front)
         np.negative(normal, out=normal, where=~front)
         np.negative(plane_normal, out=plane_normal, where=~front)
-    z *= power(_turn_into_view(axis, normal, toward_eye), degree)
+    turn = _turn_into_view(axis, normal, toward_eye)
+    for out, given, order in [(buffer.representation, values.z, degree), *more]:
+        z = _interpolated_values(values, given, shown, weights, size, order)
+        if not front.all():
+            # The members stay where they are in space; seen from behind, angles run the other way.
+            np.conjugate(z, out=z, where=~front)
+        z *= signed_power(turn, order)
+        out[pixels] = z
     buffer.normal[pixels] = normal.T
     buffer.plane_normal[pixels] = plane_normal.T
-    buffer.representation[pixels] = z
 
 
 def _interpolated_normal(
@@ -296,9 +311,16 @@ def _interpolated_normal(
 
 
 def _interpolated_values(
-    values: Carried, shown: np.ndarray, weights: np.ndarray, size: np.ndarray, degree: int
+    values: Carried,
+    corners: np.ndarray,
+    shown: np.ndarray,
+    weights: np.ndarray,
+    size: np.ndarray,
+    order: int,
 ) -> np.ndarray:
     """(P,) z at the interpolated normal n, relative to `values.axis` carried from n_0 to n.
+
+    Of the (3, T) values at corners, which turn with the frame to the power `order`.
 
     Each corner's value is to come along the arc n_i -> n, so that pixels on an edge depend on its
     two ends alone and values are continuous from triangle to triangle. It has come along
@@ -312,7 +334,7 @@ def _interpolated_values(
     of their triple product.
     """
     b0, b1, b2 = weights
-    z0, z1, z2 = (corner.take(shown) for corner in values.z)
+    z0, z1, z2 = (corner.take(shown) for corner in corners)
     volume = values.volume.take(shown)
     if np.abs(volume).max(initial=0) < 2 * FLAT:
         return z0 * b0 + z1 * b1 + z2 * b2
@@ -323,8 +345,8 @@ def _interpolated_values(
     half1.imag = b2 * volume
     half2.real = size * (1 + d02) + n0 + (b0 * d02 + b1 * d12 + b2)
     half2.imag = -b1 * volume
-    z1 *= power(_squared_phase(half1), degree)
-    z2 *= power(_squared_phase(half2), degree)
+    z1 *= signed_power(_squared_phase(half1), order)
+    z2 *= signed_power(_squared_phase(half2), order)
     z0 *= b0
     z1 *= b1
     z2 *= b2

@@ -28,7 +28,7 @@ GROUPS = {
         "cross_creases",
         "crease_angle",
     ),
-    "Colour": ("noise", "magnitude", "magnitude_range", "colour_map"),
+    "Colour": ("noise", "hue", "magnitude", "magnitude_range", "colour_map"),
     "Light": ("shading", "light"),
     "Quality": ("supersampling", "display", "method", "seed"),
 }

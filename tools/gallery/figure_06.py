@@ -32,7 +32,7 @@ def write() -> None:
     layers = compose_field(constant(MEMBER, DEGREE), DEGREE, WHOLE, LOOK).layers[0]
     expected = expected_deviation(LOOK)
     # Streamlines are whole in the part that is shown.
-    gain = float(blend_gain(DEGREE, np.float32([2 * LOOK.length + 1]), LOOK)[0])
+    gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
     blend = layers.images.blend
     shown = [
         ("one member, I₀", layers.images.members[0], expected),
@@ -114,7 +114,11 @@ def _corrected(degree: int, look: Look) -> list[float]:
         seeded = look.with_settings({"seed": seed})
         tone = compose_field(constant(MEMBER, degree), degree, WHOLE, seeded).layers[0].tone
         found.append(float(_cut(tone).std()))
-    factor = float(blend_gain(degree, np.float32([2 * look.length + 1]), look)[0])
+    factor = float(
+        blend_gain(degree if degree % 2 else degree // 2, np.float32([2 * look.length + 1]), look)[
+            0
+        ]
+    )
     return [factor, float(np.mean(found)) / expected_deviation(look)]
 
 

@@ -23,6 +23,11 @@ class Polygons(NamedTuple):
     corner_vertex: np.ndarray
     face_start: np.ndarray
 
+    @property
+    def face_count(self) -> int:
+        """F."""
+        return len(self.face_start) - 1
+
 
 def starts_of(sizes: np.ndarray | list[int]) -> np.ndarray:
     """(n + 1,) int64: where each of n stretches of these sizes starts, and the end of the last."""

@@ -114,3 +114,8 @@ def shown(word: bytes) -> str:
     """A word as it can stand in a message: printable and short."""
     text = word[:24].decode("ascii", "backslashreplace")
     return repr("".join(c if c.isprintable() else "?" for c in text) + "..." * (len(word) > 24))
+
+
+def lines(rows: np.ndarray) -> list[str]:
+    """Rows of numbers as text: the shortest that gives the same float64."""
+    return [" ".join(map(repr, row)) for row in rows.tolist()]

@@ -5,7 +5,7 @@ length the magnitude and zero where the field is undefined. Name and degree are 
 Also read are
 
 - such vectors on points, averaged onto the faces, and on corners, likewise;
-- ``dir0`` ... ``dir{N-1}``, the N members of each face, which have to be a RoSy;
+- ``dir0`` ... ``dir{N-1}``, the N directions of each face or point, a RoSy or not;
 - a float on faces: the angle of a member from the face's first edge, counter-clockwise about its
   normal, in radians; the magnitude is 1, and NaN is undefined where that is asked for.
 """
@@ -13,13 +13,20 @@ Also read are
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..field.check import checked_field, into_planes, settle_undefined, tangent_normals
-from ..field.fieldfile import check_members
+from ..field.check import (
+    checked_directions,
+    checked_field,
+    into_planes,
+    settle_undefined,
+    tangent_normals,
+)
+from ..field.directions import directions_of
 from ..field.frames import carry, dot, tangent_frame, unit
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
@@ -102,7 +109,7 @@ def read_mesh_field(
     wanted = name or attribute_name(mesh)
     degree = check_degree(field_degree(mesh) if degree is None else degree)
     if wanted not in mesh.attributes and "dir0" in mesh.attributes:
-        return _read_members(mesh, surface, undefined, owner)
+        return _read_directions(mesh, surface, undefined, owner, kept)
     attribute = mesh.attributes.get(wanted)
     if attribute is None:
         raise RosyError(
@@ -123,10 +130,55 @@ def read_mesh_field(
     return _found_or_made(kept, surface, make, "given", *kind, values, degree, source, undefined)
 
 
+@dataclass(frozen=True)
+class Stored:
+    """How a field is found in an evaluated mesh: vectors on faces, and what there is besides.
+
+    Attributes
+    ----------
+    name : str
+        Of the attribute of the members; that of the deviation k is ``name_k``, if there are any.
+    degree : int
+    deviating : bool
+    families : int
+        See `RosyField`.
+    """
+
+    name: str
+    degree: int
+    deviating: bool = False
+    families: int = 1
+
+    @property
+    def names(self) -> list[str]:
+        """Of all attributes."""
+        more = range(self.degree if self.deviating else 0)
+        return [self.name, *(f"{self.name}_{number}" for number in more)]
+
+
+def lend_field(mesh: bpy.types.Mesh, field: RosyField, name: str) -> Stored:
+    """Store a field on the faces of a mesh for as long as it is read."""
+    stored = Stored(name, field.degree, field.deviations is not None, field.families)
+    lend_vectors(mesh, name, field.vectors)
+    for number, other in enumerate(stored.names[1:]):
+        deviation = field.deviations[:, number]
+        attribute = mesh.attributes.new(other, "FLOAT2", "FACE")
+        pairs = np.stack([deviation.real, deviation.imag], axis=1).astype(np.float32)
+        attribute.data.foreach_set("vector", pairs.ravel())
+    mesh.update_tag()
+    return stored
+
+
+def lend_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
+    """Store vectors on the faces of a mesh for as long as it is read."""
+    attribute = mesh.attributes.new(name, _VECTOR, "FACE")
+    attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    mesh.update_tag()
+
+
 def read_carried_field(
     mesh: bpy.types.Mesh,
-    name: str,
-    degree: int,
+    stored: Stored,
     surface: Surface,
     undefined: str,
     owner: str,
@@ -144,14 +196,23 @@ def read_carried_field(
     RosyError
         If values are not finite.
     """
-    source = f"{owner}, attribute '{name}'"
-    values = _values(mesh.attributes[name], source, mesh)
+    source = f"{owner}, attribute '{stored.name}'"
+    values = _values(mesh.attributes[stored.name], source, mesh)
     former = read_values(mesh, FACE_NORMAL, np.float32, 3)
+    pairs = [read_values(mesh, name, np.float32, 2) for name in stored.names[1:]]
 
     def make() -> RosyField:
-        return RosyField(degree, _carried(values, former, surface, source, undefined))
+        vectors = _carried(values, former, surface, source, undefined)
+        deviations = [pair.astype(np.float64) @ (1, 1j) for pair in pairs]
+        return RosyField(
+            stored.degree,
+            vectors,
+            np.stack(deviations, axis=1) if deviations else None,
+            stored.families,
+        )
 
-    return _found_or_made(kept, surface, make, "carried", values, former, degree, source, undefined)
+    given = values, former, *pairs, stored, source, undefined
+    return _found_or_made(kept, surface, make, "carried", *given)
 
 
 def _carried(
@@ -180,16 +241,39 @@ def _found_or_made(
     return kept.find_or_make(key, lambda: (surface, make()))[1]
 
 
+#: The forms in which a field can be stored, in the words a user meets.
+FORMS = {
+    "VECTOR": ("One Vector", "One direction on each face, the others follow from it"),
+    "DIRECTIONS": ("Directions", "All directions, as dir0, dir1 ... on faces"),
+    "ANGLE": ("Angle", "The angle from each face's first edge, in radians"),
+}
+
+
 def write_mesh_field(
-    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_NAME
+    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_NAME, form: str = "VECTOR"
 ) -> bpy.types.Attribute:
     """Store a field on a mesh, in place of one of the same name.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    field : RosyField
+    name : str
+    form : {"VECTOR", "DIRECTIONS", "ANGLE"}
+        A field of free directions is always stored as these: ``dir0`` ... ``dir{N-1}``. Of a RoSy
+        stored so, vectors of that name stay; of other directions they go, or they would be read.
+
+    Returns
+    -------
+    bpy.types.Attribute
+        The (first) attribute.
 
     Raises
     ------
     RosyError
-        If the mesh is linked from a library or in edit mode, has another number of faces, or the
-        name belongs to an attribute of another kind. Nothing is changed then.
+        If the mesh is linked from a library or in edit mode, has another number of faces, a name
+        belongs to an attribute of another kind, or the field has no such form. Nothing is changed
+        then.
     """
     name = name or DEFAULT_NAME
     _check_writable(mesh)
@@ -198,22 +282,65 @@ def write_mesh_field(
         raise RosyError(
             f"mesh '{mesh.name}' has {faces} faces, but the field has {len(field.vectors)}"
         )
+    if form == "ANGLE" and field.deviations is not None:
+        raise RosyError(f"mesh '{mesh.name}': the directions of its field are no RoSy of one angle")
+    if form == "DIRECTIONS" or field.deviations is not None:
+        attribute = _write_directions(mesh, field, name)
+    elif form == "ANGLE":
+        attribute = _attribute_for(mesh, name, _FLOAT)
+        x, y = face_frames(mesh_surface(mesh))
+        angle = np.arctan2(dot(field.vectors, y), dot(field.vectors, x))
+        angle[~field.vectors.any(axis=1)] = np.nan
+        attribute.data.foreach_set("value", angle.astype(np.float32))
+    else:
+        attribute = _attribute_for(mesh, name, _VECTOR)
+        attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    if has_properties():
+        mesh.rosy.degree = field.degree
+        if attribute.name == name:
+            mesh.rosy.attribute = name
+    mesh.update()
+    return attribute
+
+
+def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
+    directions = directions_of(mesh_surface(mesh), field) if field.given is None else field.given
+    names = [f"dir{number}" for number in range(field.degree)]
+    for each in names:
+        _check_kind(mesh, each, _VECTOR)
+    native = mesh.attributes.get(name)
+    if field.deviations is not None and native is not None:
+        _check_kind(mesh, name, _VECTOR)
+        mesh.attributes.remove(native)
+    number = field.degree
+    while f"dir{number}" in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes[f"dir{number}"])
+        number += 1
+    for each, vectors in zip(names, directions.swapaxes(0, 1), strict=True):
+        attribute = _attribute_for(mesh, each, _VECTOR)
+        attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    return mesh.attributes["dir0"]
+
+
+def _check_kind(mesh: bpy.types.Mesh, name: str, kind: str) -> None:
     attribute = mesh.attributes.get(name)
-    if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", _VECTOR):
+    if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", kind):
         raise RosyError(
             f"mesh '{mesh.name}' has an attribute '{name}' of another kind, {_kind(attribute)}; "
             "remove it, or give the field another name"
         )
+
+
+def _attribute_for(mesh: bpy.types.Mesh, name: str, kind: str) -> bpy.types.Attribute:
+    """The attribute of a name and kind on faces, a new one if there is none."""
+    _check_kind(mesh, name, kind)
+    attribute = mesh.attributes.get(name)
     if attribute is None:
-        attribute = mesh.attributes.new(name, _VECTOR, "FACE")
+        attribute = mesh.attributes.new(name, kind, "FACE")
         if attribute is None or attribute.name != name:
             if attribute is not None:
                 mesh.attributes.remove(attribute)
             raise RosyError(f"mesh '{mesh.name}': an attribute cannot be named '{name}'")
-    attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
-    if has_properties():
-        mesh.rosy.degree, mesh.rosy.attribute = field.degree, name
-    mesh.update()
     return attribute
 
 
@@ -265,7 +392,9 @@ def _others(mesh: bpy.types.Mesh) -> str:
     return f"; there are {', '.join(names)}" if names else ""
 
 
-def _read_members(mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner: str) -> RosyField:
+def _read_directions(
+    mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner: str, kept: Kept | None
+) -> RosyField:
     """From ``dir0`` ... ``dir{N-1}``; N is how many there are."""
     degree = 0
     while f"dir{degree}" in mesh.attributes:
@@ -273,7 +402,7 @@ def _read_members(mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner:
     if degree > MAX_DEGREE:
         raise RosyError(f"{owner}: has {degree} attributes dir0 ..., at most {MAX_DEGREE} are read")
     first = mesh.attributes["dir0"]
-    members = []
+    directions = []
     for number in range(degree):
         attribute = mesh.attributes[f"dir{number}"]
         source = f"{owner}, attribute 'dir{number}'"
@@ -283,14 +412,14 @@ def _read_members(mesh: bpy.types.Mesh, surface: Surface, undefined: str, owner:
                 f"{source}: found {_kind(attribute)}; wanted FLOAT_VECTOR on FACE or POINT, the "
                 "same for all members"
             )
-        members.append(_values(attribute, source, mesh))
-    members = np.stack(members, axis=1).astype(np.float64)
+        directions.append(_values(attribute, source, mesh))
     source = f"{owner}, attributes dir0 to dir{degree - 1}"
-    check_members(source, members, surface)
-    vectors = members[:, 0].copy()
-    vectors[~np.isfinite(members).all(axis=(1, 2))] = np.nan
     domain = {"FACE": "face", "POINT": "vertex"}[first.domain]
-    return checked_field(surface, vectors, degree, source, undefined, domain)
+
+    def make() -> RosyField:
+        return checked_directions(surface, np.stack(directions, axis=1), source, undefined, domain)
+
+    return _found_or_made(kept, surface, make, "directions", *directions, source, undefined, domain)
 
 
 def _from_angles(

@@ -16,10 +16,13 @@ from ..projection.gbuffer import Body
 from ..reuse import Kept
 from .attributes import (
     FACE_NORMAL,
+    Stored,
     attribute_name,
     field_degree,
     has_field,
     is_native,
+    lend_field,
+    lend_vectors,
     read_carried_field,
     read_mesh_field,
 )
@@ -137,10 +140,8 @@ def read_scene(
 class _Reader:
     """Collects bodies; one surface and one field an evaluated mesh, however many instances."""
 
-    def __init__(
-        self, names: dict[bpy.types.Object, tuple[str, int]], undefined: str, kept: Kept
-    ) -> None:
-        self.names = names
+    def __init__(self, stored: dict[bpy.types.Object, Stored], undefined: str, kept: Kept) -> None:
+        self.stored = stored
         self.undefined = undefined
         self.kept = kept
         self.drawn: list[tuple[Body, bpy.types.Object]] = []
@@ -150,10 +151,10 @@ class _Reader:
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         thing = instance.object
         owner = thing.original
-        name_and_degree = self.names.get(owner)
-        key = (thing.data.as_pointer(), owner if name_and_degree else None)
+        stored = self.stored.get(owner)
+        key = (thing.data.as_pointer(), owner if stored else None)
         if key not in self.read:
-            self.read[key] = self._read(thing, name_and_degree)
+            self.read[key] = self._read(thing, stored)
         if self.read[key] is None:
             return
         surface, field = self.read[key]
@@ -166,19 +167,18 @@ class _Reader:
             self.drawn.append((body, owner))
 
     def _read(
-        self, thing: bpy.types.Object, name_and_degree: tuple[str, int] | None
+        self, thing: bpy.types.Object, stored: Stored | None
     ) -> tuple[Surface, RosyField | None] | None:
         mesh = thing.to_mesh()
         try:
             if mesh is None or not len(mesh.polygons):
                 return None
-            if name_and_degree is None or name_and_degree[0] not in mesh.attributes:
+            if stored is None or any(name not in mesh.attributes for name in stored.names):
                 return mesh_surface(mesh, thing.name, plain=True, kept=self.kept), None
-            name, degree = name_and_degree
             owner = f"object '{thing.name}'"
             surface = mesh_surface(mesh, owner, rest=True, kept=self.kept)
             return surface, read_carried_field(
-                mesh, name, degree, surface, self.undefined, owner, self.kept
+                mesh, stored, surface, self.undefined, owner, self.kept
             )
         finally:
             thing.to_mesh_clear()
@@ -192,7 +192,7 @@ class _Reader:
             if thing not in seen:
                 raise RosyError(f"object '{thing.name}' has a field, but is hidden in the viewport")
             faceless = all(value is None for key, value in self.read.items() if key[1] == thing)
-            what = "has no faces" if faceless else f"has lost attribute '{self.names[thing][0]}'"
+            what = "has no faces" if faceless else f"has lost attribute '{self.stored[thing].name}'"
             raise RosyError(
                 f"object '{thing.name}': after its modifiers "
                 f"({', '.join(modifier.name for modifier in own_modifiers(thing)) or 'none'}) "
@@ -217,20 +217,20 @@ def _prepared(
     objects: Sequence[bpy.types.Object],
     undefined: str,
     kept: Kept,
-) -> Iterator[dict[bpy.types.Object, tuple[str, int]]]:
+) -> Iterator[dict[bpy.types.Object, Stored]]:
     """Have Blender carry what a field needs through the modifiers, and take it away afterwards.
 
     These are undeformed positions, the normals of the faces on which vectors were given, and
-    vectors where the field is stored in another way. Yields the attribute and degree of each
-    object's field in its evaluated mesh. All fields are checked on the meshes without modifiers.
+    vectors where the field is stored in another way. Yields how each object's field is found in its
+    evaluated mesh. All fields are checked on the meshes without modifiers.
     """
-    names: dict[bpy.types.Object, tuple[str, int]] = {}
+    stored: dict[bpy.types.Object, Stored] = {}
     switched: list[bpy.types.Object] = []
     lent: list[bpy.types.Mesh] = []
     try:
         for thing in objects:
             mesh = thing.data
-            names[thing] = _checked_name(thing, undefined, lent, kept)
+            stored[thing] = _checked(thing, undefined, lent, kept)
             deforms = bool(own_modifiers(thing) or mesh.shape_keys)
             if deforms and is_editable(thing) and not thing.add_rest_position_attribute:
                 thing.add_rest_position_attribute = True
@@ -238,33 +238,35 @@ def _prepared(
             if deforms and FACE_NORMAL not in mesh.attributes and _may_lend(mesh):
                 lent.append(mesh)
                 surface = mesh_surface(mesh, f"object '{thing.name}'", kept=kept)
-                _lend(mesh, FACE_NORMAL, surface.face_normal)
+                lend_vectors(mesh, FACE_NORMAL, surface.face_normal)
         if switched or lent:
             depsgraph.update()
-        yield names
+        yield stored
     finally:
         for thing in switched:
             thing.add_rest_position_attribute = False
         for mesh in set(lent):
-            for name in (FACE_NORMAL, STAND_IN):
-                if name in mesh.attributes:
-                    mesh.attributes.remove(mesh.attributes[name])
+            borrowed = [
+                a.name for a in mesh.attributes if a.name.startswith((FACE_NORMAL, STAND_IN))
+            ]
+            for name in borrowed:
+                mesh.attributes.remove(mesh.attributes[name])
             mesh.update_tag()
         if switched or lent:
             depsgraph.update()
 
 
-def _checked_name(
+def _checked(
     thing: bpy.types.Object, undefined: str, lent: list[bpy.types.Mesh], kept: Kept
-) -> tuple[str, int]:
-    """Which attribute holds an object's field as vectors on faces, and its degree."""
+) -> Stored:
+    """How an object's field is stored as vectors on faces, lent to its mesh if it is not yet."""
     mesh, owner = thing.data, f"object '{thing.name}'"
     name = attribute_name(mesh)
     if mesh.is_editmode and is_native(mesh):
-        return name, field_degree(mesh)  # only its evaluated mesh can be read
+        return Stored(name, field_degree(mesh))  # only its evaluated mesh can be read
     field = read_mesh_field(mesh, undefined=undefined, owner=owner, kept=kept)
     if is_native(mesh):
-        return name, field.degree
+        return Stored(name, field.degree)
     if not _may_lend(mesh):
         raise RosyError(
             f"{owner}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}; there its "
@@ -272,19 +274,12 @@ def _checked_name(
         )
     if STAND_IN not in mesh.attributes:
         lent.append(mesh)
-        _lend(mesh, STAND_IN, field.vectors)
-    return STAND_IN, field.degree
+        return lend_field(mesh, field, STAND_IN)
+    return Stored(STAND_IN, field.degree, field.deviations is not None, field.families)
 
 
 def _may_lend(mesh: bpy.types.Mesh) -> bool:
     return is_editable(mesh) and not mesh.is_editmode
-
-
-def _lend(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
-    """Store vectors on the faces of a mesh for as long as it is read."""
-    attribute = mesh.attributes.new(name, "FLOAT_VECTOR", "FACE")
-    attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
-    mesh.update_tag()
 
 
 def _is_seen(instance: bpy.types.DepsgraphObjectInstance, shown: set[bpy.types.Object]) -> bool:

@@ -108,7 +108,8 @@ def read_values(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> n
     attribute = mesh.attributes.get(name)
     if attribute is None or not len(attribute.data):  # none is readable in edit mode
         return None
-    return _get(attribute.data, "vector" if columns == 3 else "value", dtype, columns)
+    key = "vector" if attribute.data_type in ("FLOAT_VECTOR", "FLOAT2") else "value"
+    return _get(attribute.data, key, dtype, columns)
 
 
 def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:

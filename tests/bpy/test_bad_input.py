@@ -102,13 +102,6 @@ def test_off_the_surface(scene, camera, monkey):
     refused("'Suzanne', attribute 'rosy'", "degrees off the surface", "worst on face")
 
 
-@pytest.mark.parametrize(("off", "longer"), [(0.1, 1.0), (0.0, 1.1)])
-def test_members_that_are_no_rosy(scene, camera, off, longer):
-    plane = add_plane(cuts=2)
-    member_attributes(plane.data, 3, off, longer)
-    refused("'Plane', attributes dir0 to dir2", "not a RoSy of degree 3", "allowed")
-
-
 def test_too_many_members(scene, camera):
     plane = add_plane()
     member_attributes(plane.data, 13)

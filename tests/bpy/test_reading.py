@@ -7,7 +7,9 @@ import bpy
 import numpy as np
 import pytest
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.field.generate import Recipe, generate
+from rosy.rosy_addon.field.directions import directions_field, directions_of
+from rosy.rosy_addon.field.frames import unit
+from rosy.rosy_addon.field.generate import Recipe, axis_field, generate
 from rosy.rosy_addon.field.representation import face_frames, face_representation
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.projection.project import project
@@ -126,6 +128,76 @@ def test_all_members(scene):
     field = read_mesh_field(plane.data)
     assert field.degree == 3
     np.testing.assert_allclose(field.vectors, member_vectors(plane.data, "dir0"), atol=1e-6)
+
+
+@pytest.mark.parametrize(("off", "longer"), [(0.1, 1.0), (0.0, 1.1), (0.3, 2.0)])
+def test_directions_that_are_no_rosy(scene, off, longer):
+    plane = add_plane(cuts=2)
+    member_attributes(plane.data, 3, off, longer)
+    field = read_mesh_field(plane.data)
+    assert field.degree == 3 and field.deviations is not None
+    found = directions_of(mesh_surface(plane.data), field)
+    for number in range(3):
+        wanted = member_vectors(plane.data, f"dir{number}")
+        np.testing.assert_allclose(found[:, number], wanted, atol=1e-6)
+
+
+def test_directions_go_through_modifiers(scene):
+    """Angles and lengths stay, however the mesh is divided and bent."""
+    plane = add_plane(cuts=2)
+    member_attributes(plane.data, 3, 0.3, 2.0)
+    plain = read_bodies(depsgraph())[0].field
+    names = sorted(attribute.name for attribute in plane.data.attributes)
+    plane.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bend = plane.modifiers.new("Bend", "SIMPLE_DEFORM")
+    bend.deform_method, bend.angle = "BEND", 1.0
+    (body,) = read_bodies(depsgraph())
+    assert body.surface.face_count == 4 * len(plane.data.polygons)
+    np.testing.assert_allclose(body.field.deviations[::4], plain.deviations, atol=1e-6)
+    assert sorted(attribute.name for attribute in plane.data.attributes) == names
+
+
+def test_families_are_known_where_numbers_are_consistent(scene):
+    plane = add_plane(cuts=2)
+    across = np.cross(mesh_surface(plane.data).face_normal, (1.0, 0.0, 0.0))
+    along = np.tile((1.0, 0.0, 0.0), (len(across), 1))
+    for number, vectors in enumerate((along, 2 * across, -along, -2 * across)):
+        set_vectors(plane.data, vectors, f"dir{number}")
+    (body,) = read_bodies(depsgraph())
+    assert body.field.families == 2 and body.field.degree == 4
+
+
+@pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
+def test_forms_come_back(scene, monkey, form):
+    mesh = monkey.data
+    surface = mesh_surface(mesh)
+    field = read_mesh_field(mesh)
+    field = RosyField(field.degree, unit(field.vectors))
+    mesh.attributes.remove(mesh.attributes["rosy"])
+    name = "turn" if form == "ANGLE" else "rosy"
+    write_mesh_field(mesh, field, name, form)
+    assert mesh.attributes[name if form != "DIRECTIONS" else "dir3"].domain == "FACE"
+    again = read_mesh_field(mesh, undefined="zero")
+    known = again.magnitude > 0
+    assert known.mean() > 0.95 and again.degree == 4
+    z, wanted = (face_representation(surface, one)[known] for one in (again, field))
+    np.testing.assert_allclose(z, wanted, atol=1e-4)
+
+
+def test_other_directions_replace_what_was_there(scene):
+    plane = add_plane(cuts=2)
+    surface = mesh_surface(plane.data)
+    write_mesh_field(plane.data, axis_field(surface, 4, (1, 0, 0)))
+    member_attributes(plane.data, 6)
+    turn = np.exp(1j * np.array([0.0, 0.5, 3.0]))[None, :, None]
+    x, y = (axis[:, None] for axis in face_frames(surface))
+    field = directions_field(surface, turn.real * x + turn.imag * y)
+    write_mesh_field(plane.data, field)
+    names = {attribute.name for attribute in plane.data.attributes}
+    assert {"dir0", "dir1", "dir2"} <= names and not {"rosy", "dir3", "dir5"} & names
+    again = read_mesh_field(plane.data)
+    np.testing.assert_allclose(again.deviations, field.deviations, atol=1e-6)
+    assert plane.data.rosy.degree == 3
 
 
 # --- scenes ----------------------------------------------------------------------------------

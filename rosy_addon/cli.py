@@ -21,12 +21,17 @@ from .compositor.look import Look
 from .compositor.png import write_png
 from .compositor.presets import load_preset, preset_names
 from .errors import RosyError
-from .field.fieldfile import read_field, write_field
-from .field.generate import KINDS, Recipe, generate
+from .field.analysis import angle_errors, error_facts, field_energy
+from .field.convert import smoothed, to_degree, turned, with_magnitude
+from .field.fieldfile import READ, WRITTEN, load_field, write_field
+from .field.formats.obj import read_uv
+from .field.formats.sings import SINGULARITIES, read_sings
+from .field.formats.strokes import read_strokes
+from .field.generate import KINDS, MAGNITUDES, Recipe, curvature_magnitude, generate
 from .field.meshfile import read_mesh
 from .field.rosy_field import RosyField, check_degree
 from .field.singularities import euler_characteristic, singularities
-from .field.surface import Surface
+from .field.surface import Surface, cut_note
 from .files import check_writable
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
@@ -92,14 +97,14 @@ def render(options: argparse.Namespace) -> None:
 
 
 def field(options: argparse.Namespace) -> None:
-    """Make a field file, or write one in the other format."""
+    """Make a field file, or convert one: its format, its degree, its directions, its lengths."""
     check_writable(options.output)
     surface, made = _mesh_and_field(options)
     write_field(options.output, made, surface)
 
 
 def info(options: argparse.Namespace) -> None:
-    """Say what a mesh and its field are."""
+    """Say what a mesh and its field are, and how far the field is from another."""
     surface, found = _mesh_and_field(options)
     vertex, index = singularities(surface, found)
     magnitude = found.magnitude
@@ -110,9 +115,36 @@ def info(options: argparse.Namespace) -> None:
         "euler_characteristic": euler_characteristic(surface),
         "magnitude": [float(magnitude.min()), float(magnitude.max())],
         "undefined_faces": int(np.count_nonzero(magnitude == 0)),
+        "is_rosy": found.deviations is None,
+        "energy": field_energy(surface, found),
         "singularities": np.stack([vertex, index], axis=1).tolist(),
     }
+    if options.against is not None:
+        facts["against"] = _compared(options, surface, found, vertex, index)
     print(json.dumps(facts) if options.json else _in_words(facts))
+
+
+def _compared(
+    options: argparse.Namespace,
+    surface: Surface,
+    found: RosyField,
+    vertex: np.ndarray,
+    index: np.ndarray,
+) -> dict[str, Any]:
+    """How far a field is from one in a file; of a file of singularities, which of them differ."""
+    if options.against.suffix.lower() not in SINGULARITIES:
+        other = load_field(options.against, surface, found.degree).field
+        return error_facts(surface, angle_errors(surface, found, other))
+    degree, element, stored = read_sings(options.against)
+    if degree != found.degree:
+        raise RosyError(f"{options.against}: is of a field of degree {degree}, not {found.degree}")
+    ours = set(zip(vertex.tolist(), index.tolist(), strict=True))
+    theirs = set(zip(element.tolist(), stored.tolist(), strict=True))
+    return {
+        "same": len(ours & theirs),
+        "only_here": sorted(map(list, ours - theirs)),
+        "only_there": sorted(map(list, theirs - ours)),
+    }
 
 
 def bake(options: argparse.Namespace) -> None:
@@ -181,11 +213,53 @@ def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
     surface = read_mesh(options.mesh)
     if options.field is not None:
         undefined = "zero" if options.undefined else "error"
-        return surface, read_field(options.field, surface, options.degree, undefined)
+        loaded = load_field(
+            options.field, surface, options.degree, undefined, mesh=options.field_mesh
+        )
+        _note(loaded.note)
+        return surface, _converted(options, surface, loaded.field)
+    _note(cut_note(surface))
     degree = 4 if options.degree is None else options.degree
-    kind = options.generate or ("curvature" if degree in (2, 4) else "axis")
+    guided = options.strokes is not None or options.guides is not None
+    usual = "guided" if guided else "curvature" if degree in (2, 4) else "axis"
+    made = generate(surface, _recipe(options, surface, options.generate or usual, degree), degree)
+    return surface, _converted(options, surface, made)
+
+
+def _recipe(options: argparse.Namespace, surface: Surface, kind: str, degree: int) -> Recipe:
+    """What to generate, with all that the kind can use."""
     recipe = Recipe(kind, options.axis, options.reach, np.radians(options.sharp_angle))
-    return surface, generate(surface, recipe, degree)
+    if options.strokes is not None:
+        recipe = replace(recipe, strokes=read_strokes(options.strokes))
+    if options.guides is not None:
+        guides = load_field(options.guides, surface, degree).field
+        recipe = replace(recipe, vectors=guides.vectors)
+    if options.uv or kind == "uv":
+        uv = read_uv(options.mesh) if options.mesh.suffix.lower() == ".obj" else None
+        if uv is None:
+            raise RosyError(f"{options.mesh}: has no UV map; those of .obj files are read")
+        recipe = replace(recipe, uv=uv)
+    return recipe
+
+
+def _converted(options: argparse.Namespace, surface: Surface, made: RosyField) -> RosyField:
+    """The field after what `field` may be asked to do with it."""
+    if getattr(options, "to_degree", None) is not None:
+        made = to_degree(surface, made, options.to_degree)
+    if getattr(options, "turn", 0.0):
+        made = turned(surface, made, np.radians(options.turn))
+    if getattr(options, "smooth", 0.0):
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        made = smoothed(surface, made, (options.smooth * size) ** 2)
+    if getattr(options, "magnitude", None) is not None:
+        made = with_magnitude(made, curvature_magnitude(surface, options.magnitude))
+    return made
+
+
+def _note(text: str) -> None:
+    """Something that a user should know, if there is anything."""
+    if text:
+        print(f"rosy: {text}", file=sys.stderr)
 
 
 def _look(options: argparse.Namespace, default: Look) -> Look:
@@ -237,10 +311,28 @@ def _in_words(facts: dict[str, Any]) -> str:
             f"{facts['faces']} faces, {facts['vertices']} vertices, "
             f"Euler characteristic {facts['euler_characteristic']}",
             f"magnitude {low:.4g} to {high:.4g}, undefined on {facts['undefined_faces']} faces",
+            f"energy {facts['energy']:.6g}",
+            *([] if facts["is_rosy"] else ["directions at free angles, no RoSy"]),
+            *_comparison_in_words(facts.get("against")),
             f"{len(places)} singularities",
             *places,
         ]
     )
+
+
+def _comparison_in_words(against: dict[str, Any] | None) -> list[str]:
+    if against is None:
+        return []
+    if "same" in against:
+        differing = len(against["only_here"]), len(against["only_there"])
+        return [
+            f"singularities: {against['same']} are the same, {differing[0]} only here, "
+            f"{differing[1]} only there"
+        ]
+    return [
+        f"off by {against['mean']:.4g} degrees on average, rms {against['rms']:.4g}, at most "
+        f"{against['max']:.4g}, on {100 * against['compared']:.4g} % of the faces"
+    ]
 
 
 def _parser(prog: str) -> argparse.ArgumentParser:
@@ -296,13 +388,35 @@ def _add_render(verbs: Any) -> None:
 def _add_field(verbs: Any) -> None:
     verb = _verb(verbs, "field", field)
     _add_mesh(verb)
-    verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.rosy|OUT.rawfield")
+    verb.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="OUT", help=", ".join(WRITTEN)
+    )
+    verb.add_argument(
+        "--to-degree", type=int, metavar="N", help="a multiple or a divisor of the field's degree"
+    )
+    verb.add_argument(
+        "--turn", type=_number(-360.0, 360.0), default=0.0, metavar="DEGREES", help="all directions"
+    )
+    verb.add_argument(
+        "--smooth",
+        type=_number(0.0, 10.0),
+        default=0.0,
+        metavar="SHARE",
+        help="let the field diffuse over this share of the size of the mesh",
+    )
+    verb.add_argument("--magnitude", choices=list(MAGNITUDES), help="give the field other lengths")
 
 
 def _add_info(verbs: Any) -> None:
     verb = _verb(verbs, "info", info)
     _add_mesh(verb)
     verb.add_argument("--json", action="store_true", help="as one object")
+    verb.add_argument(
+        "--against",
+        type=Path,
+        metavar="FILE",
+        help="another field, for the angle between the two, or singularities (.sings)",
+    )
 
 
 def _verb(verbs: Any, name: str, function: Callable) -> argparse.ArgumentParser:
@@ -314,7 +428,7 @@ def _verb(verbs: Any, name: str, function: Callable) -> argparse.ArgumentParser:
 
 def _add_mesh(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("mesh", type=Path, metavar="MESH", help=".obj, .off, .ply or .stl")
-    verb.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=".rosy or .rawfield")
+    verb.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ))
     verb.add_argument(
         "--degree", type=int, metavar="N", help="1 to 12; 4, or the file's, if not given"
     )
@@ -329,7 +443,8 @@ def _add_mesh(verb: argparse.ArgumentParser) -> None:
         type=_number(0.0, 10.0),
         default=0.0,
         metavar="SHARE",
-        help="of the size of the mesh: how far curvature reaches into parts that are hardly curved",
+        help="of the size of the mesh: how far curvature reaches into parts that are hardly curved, "
+        "or over what distance guides are smoothed, which are met exactly at 0",
     )
     verb.add_argument(
         "--sharp-angle",
@@ -337,6 +452,28 @@ def _add_mesh(verb: argparse.ArgumentParser) -> None:
         default=30.0,
         metavar="DEGREES",
         help="by which the surface bends at a sharp edge, for --generate features (%(default)g)",
+    )
+    verb.add_argument(
+        "--strokes",
+        type=Path,
+        metavar="FILE",
+        help="lines drawn on the mesh that a guided field follows: rows x y z, with an empty line "
+        "between one and the next",
+    )
+    verb.add_argument(
+        "--guides",
+        type=Path,
+        metavar="FIELD",
+        help="a field that a guided one follows where it is not zero",
+    )
+    verb.add_argument(
+        "--uv", action="store_true", help="let a guided field follow the UV map of an .obj file"
+    )
+    verb.add_argument(
+        "--field-mesh",
+        type=Path,
+        metavar="MESH",
+        help="whose faces the field file counts, if they are others: it follows by position",
     )
     verb.add_argument(
         "--undefined", action="store_true", help="take NaN and infinite vectors for undefined"

@@ -1,7 +1,11 @@
-"""Where a field can come from: the kinds of fields that are made, by name, and two plain ones."""
+"""Where a field can come from: the kinds of fields that are made, by name, and two plain ones.
+
+Surfaces that cannot be oriented are cut where their sides meet; `surface.cut_edges` counts.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +15,14 @@ from ..progress import Progress, Work, drain
 from .corners import corner_angles, corner_rotations, smooth_faces
 from .frames import dot, unit
 from .guided import finding_guided
-from .guides import along_edges, feature_edges
+from .guides import (
+    along_edges,
+    along_handles,
+    along_strokes,
+    along_uv,
+    feature_edges,
+    mean_guides,
+)
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import finding_smoothest
@@ -22,7 +33,16 @@ KINDS = {
     "smoothest": "As smooth as can be, with as few singularities as the shape allows",
     "curvature": "Along the principal directions of curvature (even degrees)",
     "features": "Along borders and sharp edges, and smooth between them",
+    "guided": "Along what you give: strokes, edges, a UV map, vectors, empties; smooth between",
     "axis": "Along a direction, projected to the surface",
+    "uv": "Along the axes of a UV map",
+}
+
+#: What the magnitude of a field can be made of, in the words a user meets.
+MAGNITUDES = {
+    "unit": "1 everywhere",
+    "confidence": "How clear the direction of curvature is, from 0 to 1",
+    "curvature": "How much the surface bends where it bends most, by the size of the mesh",
 }
 
 #: Rounds of averaging that take the jitter of the triangulation out of a curvature field.
@@ -40,12 +60,22 @@ class Recipe:
     axis : 3 floats
         Of the kind "axis": object space.
     reach : float
-        Of the kind "curvature": how far, as a share of the surface's size, clearly curved parts
-        reach into those that are not; 0 leaves every face what its own curvature says.
+        As a share of the surface's size. Of the kind "curvature": how far clearly curved parts
+        reach into those that are not; 0 leaves every face what its own curvature says. Of
+        "guided": over what distance guides are smoothed; at 0 they are met exactly.
     sharp_angle : float
         Of the kind "features": radians by which the surface bends at a sharp edge, at least.
     edges : (E, 2) int ndarray or None
-        Of the kind "features": which edges to follow, instead of borders and sharp ones.
+        Of the kinds "features" and "guided": which edges to follow; of the former, instead of
+        borders and sharp ones.
+    strokes : sequence of (n, 3) float ndarray
+        Of "guided": points of lines drawn on the surface, object space.
+    handles : sequence of (place, axis, radius)
+        Of "guided": points, what they guide along, and how far from them; object space.
+    uv : (C, 2) float ndarray or None
+        Of "guided" and "uv": of the corners.
+    vectors : (F, 3) float ndarray or None
+        Of "guided": a member each, zero where there is none.
     """
 
     kind: str
@@ -53,6 +83,10 @@ class Recipe:
     reach: float = 0.0
     sharp_angle: float = np.pi / 6
     edges: np.ndarray | None = None
+    strokes: Sequence[np.ndarray] = ()
+    handles: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
+    uv: np.ndarray | None = None
+    vectors: np.ndarray | None = None
 
 
 def generate(surface: Surface, recipe: Recipe | str, degree: int) -> RosyField:
@@ -90,6 +124,12 @@ def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[Rosy
         return (yield from finding_guided(surface, degree, unit(field.vectors), weight))
     if recipe.kind == "features":
         return (yield from _following_features(surface, recipe, degree))
+    if recipe.kind == "guided":
+        return (yield from _following_guides(surface, recipe, degree))
+    if recipe.kind == "uv":
+        if recipe.uv is None:
+            raise RosyError(f"{surface.name}: it has no UV map to follow")
+        return RosyField(degree, along_uv(surface, recipe.uv, check_degree(degree)))
     raise RosyError(f"no generator is named '{recipe.kind}'; there are {', '.join(KINDS)}")
 
 
@@ -101,6 +141,32 @@ def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[R
     guides = along_edges(surface, ends, degree)
     if not guides.any():
         raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
+    return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
+
+
+def _following_guides(surface: Surface, recipe: Recipe, degree: int) -> Work[RosyField]:
+    degree = check_degree(degree)
+    found = []
+    if recipe.edges is not None:
+        found.append(along_edges(surface, recipe.edges, degree))
+    if recipe.strokes:
+        found.append(along_strokes(surface, recipe.strokes, degree))
+    if recipe.handles:
+        place, axis, radius = (
+            np.array(part, dtype=np.float64) for part in zip(*recipe.handles, strict=True)
+        )
+        found.append(along_handles(surface, place, axis, radius, degree))
+    if recipe.uv is not None:
+        found.append(along_uv(surface, recipe.uv, degree))
+    if recipe.vectors is not None:
+        found.append(unit(recipe.vectors))
+    if not found:
+        raise RosyError(f"{surface.name}: there is nothing to follow")
+    every = np.tile(np.arange(surface.face_count), len(found))
+    guides = mean_guides(surface, every, np.concatenate(found), degree)
+    if recipe.reach:
+        size = float(np.ptp(surface.vertices, axis=0).max())
+        return (yield from finding_guided(surface, degree, guides, (recipe.reach * size) ** -2))
     return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
 
 
@@ -135,6 +201,31 @@ def axis_field(
     return RosyField(degree, vectors)
 
 
+def curvature_magnitude(surface: Surface, kind: str) -> np.ndarray:
+    """(F,) float64 magnitudes of one of `MAGNITUDES`.
+
+    The curvature is the larger one of the two principal ones, times the largest side of the box of
+    the mesh, so that it has no unit.
+    """
+    if kind == "unit":
+        return np.ones(surface.face_count)
+    if kind == "confidence":
+        return curvature_field(surface, 4).magnitude
+    if kind != "curvature":
+        raise RosyError(f"no magnitude is named '{kind}'; there are {', '.join(MAGNITUDES)}")
+    whole = _shaded_smoothly(surface)
+    mean, deviator = _curvature_of_faces(whole, *face_frames(whole))
+    size = float(np.ptp(surface.vertices, axis=0).max())
+    return (np.abs(mean) + np.abs(deviator)) * size
+
+
+def _shaded_smoothly(surface: Surface) -> Surface:
+    """A mesh shown flat or with sharp edges bends all the same."""
+    return build_surface(
+        surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name
+    )
+
+
 def curvature_field(surface: Surface, degree: int) -> RosyField:
     """Members along the principal directions of curvature.
 
@@ -162,10 +253,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     degree = check_degree(degree)
     if degree % 2:
         raise RosyError(f"a curvature field has an even degree, not {degree}")
-    # Shading does not matter here: a mesh shown flat or with sharp edges bends all the same.
-    whole = build_surface(
-        surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name
-    )
+    whole = _shaded_smoothly(surface)
     x, y = face_frames(whole)
     mean, deviator = _curvature_of_faces(whole, x, y)
     amount = np.abs(deviator)

@@ -99,7 +99,7 @@ def finding_guided(
     free = np.flatnonzero(~firm)
     if len(free):
         matrix, moved = _reduced(laplacian(connection, degree), pull, firm, given)
-        solving = _solve(matrix, (right - moved)[free])
+        solving = solve(matrix, (right - moved)[free])
         z[free] = yield from part(solving, 0.1, 0.95)
     yield Progress(0.95, "carrying the field to the faces")
     found = sum_on_faces(surface, connection, z, turn, degree)
@@ -130,7 +130,7 @@ def _reduced(
     ), moved
 
 
-def _solve(matrix: Rows, right: np.ndarray) -> Work[np.ndarray]:
+def solve(matrix: Rows, right: np.ndarray) -> Work[np.ndarray]:
     """Conjugate gradients, preconditioned by cycles of multigrid."""
     levels = yield from part(hierarchy(matrix), 0.0, 0.5)
     found, rest = np.zeros_like(right), right.copy()

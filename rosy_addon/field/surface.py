@@ -272,6 +272,27 @@ def surface_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
     )
 
 
+def cut_edges(surface: Surface) -> int:
+    """How many edges join two faces that do not agree on which side is out.
+
+    There is no field across such an edge. Only flipping faces helps, and of a Möbius strip not even
+    that: some edges are left, along which the field is cut.
+    """
+    edges = surface_edges(surface.corner_vertex, surface.face_start)
+    return int(np.count_nonzero(edges.uses == 2)) - len(edges.inner)
+
+
+def cut_note(surface: Surface) -> str:
+    """What a user should know of that; empty if there is nothing."""
+    cut = cut_edges(surface)
+    if not cut:
+        return ""
+    return (
+        f"{surface.name}: along {cut} edges faces disagree on which side is out, and the field is "
+        "cut there: recalculate the normals, unless it is a Möbius strip, which has but one side"
+    )
+
+
 def _check_polygons(
     name: str, vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> None:

@@ -290,3 +290,79 @@ def test_bake_without_blender_says_so(monkeypatch, capsys):
 def test_bake_that_would_keep_nothing_is_refused(capsys):
     assert main(["bake"]) == 2
     assert "give --out DIR" in capsys.readouterr().err
+
+
+# --- fields made, converted and compared -----------------------------------------------------
+
+
+def facts_of(*arguments) -> dict:
+    done = rosy("info", *arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_field_converts(sphere, tmp_path):
+    made = tmp_path / "a.rosy"
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    converted = tmp_path / "b.npy"
+    done = rosy("field", sphere, made, "-o", converted, "--to-degree", 8, "--turn", 10,
+                "--smooth", 0.05, "--magnitude", "unit")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = facts_of(sphere, converted)
+    assert facts["degree"] == 8 and np.allclose(facts["magnitude"], 1)
+    assert_refused(rosy("field", sphere, made, "-o", made, "--to-degree", 3), "neither a multiple")
+
+
+def test_info_compares(sphere, tmp_path):
+    made, turned, sings = (tmp_path / name for name in ("a.rosy", "b.rawfield", "a.sings"))
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    assert rosy("field", sphere, made, "-o", turned, "--turn", 5).returncode == 0
+    assert rosy("field", sphere, made, "-o", sings).returncode == 0
+    facts = facts_of(sphere, made, "--against", turned)
+    assert np.isclose(facts["against"]["mean"], 5) and np.isclose(facts["against"]["max"], 5)
+    assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
+    facts = facts_of(sphere, turned, "--against", sings)
+    assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
+    done = rosy("info", sphere, made, "--against", turned)
+    assert "off by 5 degrees on average" in done.stdout
+
+
+def test_strokes_and_guides(sphere, tmp_path):
+    turn = np.linspace(0, 1.0, 30)
+    arc = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    rows = "\n".join(" ".join(map(str, point)) for point in arc)
+    (tmp_path / "strokes.txt").write_text(f"# one\n{rows}\n\n{rows}\n")
+    out = tmp_path / "a.rosy"
+    done = rosy("field", sphere, "-o", out, "--strokes", tmp_path / "strokes.txt", "--degree", 2)
+    assert done.returncode == 0, done.stderr
+    again = tmp_path / "b.rosy"
+    done = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--reach", 0.01)
+    assert done.returncode == 0, done.stderr
+    assert facts_of(sphere, again, "--against", out)["against"]["mean"] < 3
+    (tmp_path / "none.txt").write_text("1 2 3\n\n4 5 6\n")
+    assert_refused(
+        rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt"), "holds no stroke"
+    )
+    assert_refused(rosy("field", sphere, "-o", out, "--generate", "uv"), "has no UV map")
+
+
+def test_the_uv_map_of_a_file(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "spot.obj"
+    out = tmp_path / "a.rosy"
+    assert rosy("field", mesh, "-o", out, "--generate", "uv").returncode == 0
+    assert facts_of(mesh, out)["undefined_faces"] == 0
+    smooth = tmp_path / "b.rosy"
+    done = rosy("field", mesh, "-o", smooth, "--generate", "guided", "--uv", "--reach", "0.02")
+    assert done.returncode == 0, done.stderr
+    facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
+    assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15
+
+
+def test_a_field_that_follows_says_so(sphere, tmp_path):
+    made = tmp_path / "sphere.rosy"
+    assert rosy("field", sphere, "-o", made).returncode == 0
+    cut = write_off(tmp_path / "cut.off", icosphere(4))
+    done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
+                "--field-mesh", sphere)  # fmt: skip
+    assert done.returncode == 0
+    assert "followed by position, from sphere.off" in done.stderr

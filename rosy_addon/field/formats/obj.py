@@ -53,3 +53,40 @@ def _without_slashes(corners: Rows) -> Rows:
         return corners
     lines = re.sub(rb"(?<=\d)/[-\d/]*(?=\s|$)", b"", joined).split(b"\n")
     return Rows(corners.path, [line.split() for line in lines], corners.line)
+
+
+def read_uv(path: Path) -> np.ndarray | None:
+    """(C, 2) float64 texture coordinates of the corners of an .obj file; None if it has none.
+
+    Raises
+    ------
+    RosyError
+        If corners refer to coordinates that are not there, or only some have any.
+    """
+    rows = read_rows(path)
+    is_uv = np.array([words[0] == b"vt" for words in rows.words], dtype=bool)
+    is_face = np.array([words[0] == b"f" for words in rows.words], dtype=bool)
+    if not is_uv.any():
+        return None
+    table = _chosen(rows, is_uv, 2)
+    for row, words in enumerate(table.words):
+        if len(words) < 2:
+            raise table.error(row, "a texture coordinate has fewer than 2 numbers")
+    uv = table.floats("texture coordinate").reshape(-1, 2)
+    corners = _chosen(rows, is_face)
+    words = [[word.split(b"/")[1:2] for word in line] for line in corners.words]
+    for row, line in enumerate(words):
+        if not all(word and word[0] for word in line):
+            raise corners.error(row, "a corner has no texture coordinate")
+    chosen = Rows(path, [[word[0] for word in line] for line in words], corners.line)
+    index = chosen.ints("texture coordinate of a corner")
+    above = np.repeat(np.cumsum(is_uv)[is_face], [len(line) for line in words])
+    place = np.where(index < 0, index + above, index - 1)
+    wrong = (place < 0) | (place >= len(uv))
+    if wrong.any():
+        corner = int(np.argmax(wrong))
+        raise chosen.error(
+            chosen.row_of_word(corner),
+            f"a corner refers to texture coordinate {index[corner]}, there are {len(uv)}",
+        )
+    return uv[place]

@@ -4,9 +4,31 @@ from __future__ import annotations
 
 import bpy
 
-from . import bake, field_export, field_generate, field_import, preset_apply, remove, show, ticking
+from ..rosy_addon.ui import overlay
+from . import (
+    bake,
+    field_convert,
+    field_export,
+    field_generate,
+    field_import,
+    preset_apply,
+    remove,
+    show,
+    singularities,
+    ticking,
+)
 
-MODULES = (field_generate, field_import, field_export, bake, show, remove, preset_apply)
+MODULES = (
+    field_generate,
+    field_convert,
+    field_import,
+    field_export,
+    singularities,
+    bake,
+    show,
+    remove,
+    preset_apply,
+)
 
 
 def register() -> None:
@@ -19,6 +41,7 @@ def register() -> None:
 def unregister() -> None:
     """Take them away again, ending work under way."""
     ticking.stop_running()
+    overlay.hide()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

@@ -13,6 +13,16 @@ from ..rosy_addon.scene.attributes import has_field, read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from .meshes import can_change_fields, selected_meshes
 
+#: The kinds of files, by the end of their name.
+FORMATS = {
+    ".rosy": ("RoSy", "One member vector a face"),
+    ".rawfield": ("Raw Field", "All directions of a face in a row, as Directional reads them"),
+    ".txt": ("Text", "All directions of a face in a row, numbers alone"),
+    ".npy": ("NumPy", "An array with all directions of a face in a row"),
+    ".obj": ("fieldgen OBJ", "The mesh, and a direction at each vertex, as fieldgen writes it"),
+    ".sings": ("Singularities", "Vertices and their indices, as Directional reads them"),
+}
+
 
 class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
     """Write the field of the active mesh to a file, one row a face"""
@@ -22,13 +32,12 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
     bl_options = {"REGISTER"}
 
     filename_ext = ".rosy"
-    filter_glob: bpy.props.StringProperty(default="*.rosy;*.rawfield", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{kind}" for kind in FORMATS), options={"HIDDEN"}
+    )
     file_format: bpy.props.EnumProperty(
         name="Format",
-        items=[
-            (".rosy", "RoSy", "One member vector a face"),
-            (".rawfield", "Raw Field", "All member vectors of a face in a row"),
-        ],
+        items=[(kind, name, text) for kind, (name, text) in FORMATS.items()],
         default=".rosy",
     )
 

@@ -3,17 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from math import pi
 
 import bpy
 
+from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.generate import KINDS, Recipe, generating
+from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
+from ..rosy_addon.field.surface import Surface, cut_note
 from ..rosy_addon.progress import Work, part
+from ..rosy_addon.scene.guides import (
+    guide_objects,
+    guiding_vectors,
+    strokes_and_handles,
+    uv_of_corners,
+)
 from ..rosy_addon.scene.meshes import MARKS, marked_edges, mesh_surface
 from ..rosy_addon.ui.generators import settings_of_generator
 from .meshes import can_change_fields, give_fields, selected_meshes
 from .ticking import Ticking
+
+#: Kinds whose name is not their word with a capital.
+NAMES = {"uv": "UV Map"}
+
+
+def _names_on_mesh(context: bpy.types.Context, kind: str) -> list[str]:
+    """Names of the active mesh's UV maps or attributes."""
+    meshes = selected_meshes(context)
+    return [each.name for each in getattr(meshes[0].data, kind)] if meshes else []
 
 
 class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
@@ -26,7 +45,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
     kind: bpy.props.EnumProperty(
         name="From",
         description="Where the directions come from",
-        items=[(kind, kind.capitalize(), text) for kind, text in KINDS.items()],
+        items=[(kind, NAMES.get(kind, kind.capitalize()), text) for kind, text in KINDS.items()],
         default="curvature",
     )
     degree: bpy.props.IntProperty(
@@ -64,6 +83,36 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         max=pi,
         default=pi / 6,
     )
+    guides: bpy.props.EnumProperty(
+        name="Follow",
+        description="What the field follows, one or several",
+        options={"ENUM_FLAG"},
+        items=[
+            ("OBJECTS", "Objects", "Strokes, curves and empties: the one named, or the selected"),
+            ("EDGES", "Edges", "Borders and sharp edges, or marked ones"),
+            ("UV", "UV Map", "The axes of a UV map"),
+            ("ATTRIBUTE", "Vectors", "An attribute of vectors, where they are not zero"),
+        ],
+        default={"OBJECTS"},
+    )
+    guide: bpy.props.StringProperty(
+        name="Object",
+        description="Grease Pencil, curves or an empty that the field follows; empty: all of these "
+        "that are selected. Empties guide along their z axis, as far as they are drawn",
+        search=lambda self, context, typed: [
+            thing.name for thing in guide_objects(context.scene.objects)
+        ],
+    )
+    uv_map: bpy.props.StringProperty(
+        name="UV Map",
+        description="Empty: the active one",
+        search=lambda self, context, typed: _names_on_mesh(context, "uv_layers"),
+    )
+    vectors: bpy.props.StringProperty(
+        name="Vectors",
+        description="Attribute of vectors on faces, points or corners",
+        search=lambda self, context, typed: _names_on_mesh(context, "attributes"),
+    )
     axis: bpy.props.FloatVectorProperty(
         name="Axis",
         description="Direction in the object's own space that is projected to the surface",
@@ -84,17 +133,55 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         """Make all fields, then give them to the meshes; the number of faces comes back."""
         meshes = list(self.needed(context))
         surfaces = [mesh_surface(mesh) for mesh in meshes]
+        recipes = [
+            self._recipe(context, mesh, surface)
+            for mesh, surface in zip(meshes, surfaces, strict=True)
+        ]
         made = {}
         for number, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
-            making = generating(surface, self._recipe(mesh), self.degree)
+            if note := cut_note(surface):
+                self.report({"WARNING"}, note)
+            making = generating(surface, recipes[number], self.degree)
             made[mesh] = yield from part(making, number / len(meshes), (number + 1) / len(meshes))
         give_fields(self, context, made, self.attribute)
         return sum(len(field.vectors) for field in made.values())
 
-    def _recipe(self, mesh: bpy.types.Mesh) -> Recipe:
-        marked = self.kind == "features" and self.edges != "FEATURES"
-        edges = marked_edges(mesh, self.edges) if marked else None
-        return Recipe(self.kind, tuple(self.axis), self.reach, self.sharp_angle, edges)
+    def _recipe(self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface) -> Recipe:
+        recipe = Recipe(self.kind, tuple(self.axis), self.reach, self.sharp_angle)
+        if self.kind == "uv":
+            return replace(recipe, uv=uv_of_corners(mesh, self.uv_map))
+        if self.kind == "features" and self.edges != "FEATURES":
+            return replace(recipe, edges=marked_edges(mesh, self.edges))
+        if self.kind != "guided":
+            return recipe
+        if "EDGES" in self.guides:
+            by_angle = self.edges == "FEATURES"
+            ends = feature_edges(surface, self.sharp_angle) if by_angle else None
+            recipe = replace(recipe, edges=marked_edges(mesh, self.edges) if ends is None else ends)
+        if "OBJECTS" in self.guides:
+            owner = next(thing for thing in selected_meshes(context) if thing.data == mesh)
+            strokes, handles = strokes_and_handles(self._guides(context), owner)
+            recipe = replace(recipe, strokes=strokes, handles=handles)
+        if "UV" in self.guides:
+            recipe = replace(recipe, uv=uv_of_corners(mesh, self.uv_map))
+        if "ATTRIBUTE" in self.guides:
+            recipe = replace(recipe, vectors=guiding_vectors(mesh, self.vectors))
+        return recipe
+
+    def _guides(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """The objects to follow."""
+        if not self.guide:
+            found = guide_objects(context.selected_objects)
+            if not found:
+                raise RosyError(
+                    "there is nothing to follow: name an object, or select Grease Pencil, curves "
+                    "or empties beside the mesh"
+                )
+            return found
+        thing = context.scene.objects.get(self.guide)
+        if thing is None or not guide_objects([thing]):
+            raise RosyError(f"object '{self.guide}' is no Grease Pencil, curve or empty here")
+        return [thing]
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(thing.data for thing in selected_meshes(context))

@@ -6,7 +6,8 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.fieldfile import read_field
+from ..rosy_addon.field.fieldfile import READ, load_field
+from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
 from .meshes import can_change_fields, give_fields, selected_meshes
 
@@ -19,7 +20,23 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO"}
 
     filename_ext = ".rosy"
-    filter_glob: bpy.props.StringProperty(default="*.rosy;*.rawfield", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{kind}" for kind in READ), options={"HIDDEN"}
+    )
+    degree: bpy.props.IntProperty(
+        name="Degree",
+        description="What the file has to hold, or what one that does not say so holds; 0: any",
+        min=0,
+        max=MAX_DEGREE,
+        default=0,
+    )
+    mesh_file: bpy.props.StringProperty(
+        name="Its Mesh",
+        description="Mesh file whose faces the field counts, if these are others than the mesh "
+        "has here: triangulated, or in another order. The field follows by position; a file of "
+        "the same name beside it is found by itself if the numbers of faces differ",
+        subtype="FILE_PATH",
+    )
     undefined: bpy.props.EnumProperty(
         name="Not Finite",
         description="What to do about vectors with NaN or infinite components",
@@ -46,12 +63,19 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
     def execute(self, context: bpy.types.Context) -> set[str]:
         mesh = selected_meshes(context)[0].data
         try:
-            path = bpy.path.abspath(self.filepath)
-            field = read_field(path, mesh_surface(mesh), undefined=self.undefined)
+            field, note = load_field(
+                bpy.path.abspath(self.filepath),
+                mesh_surface(mesh),
+                self.degree or None,
+                self.undefined,
+                mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
+            )
             give_fields(self, context, {mesh: field}, self.attribute)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        if note:
+            self.report({"WARNING"}, note)
         self.report(
             {"INFO"},
             f"Read a field of degree {field.degree} on {len(field.vectors):,} faces of '{mesh.name}'",

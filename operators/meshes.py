@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.scene.attributes import is_native, write_mesh_field
+from ..rosy_addon.scene.attributes import (
+    DEFAULT_NAME,
+    attribute_name,
+    is_native,
+    write_mesh_field,
+)
 from ..rosy_addon.scene.capabilities import is_editable
-from ..rosy_addon.ui import status
+from ..rosy_addon.scene.singular import singular_vertices
+from ..rosy_addon.ui import overlay, status
 from ..rosy_addon.ui.preferences import start_scene
 
 
@@ -46,9 +54,11 @@ def give_fields(
     operator: bpy.types.Operator,
     context: bpy.types.Context,
     made: dict[bpy.types.Mesh, RosyField],
-    name: str,
+    name: str | None = None,
 ) -> None:
     """Write fields to meshes, all or none of them, and start the scene's settings.
+
+    Under the name given; if none is, in place of the field that is there.
 
     Raises
     ------
@@ -56,12 +66,27 @@ def give_fields(
         If a field cannot be written to its mesh; nothing is changed then.
     """
     # Those that will refuse come first.
-    for mesh in sorted(made, key=lambda mesh: _will_take(mesh, name)):
-        write_mesh_field(mesh, made[mesh], name)
+    names = {mesh: name or _own_name(mesh) for mesh in made}
+    for mesh in sorted(made, key=lambda mesh: _will_take(mesh, names[mesh])):
+        write_mesh_field(mesh, made[mesh], names[mesh])
+    _refresh_overlay(context, made)
     try:
         start_scene(context)
     except RosyError as error:
         operator.report({"WARNING"}, f"RoSy's preferences: {error}")
+
+
+def _own_name(mesh: bpy.types.Mesh) -> str:
+    """Where a field takes the place of the mesh's own; a new one if that is in another form."""
+    name = attribute_name(mesh)
+    return name if name not in mesh.attributes or is_native(mesh, name) else DEFAULT_NAME
+
+
+def _refresh_overlay(context: bpy.types.Context, meshes: Iterable[bpy.types.Mesh]) -> None:
+    """Show the singularities of new fields where those of the old ones were shown."""
+    for thing in context.view_layer.objects:
+        if thing.data in meshes and overlay.is_shown(thing.name):
+            overlay.show(thing.name, singular_vertices(thing, context.evaluated_depsgraph_get()))
 
 
 def _will_take(mesh: bpy.types.Mesh, name: str) -> bool:

@@ -41,8 +41,9 @@ FEW = 0.01
 #: Numbers from here on are as good as infinite: a length made of them would be.
 HUGE = 5e153
 
-#: Smaller deviations, as sines, are the last bits of float64: such vectors stay as they are.
-ROUNDING = 1e-12
+#: Smaller deviations, as sines, are the last bits of float32, in which Blender keeps vectors: such
+#: vectors stay as they are, and go through files unchanged.
+ROUNDING = 3e-7
 
 
 def checked_field(
@@ -227,7 +228,7 @@ def into_planes(
             "is it the field of another mesh, or in another space?"
         )
     # With a normal along the vector nothing but rounding errors would be left of it.
-    tangent = np.where((sine < 1 - ROUNDING)[:, None], vectors - off[:, None] * normal, 0.0)
+    tangent = np.where((sine < 1 - 1e-12)[:, None], vectors - off[:, None] * normal, 0.0)
     tangent = np.where((sine > ROUNDING)[:, None], unit(tangent) * length[:, None], vectors)
     return np.where(normal.any(axis=1)[:, None], tangent, 0.0)
 

@@ -130,6 +130,83 @@ def read_mesh_field(
     return _found_or_made(kept, surface, make, "given", *kind, values, degree, source, undefined)
 
 
+def read_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    """(F, 3) float64: a vector attribute on faces, points or corners as a vector on each face.
+
+    Those of points and corners are added up; they need not be tangent to the surface.
+
+    Raises
+    ------
+    RosyError
+        If the attribute is of another type, or its values are not finite.
+    """
+    source = f"mesh '{mesh.name}', attribute '{name}'"
+    attribute = mesh.attributes[name]
+    values = _values(attribute, source, mesh).astype(np.float64)
+    if values.ndim == 1:
+        raise RosyError(f"{source}: found {_kind(attribute)}; a vector is wanted")
+    settle_undefined(values, source, attribute.domain.lower(), "error")
+    if attribute.domain == "FACE":
+        return values
+    surface = mesh_surface(mesh)
+    if attribute.domain == "POINT":
+        values = values[surface.corner_vertex]
+    return mean_over_faces(values, surface.face_start)
+
+
+def read_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    """(F,) float64: a number for each face, of an attribute or a vertex group.
+
+    Of a float, a whole number, a boolean or a colour (its brightness), on faces, points or corners.
+
+    Raises
+    ------
+    RosyError
+        If there is neither, or it holds anything else.
+    """
+    surface = mesh_surface(mesh)
+    source = f"mesh '{mesh.name}', '{name}'"
+    attribute = mesh.attributes.get(name)
+    if attribute is not None:
+        domain, values = attribute.domain, _numbers(attribute, source)
+    else:
+        owner = next(
+            (o for o in bpy.data.objects if o.data == mesh and name in o.vertex_groups), None
+        )
+        if owner is None:
+            raise RosyError(f"{source}: is neither an attribute nor a vertex group")
+        group = owner.vertex_groups[name].index
+        domain, values = "POINT", np.zeros(len(mesh.vertices))
+        for vertex in mesh.vertices:
+            for entry in vertex.groups:
+                if entry.group == group:
+                    values[vertex.index] = entry.weight
+    if not np.isfinite(values).all():
+        raise RosyError(f"{source}: has values that are not finite")
+    if domain == "FACE":
+        return values
+    if domain == "POINT":
+        values = values[surface.corner_vertex]
+    return mean_over_faces(values, surface.face_start)
+
+
+def _numbers(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
+    """(n,) float64."""
+    count, kind = len(attribute.data), attribute.data_type
+    if attribute.domain not in ("FACE", "POINT", "CORNER"):
+        raise RosyError(f"{source}: found {_kind(attribute)}; wanted on FACE, POINT or CORNER")
+    if kind in ("FLOAT_COLOR", "BYTE_COLOR"):
+        values = np.empty(4 * count, dtype=np.float32)
+        attribute.data.foreach_get("color", values)
+        return values.reshape(-1, 4)[:, :3] @ (0.2126, 0.7152, 0.0722)
+    kinds = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
+    if kind not in kinds:
+        raise RosyError(f"{source}: found {_kind(attribute)}; a number or a colour is wanted")
+    values = np.empty(count, dtype=kinds[kind])
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.float64)
+
+
 @dataclass(frozen=True)
 class Stored:
     """How a field is found in an evaluated mesh: vectors on faces, and what there is besides.

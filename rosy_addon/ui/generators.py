@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-_SETTINGS = {"axis": ("axis",), "curvature": ("reach",), "features": ("edges", "sharp_angle")}
+_SETTINGS = {
+    "axis": ("axis",),
+    "curvature": ("reach",),
+    "features": ("edges", "sharp_angle"),
+    "guided": ("guides", "guide", "edges", "sharp_angle", "uv_map", "vectors", "reach"),
+    "uv": ("uv_map",),
+}
+
+#: Which guides a setting of a guided field belongs to.
+_OF_GUIDES = {
+    "guide": "OBJECTS",
+    "edges": "EDGES",
+    "sharp_angle": "EDGES",
+    "uv_map": "UV",
+    "vectors": "ATTRIBUTE",
+}
 
 
 def settings_of_generator(chosen: Any) -> tuple[str, ...]:
@@ -16,6 +31,8 @@ def settings_of_generator(chosen: Any) -> tuple[str, ...]:
         Of ``rosy.field_generate``.
     """
     names = _SETTINGS.get(chosen.kind, ())
+    if chosen.kind == "guided":
+        names = tuple(name for name in names if _OF_GUIDES.get(name, "") in {"", *chosen.guides})
     if "edges" in names and chosen.edges != "FEATURES":
-        return ("edges",)
+        names = tuple(name for name in names if name != "sharp_angle")
     return names

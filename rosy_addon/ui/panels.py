@@ -12,7 +12,7 @@ from ..compositor.presets import load_preset, preset_names
 from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
-from . import status
+from . import overlay, status
 from .generators import settings_of_generator
 
 #: Settings of a look, in the groups in which a user looks for them.
@@ -94,10 +94,34 @@ def _draw_field_there(
     row = layout.row(align=True)
     row.operator("rosy.field_import", text="Import", icon="IMPORT")
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
+    shown = overlay.is_shown(thing.name)
+    button = layout.operator(
+        "rosy.singularities",
+        text="Hide Singularities" if shown else "Show Singularities",
+        icon="OVERLAY",
+        depress=shown,
+    )
+    button.show = "NONE" if shown else "OVERLAY"
+    header, body = layout.panel("rosy_convert_field", default_closed=True)
+    header.label(text="Convert")
+    if body is not None:
+        _draw_converter(body, context)
     header, body = layout.panel("rosy_another_field", default_closed=True)
     header.label(text="Another Field")
     if body is not None:
         _draw_generator(body, context)
+
+
+def _draw_converter(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The settings that the next conversion will have, and its button; other forms to store it in."""
+    settings = context.window_manager.operator_properties_last("rosy.field_convert")
+    column = layout.column()
+    for name in ("degree", "angle", "smooth", "magnitude"):
+        column.prop(settings, name)
+    if settings.magnitude == "values":
+        column.prop(settings, "values")
+    layout.operator("rosy.field_convert")
+    layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
 
 
 def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -26,6 +26,7 @@ def member_vectors(mesh, name="rosy"):
         ("smoothest", 4),
         ("smoothest", 7),
         ("features", 4),
+        ("uv", 4),
     ],
 )
 def test_generate(suzanne, kind, degree):
@@ -131,3 +132,239 @@ def test_every_setting_of_a_look_is_shown_once():
 
     shown = [name for group in GROUPS.values() for name in group] + list(OTHERS)
     assert sorted(shown) == sorted(entry.name for entry in fields(Look))
+
+
+# --- guides ----------------------------------------------------------------------------------
+
+
+def ball_with(add):
+    """A sphere, and something beside it to follow; the sphere is active, both are selected."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, location=(1.0, 2.0, 0.5))
+    ball = bpy.context.object
+    ball.rotation_euler = (0.3, 0.2, 0.1)
+    ball.scale = (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    guide = add(ball)
+    bpy.context.view_layer.update()
+    guide.select_set(True)
+    ball.select_set(True)
+    bpy.context.view_layer.objects.active = ball
+    return ball, guide
+
+
+def arc_around(ball):
+    """Points on the sphere in the world, and the way they take."""
+    turn = np.linspace(0, 1.2, 25)
+    local = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
+    matrix = np.array(ball.matrix_world)
+    return local @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def drawn_curve(ball):
+    curve = bpy.data.curves.new("Curve", "CURVE")
+    curve.dimensions = "3D"
+    points = arc_around(ball)
+    spline = curve.splines.new("POLY")
+    spline.points.add(len(points) - 1)
+    spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
+    return placed(curve)
+
+
+def drawn_bezier(ball):
+    curve = bpy.data.curves.new("Bezier", "CURVE")
+    curve.dimensions = "3D"
+    points = arc_around(ball)[::6]
+    spline = curve.splines.new("BEZIER")
+    spline.bezier_points.add(len(points) - 1)
+    spline.bezier_points.foreach_set("co", points.ravel())
+    for point in spline.bezier_points:
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    return placed(curve)
+
+
+def drawn_hair(ball):
+    points = arc_around(ball)
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.add_curves([len(points)])
+    curves.position_data.foreach_set("vector", points.astype(np.float32).ravel())
+    return placed(curves)
+
+
+def drawn_grease_pencil(ball):
+    points = arc_around(ball)
+    if hasattr(bpy.data, "grease_pencils_v3") or bpy.app.version >= (4, 3, 0):
+        newer = hasattr(bpy.data, "grease_pencils_v3")
+        pencil = (bpy.data.grease_pencils_v3 if newer else bpy.data.grease_pencils).new("Pencil")
+        drawing = pencil.layers.new("Lines").frames.new(1).drawing
+        drawing.add_strokes([len(points)])
+        for point, place in zip(drawing.strokes[0].points, points, strict=True):
+            point.position = place
+    else:
+        pencil = bpy.data.grease_pencils.new("Pencil")
+        stroke = pencil.layers.new("Lines").frames.new(1).strokes.new()
+        stroke.points.add(len(points))
+        stroke.points.foreach_set("co", points.ravel())
+    return placed(pencil)
+
+
+def placed(data):
+    thing = bpy.data.objects.new(data.name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+@pytest.mark.parametrize("add", [drawn_curve, drawn_bezier, drawn_hair, drawn_grease_pencil])
+@pytest.mark.parametrize("named", [False, True])
+def test_strokes_are_followed(scene, add, named):
+    ball, guide = ball_with(add)
+    name = guide.name if named else ""
+    assert bpy.ops.rosy.field_generate(kind="guided", degree=2, guide=name) == {"FINISHED"}
+    vectors = member_vectors(ball.data)
+    centre = np.array([face.center for face in ball.data.polygons])
+    along = (np.abs(centre[:, 1]) < 0.04) & (centre[:, 0] > 0.4) & (centre[:, 2] > 0.1)
+    assert along.sum() > 10
+    way = np.stack([-centre[:, 2], 0 * centre[:, 1], centre[:, 0]], axis=1)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    cosine = np.abs(np.sum(vectors * way, axis=1))[along]
+    assert np.degrees(np.arccos(cosine.clip(0, 1))).max() < 5
+
+
+def test_an_empty_guides_around_it(scene):
+    def add(ball):
+        empty = bpy.data.objects.new("Guide", None)
+        bpy.context.scene.collection.objects.link(empty)
+        empty.location = ball.matrix_world @ ball.data.vertices[0].co
+        empty.rotation_euler = (0.0, 1.2, 0.0)
+        empty.empty_display_size = 0.4
+        return empty
+
+    ball, guide = ball_with(add)
+    assert bpy.ops.rosy.field_generate(kind="guided", degree=1) == {"FINISHED"}
+    place = ball.matrix_world.inverted() @ guide.location
+    face = min(ball.data.polygons, key=lambda face: (face.center - place).length)
+    axis = np.array((ball.matrix_world.inverted() @ guide.matrix_world).col[2][:3])
+    normal = np.array(face.normal)
+    axis -= normal * (axis @ normal)
+    axis /= np.linalg.norm(axis)
+    assert member_vectors(ball.data)[face.index] @ axis > 0.999
+
+
+def test_marked_edges_uv_and_vectors_together(suzanne):
+    assert bpy.ops.rosy.field_generate(kind="axis", degree=4, attribute="wind") == {"FINISHED"}
+    made = bpy.ops.rosy.field_generate(
+        kind="guided", degree=4, guides={"EDGES", "UV", "ATTRIBUTE"}, vectors="wind", reach=0.02
+    )
+    assert made == {"FINISHED"}
+    assert np.linalg.norm(member_vectors(suzanne.data), axis=1).min() > 0.5
+
+
+def test_guides_that_are_not_there(suzanne):
+    before = contents()
+    generate = bpy.ops.rosy.field_generate
+    assert "there is nothing to follow" in error_of(generate, kind="guided")
+    assert "'Nobody'" in error_of(generate, kind="guided", guide="Nobody")
+    assert "attribute 'wind'" in error_of(
+        generate, kind="guided", guides={"ATTRIBUTE"}, vectors="wind"
+    )
+    assert "UV map 'none'" in error_of(generate, kind="uv", uv_map="none")
+    assert contents() == before
+
+
+# --- conversions -----------------------------------------------------------------------------
+
+
+def test_convert(suzanne):
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    before = member_vectors(suzanne.data)
+    group = suzanne.vertex_groups.new(name="Weights")
+    group.add(list(range(100)), 0.5, "REPLACE")
+    converted = bpy.ops.rosy.field_convert(
+        degree=8, angle=0.1, smooth=0.01, magnitude="values", values="Weights"
+    )
+    assert converted == {"FINISHED"}
+    assert suzanne.data.rosy.degree == 8
+    length = np.linalg.norm(member_vectors(suzanne.data), axis=1)
+    assert 0.4 < length.max() <= 0.5 + 1e-6 and length.min() == 0
+    bpy.ops.rosy.field_convert(degree=4)
+    assert suzanne.data.rosy.degree == 4
+    assert len(before) == len(length)
+
+
+def test_convert_refuses(suzanne):
+    bpy.ops.rosy.field_generate(kind="axis", degree=4)
+    before = contents()
+    assert "neither a multiple" in error_of(bpy.ops.rosy.field_convert, degree=3)
+    assert "'nothing'" in error_of(bpy.ops.rosy.field_convert, magnitude="values", values="nothing")
+    assert contents() == before
+
+
+@pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
+def test_store(suzanne, form):
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    assert bpy.ops.rosy.field_store(form=form) == {"FINISHED"}
+    wanted = {"VECTOR": "rosy", "DIRECTIONS": "dir3", "ANGLE": "rosy_angle"}[form]
+    assert suzanne.data.attributes[wanted].domain == "FACE"
+    assert "energy" not in error_free_info(suzanne)
+
+
+def error_free_info(thing):
+    """The field can be read again as it is stored now."""
+    assert bpy.ops.rosy.field_convert(angle=0.0) == {"FINISHED"}
+    return thing.data.attributes.keys()
+
+
+# --- singularities ---------------------------------------------------------------------------
+
+
+def test_singularities_as_points(scene):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    ball = bpy.context.object
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    assert bpy.ops.rosy.singularities(show="BOTH") == {"FINISHED"}
+    name = "Icosphere singularities"
+    points = bpy.data.objects[name]
+    assert points.parent == ball
+    values = points.data.attributes["index"].data
+    assert sum(value.value for value in values) == 8
+    place = points.data.attributes["position"].data
+    assert all(abs(point.vector.length - 1) < 0.02 for point in place)
+    # Again: in their place.
+    assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
+    assert [o.name for o in bpy.data.objects if "singularities" in o.name] == [name]
+    assert bpy.ops.rosy.singularities(show="NONE") == {"FINISHED"}
+    assert "Icosphere singularities" not in bpy.data.objects
+    assert not len(bpy.data.pointclouds) and len(bpy.data.meshes) == len(
+        {o.data for o in bpy.data.objects if o.type == "MESH"}
+    )
+
+
+def test_exports_and_imports(suzanne, tmp_path):
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    before = member_vectors(suzanne.data)
+    for kind in (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings"):
+        path = str(tmp_path / f"a{kind}")
+        assert bpy.ops.rosy.field_export(filepath=path, file_format=kind) == {"FINISHED"}
+        if kind == ".sings":
+            continue
+        assert bpy.ops.rosy.field_import(filepath=path) == {"FINISHED"}
+        if kind != ".obj":
+            np.testing.assert_array_equal(member_vectors(suzanne.data), before)
+
+
+def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
+    bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(0.2, 0.3, 1.0))
+    path = tmp_path / "a.rosy"
+    assert bpy.ops.rosy.field_export(filepath=str(path)) == {"FINISHED"}
+    rows = [f"v {v.co.x} {v.co.y} {v.co.z}" for v in suzanne.data.vertices]
+    rows += ["f " + " ".join(str(v + 1) for v in f.vertices) for f in suzanne.data.polygons]
+    (tmp_path / "a.obj").write_text("\n".join(rows))
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.quads_convert_to_tris()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    suzanne.data.attributes.remove(suzanne.data.attributes["rosy"])
+    assert bpy.ops.rosy.field_import(filepath=str(path)) == {"FINISHED"}
+    found = member_vectors(suzanne.data)
+    assert np.linalg.norm(found, axis=1).mean() > 0.5
+    axis = np.array((0.2, 0.3, 1.0)) / np.linalg.norm((0.2, 0.3, 1.0))
+    assert np.median(found @ axis) > 0.4

@@ -121,7 +121,7 @@ def test_fields_of_others(name, shared_data):
     field = read_field(shared_data / "fields" / f"{name}.rawfield", surface)
     assert field.degree == int(degree or 4)
     assert np.allclose(field.magnitude, 1, atol=1e-4)
-    assert np.abs(dot(field.vectors, surface.face_normal)).max() < 1e-12
+    assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
     if name == "cheburashka":  # the one that is closed
         _, index = singularities(surface, field)
         assert index.sum() == field.degree * euler_characteristic(surface)

@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ..scene.singular import Singular
 
@@ -24,6 +24,9 @@ RIM = (0.02, 0.02, 0.02, 1.0)
 
 #: Diameter of a dot in pixels, without its rim of two.
 DOT = 9.0
+
+#: Sides of the polygon that passes for a disc.
+SIDES = 20
 
 #: How far dots are lifted off the surface, as a share of the object's size, not to sink into it.
 LIFT = 0.004
@@ -76,24 +79,43 @@ def _visible() -> list[tuple[bpy.types.Object, Singular]]:
 
 
 def _draw_dots() -> None:
-    space = bpy.context.space_data
-    if not space.overlay.show_overlays:
+    context = bpy.context
+    if not context.space_data.overlay.show_overlays:
         return
-    shader = gpu.shader.from_builtin("POINT_UNIFORM_COLOR")
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.blend_set("ALPHA")
-    scale = bpy.context.preferences.system.ui_scale
+    scale = context.preferences.system.ui_scale
     for thing, found in _visible():
         lifted = _lifted(thing, found)
         for sign, colour in COLOURS.items():
             points = lifted[np.sign(found.index) == sign]
-            for size, ink in ((DOT + 4, RIM), (DOT, colour)):
-                gpu.state.point_size_set(size * scale)
+            # The rim first, and a little behind.
+            for radius, nearer, ink in ((DOT / 2 + 2, DOT / 2, RIM), (DOT / 2, DOT, colour)):
+                corners = _discs(context, points, radius * scale, nearer)
                 shader.uniform_float("color", ink)
-                batch_for_shader(shader, "POINTS", {"pos": points.tolist()}).draw(shader)
-    gpu.state.point_size_set(1.0)
-    gpu.state.blend_set("NONE")
+                batch_for_shader(shader, "TRIS", {"pos": corners}).draw(shader)
     gpu.state.depth_test_set("NONE")
+
+
+def _discs(
+    context: bpy.types.Context, points: np.ndarray, radius: float, nearer: float
+) -> np.ndarray:
+    """(n, 3) corners of triangles that make up a disc at each point, facing the eye.
+
+    `radius` and `nearer`, by how much they come nearer to the eye, are in pixels.
+    """
+    view, window = context.region_data, context.region
+    eye = np.array(view.view_matrix.inverted())
+    right, up, back = eye[:3, 0], eye[:3, 1], eye[:3, 2]
+    depth = np.ones(len(points))
+    if view.is_perspective:
+        depth = (eye[:3, 3] - points) @ back
+    pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None, None]
+    turn = np.linspace(0, 2 * np.pi, SIDES + 1)
+    rim = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up
+    fan = np.stack([np.zeros((SIDES, 3)), rim[:-1], rim[1:]], axis=1).reshape(-1, 3)
+    corners = points[:, None] + pixel * (radius * fan + nearer * back)
+    return corners.reshape(-1, 3).astype(np.float32)
 
 
 def _draw_labels() -> None:
@@ -106,29 +128,22 @@ def _draw_labels() -> None:
     blf.color(font, 1.0, 1.0, 1.0, 1.0)
     blf.enable(font, blf.SHADOW)
     blf.shadow(font, 5, 0.0, 0.0, 0.0, 1.0)
-    eye = context.region_data.view_matrix.inverted()
     for thing, found in _visible():
         if len(found) > MOST_LABELS:
             continue
-        turned = np.array(thing.matrix_world.to_3x3().inverted_safe().transposed())
-        for point, normal, index in zip(
-            _lifted(thing, found), found.normals @ turned.T, found.index.tolist(), strict=True
-        ):
-            away = _away(context, eye, point)
-            if float(np.dot(normal, away)) > 0:  # on the far side
-                continue
+        for point, index in zip(_lifted(thing, found), found.index.tolist(), strict=True):
             place = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
-            if place is not None:
+            if place is not None and not _is_hidden(context, Vector(point)):
                 blf.position(font, place.x + 8 * scale, place.y + 5 * scale, 0)
                 blf.draw(font, index_text(index, found.degree))
     blf.disable(font, blf.SHADOW)
 
 
-def _away(context: bpy.types.Context, eye: Matrix, point: np.ndarray) -> np.ndarray:
-    """The direction in which the view looks at a point."""
-    if context.region_data.is_perspective:
-        return point - np.array(eye.translation)
-    return -np.array(eye.col[2][:3])
+def _is_hidden(context: bpy.types.Context, point: Vector) -> bool:
+    """Whether something is between a point and the eye."""
+    eye = context.region_data.view_matrix.inverted()
+    toward = eye.translation - point if context.region_data.is_perspective else eye.col[2].xyz
+    return context.scene.ray_cast(context.view_layer.depsgraph, point, toward.normalized())[0]
 
 
 def _lifted(thing: bpy.types.Object, found: Singular) -> np.ndarray:

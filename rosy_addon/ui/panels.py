@@ -48,6 +48,10 @@ OUTPUT = ("percentage", "placement", "emission", "diffuse", "store", "directory"
 SHORT_NAMES = {"magnitude_range": "Top Value", "undefined": "Skip Bad Vectors"}
 
 
+#: What an empty setting of the generator stands for.
+IF_EMPTY = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
+
+
 class _Sidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -131,7 +135,7 @@ def _draw_generator(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     column.prop(settings, "kind")
     column.prop(settings, "degree")
     for name in settings_of_generator(settings):
-        column.prop(settings, name)
+        column.prop(settings, name, placeholder=IF_EMPTY.get(name, ""))
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.field_generate", icon="FORCE_VORTEX")

@@ -52,6 +52,7 @@ def all_steps():
     for step in (
         panel_without_field,
         panel_with_field,
+        singularities_as_dots,
         bake_with_progress,
         panel_with_picture,
         panel_out_of_date,
@@ -216,6 +217,44 @@ def panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
     yield from photograph("panel-2-field", 450)
+
+
+def singularities_as_dots():
+    """Dots of both signs while they are shown, and no handler when they are not."""
+    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    yield from fresh_scene()
+    with in_view():
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+        bpy.ops.view3d.view_selected()
+    assert not overlay._handlers
+    yield from photograph("panel-5-no-singularities")
+    without = dots_in("panel-5-no-singularities")
+    with in_view():
+        assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
+    yield from photograph("panel-6-singularities", 450)
+    orange, blue = dots_in("panel-6-singularities") - without
+    assert orange > 200 and blue > 200, (orange, blue)
+    with in_view():
+        bpy.ops.rosy.singularities(show="NONE")
+    assert not overlay._handlers
+    yield from photograph("panel-7-hidden")
+    assert np.abs(dots_in("panel-7-hidden") - without).max() < 100
+
+
+def dots_in(name):
+    """How many pixels of the 3D view, as it was photographed, are orange and blue as dots are."""
+    whole = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
+    seen = pixels(whole)
+    bpy.data.images.remove(whole)
+    region = view()[2]
+    seen = seen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
+    red, green, blue = seen[..., 0], seen[..., 1], seen[..., 2]
+    return np.array(
+        [
+            np.count_nonzero((red > 0.8) & (green < 0.5) & (blue < 0.25)),
+            np.count_nonzero((blue > 0.8) & (red < 0.3) & (green < 0.5)),
+        ]
+    )
 
 
 def bake_with_progress():

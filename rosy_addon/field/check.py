@@ -195,8 +195,14 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
     with the angles at the corners, regardless of sharp edges; zero on vertices without a face.
     """
     surface = _at_rest(surface)
-    if domain == "face":
-        return surface.face_normal
+    return surface.face_normal if domain == "face" else vertex_normals(surface)
+
+
+def vertex_normals(surface: Surface) -> np.ndarray:
+    """(V, 3) float64 unit normals of the faces around each vertex, averaged with their angles.
+
+    Of the shape as it is, regardless of sharp edges; zero on vertices without a face.
+    """
     count = len(surface.vertices)
     weighted = surface.face_normal[surface.corner_face] * corner_angles(surface)[:, None]
     columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]

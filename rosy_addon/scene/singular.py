@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
+from ..field.check import vertex_normals
 from ..field.singularities import singularities
 from .attributes import read_mesh_field
-from .bodies import MADE
+from .bodies import MADE, own_modifiers, read_scene
 from .meshes import mesh_surface
 
 #: What the points of an object carry: the index in units of 1 / N, and N.
@@ -42,26 +43,26 @@ class Singular:
 
 
 def singular_vertices(thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Singular:
-    """The singularities of an object's field.
-
-    They are found on its mesh as it is without modifiers, and shown where these have moved the
-    vertices, as long as there are as many of them.
+    """The singularities of an object's field, on its mesh as it is shown: after its modifiers.
 
     Raises
     ------
     RosyError
         If its field cannot be read.
     """
-    mesh = thing.data
-    surface = mesh_surface(mesh, f"object '{thing.name}'")
-    field = read_mesh_field(mesh, surface=surface, undefined="zero", owner=f"object '{thing.name}'")
-    vertex, index = singularities(surface, field)
-    shown = thing.evaluated_get(depsgraph).data
-    source = shown if len(shown.vertices) == len(mesh.vertices) else mesh
-    points, normals = (
-        _vectors(collection, key)[vertex]
-        for collection, key in ((source.vertices, "co"), (source.vertex_normals, "vector"))
-    )
+    if own_modifiers(thing) or thing.data.shape_keys:
+        reading = read_scene(depsgraph, [thing], undefined="zero")
+        body = reading.bodies[0]
+        surface, field = body.surface, body.field
+    else:
+        owner = f"object '{thing.name}'"
+        surface = mesh_surface(thing.data, owner)
+        field = read_mesh_field(thing.data, surface=surface, undefined="zero", owner=owner)
+    # The field's vectors belong to the shape at rest.
+    rest = surface if surface.rest is None else replace(surface, vertices=surface.rest, rest=None)
+    vertex, index = singularities(rest, field)
+    points = surface.vertices[vertex].astype(np.float32)
+    normals = vertex_normals(surface)[vertex].astype(np.float32)
     return Singular(points, normals, index, field.degree)
 
 
@@ -113,9 +114,3 @@ def _cloud(name: str, count: int) -> bpy.types.ID:
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(count)
     return mesh
-
-
-def _vectors(collection, key: str) -> np.ndarray:
-    values = np.empty(3 * len(collection), dtype=np.float32)
-    collection.foreach_get(key, values)
-    return values.reshape(-1, 3)

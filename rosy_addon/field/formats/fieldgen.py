@@ -13,8 +13,9 @@ import numpy as np
 
 from ...errors import RosyError
 from ...files import read_bytes
+from ..check import vertex_normals
 from ..corners import corner_angles, corner_rotations
-from ..frames import tangent_frame, unit
+from ..frames import tangent_frame
 from ..representation import (
     complex_sums,
     face_frames,
@@ -70,8 +71,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
     count = len(surface.vertices)
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
-    weighted = surface.face_normal[face] * angle[:, None]
-    normal = unit(np.stack([np.bincount(vertex, column, count) for column in weighted.T], axis=1))
+    normal = vertex_normals(surface)
     face_x, face_y = face_frames(surface)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
     turn = power(corner_rotations(surface.face_normal, face_x, face, normal[vertex]), field.degree)

@@ -138,9 +138,14 @@ def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[R
     ends = recipe.edges
     if ends is None:
         ends = feature_edges(surface, recipe.sharp_angle)
+    if not len(ends):
+        raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
     guides = along_edges(surface, ends, degree)
     if not guides.any():
-        raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
+        raise RosyError(
+            f"{surface.name}: the edges of each face contradict each other in a field of degree "
+            f"{degree}"
+        )
     return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
 
 

@@ -273,13 +273,18 @@ def surface_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
 
 
 def cut_edges(surface: Surface) -> int:
-    """How many edges join two faces that do not agree on which side is out.
+    """How many edges join two faces (with an area) that do not agree on which side is out.
 
     There is no field across such an edge. Only flipping faces helps, and of a Möbius strip not even
     that: some edges are left, along which the field is cut.
     """
     edges = surface_edges(surface.corner_vertex, surface.face_start)
-    return int(np.count_nonzero(edges.uses == 2)) - len(edges.inner)
+    flat = ~surface.face_normal.any(axis=1)
+    beside_flat = np.zeros(len(edges.uses), dtype=bool)
+    beside_flat[edges.corner_edge[flat[surface.corner_face]]] = True
+    doubtful = (edges.uses == 2) & ~beside_flat
+    doubtful[edges.inner] = False
+    return int(np.count_nonzero(doubtful))
 
 
 def cut_note(surface: Surface) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import awkward
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -91,3 +92,9 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
         triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
     vertices *= radius / np.linalg.norm(vertices, axis=1, keepdims=True)
     return from_triangles(vertices, triangles, name="sphere")
+
+
+def cube() -> Surface:
+    """A unit cube of six quads."""
+    points, faces = awkward.cube()
+    return build_surface(points, np.concatenate(faces), range(0, 25, 4), name="cube")

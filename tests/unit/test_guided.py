@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
-from shapes import from_quads, from_triangles, icosphere, plane, torus
-from test_smoothest import DATA, angles_apart, as_scipy, bumpy, cube
+from shapes import cube, from_quads, from_triangles, icosphere, plane, torus
+from test_smoothest import DATA, angles_apart, as_scipy, bumpy
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field.connection import connect, laplacian

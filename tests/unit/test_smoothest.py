@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sparse
+from awkward import AWKWARD
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import eigsh, spsolve
 from scipy.spatial import ConvexHull
@@ -269,45 +270,12 @@ def test_each_piece_has_its_own():
     np.testing.assert_allclose(energy, [alone[0], alone[1] / 0.09], rtol=1e-4)
 
 
-def cube():
-    points = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    quads = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
-    return build_surface(points, quads, range(0, 25, 4), name="cube")
-
-
-def moebius(count=24):
-    angle = np.repeat(np.arange(count) * (2 * np.pi / count), 2)
-    out = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
-    up = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
-    points = np.stack([out * np.cos(angle), out * np.sin(angle), up], axis=1)
-    triangles = []
-    for step in range(count):
-        a, b = 2 * step, 2 * step + 1
-        c, d = (a + 2, b + 2) if step < count - 1 else (1, 0)
-        triangles += [[a, c, b], [b, c, d]]
-    return from_triangles(points, triangles)
-
-
-def with_faces_without_area(count=1000):
-    ball = icosphere(2)
-    points = np.concatenate([ball.vertices, np.zeros((3, 3))])
-    flat = np.tile(len(ball.vertices) + np.arange(3), (count, 1))
-    return from_triangles(points, np.concatenate([ball.corner_vertex.reshape(-1, 3), flat]))
-
-
-def fan():
-    points = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0.5, 0], [-1, -0.5, 0]]
-    return from_triangles(points, [[0, 1, 2], [0, 1, 3], [1, 0, 4]])
-
-
-def triangle():
-    return from_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-
-
 @pytest.mark.parametrize("degree", [1, 3, 4, 12])
-@pytest.mark.parametrize("make", [cube, moebius, with_faces_without_area, fan, triangle, plane])
-def test_meshes_that_are_not_closed_smooth_manifolds(make, degree):
-    surface = make()
+@pytest.mark.parametrize("name", AWKWARD)
+def test_meshes_that_are_not_closed_smooth_manifolds(name, degree):
+    points, faces = AWKWARD[name]()
+    starts = np.cumsum([0, *map(len, faces)])
+    surface = build_surface(points, np.concatenate(faces), starts)
     field = smoothest_field(surface, degree)
     length = np.linalg.norm(field.vectors, axis=1)
     has_area = surface.face_normal.any(axis=1)

@@ -1,0 +1,46 @@
+"""Every kind of field on every awkward mesh, with the operator that the panel's button runs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+from awkward import AWKWARD
+
+KINDS = ("smoothest", "curvature", "features", "guided", "axis", "uv")
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_on_every_mesh(scene, kind, name, capfd):
+    points, faces = AWKWARD[name]()
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    layer = mesh.uv_layers.new(name="UVMap")
+    corner = np.array([points[vertex] for face in faces for vertex in face], dtype=np.float32)
+    layer.uv.foreach_set("vector", (corner[:, :2] + 0.2 * corner[:, 2:]).ravel())
+    thing = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(thing)
+    bpy.context.view_layer.objects.active = thing
+    thing.select_set(True)
+    settings = {"guides": {"EDGES", "UV"}, "reach": 0.1} if kind == "guided" else {}
+    if (kind, name) == ("features", "faces_without_area"):
+        # The edges of an octahedron's triangles cancel out.
+        with pytest.raises(RuntimeError, match="contradict each other"):
+            bpy.ops.rosy.field_generate(kind=kind, degree=4)
+        return
+    assert bpy.ops.rosy.field_generate(kind=kind, degree=4, **settings) == {"FINISHED"}
+    warned = "Möbius" in capfd.readouterr().out
+    assert warned == (name == "moebius")
+    values = np.empty(3 * len(faces), dtype=np.float32)
+    mesh.attributes["rosy"].data.foreach_get("vector", values)
+    assert np.isfinite(values).all()
+    if kind == "smoothest":
+        length = np.linalg.norm(values.reshape(-1, 3), axis=1)
+        area = np.array([face.area > 0 for face in mesh.polygons])
+        np.testing.assert_allclose(length, area, atol=1e-5)

@@ -1,0 +1,68 @@
+"""Meshes that are no closed smooth manifolds, as points and faces: for tests here and in Blender."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def cube():
+    points = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return points, quads
+
+
+def moebius(count=24):
+    angle = np.repeat(np.arange(count) * (2 * np.pi / count), 2)
+    out = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
+    up = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
+    points = np.stack([out * np.cos(angle), out * np.sin(angle), up], axis=1)
+    triangles = []
+    for step in range(count):
+        a, b = 2 * step, 2 * step + 1
+        c, d = (a + 2, b + 2) if step < count - 1 else (1, 0)
+        triangles += [(a, c, b), (b, c, d)]
+    return points.tolist(), triangles
+
+
+def grid(count=4):
+    points = [(x, y, 0) for y in range(count + 1) for x in range(count + 1)]
+    row = count + 1
+    here = [y * row + x for y in range(count) for x in range(count)]
+    return points, [(a, a + 1, a + row + 1, a + row) for a in here]
+
+
+def octahedron():
+    points = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    top = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4)]
+    return points, [*top, *((b, a, 5) for a, b, _ in top)]
+
+
+def pieces():
+    """A cube, an octahedron beside it, and a grid above them."""
+    points, faces = [], []
+    for number, (more, others) in enumerate((cube(), octahedron(), grid())):
+        faces += [tuple(vertex + len(points) for vertex in face) for face in others]
+        points += [(x + 3 * number, y, z + number) for x, y, z in more]
+    return points, faces
+
+
+def fan():
+    """Three triangles on one edge."""
+    points = [(0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0.5, 0), (-1, -0.5, 0)]
+    return points, [(0, 1, 2), (0, 1, 3), (1, 0, 4)]
+
+
+def faces_without_area(count=1000):
+    """An octahedron, and a thousand triangles without area."""
+    points, faces = octahedron()
+    points += [(0.1 * number, 0.0, 2.0) for number in range(count + 2)]
+    return points, faces + [(6 + number, 7 + number, 8 + number) for number in range(count)]
+
+
+def triangle():
+    return [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+
+
+AWKWARD = {
+    make.__name__: make for make in (cube, moebius, grid, pieces, fan, faces_without_area, triangle)
+}

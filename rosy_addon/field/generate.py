@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Work, drain
+from ..progress import Progress, Work, drain, part
 from .corners import corner_angles, corner_rotations, smooth_faces
 from .frames import dot, unit
 from .guided import finding_guided
@@ -116,12 +116,14 @@ def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[Rosy
     if recipe.kind == "axis":
         return axis_field(surface, degree, recipe.axis)
     if recipe.kind == "curvature":
-        field = curvature_field(surface, degree)
+        end = 0.4 if recipe.reach else 1.0
+        field = yield from part(finding_curvature(surface, degree), 0.0, end)
         if not recipe.reach:
             return field
         size = np.ptp(surface.vertices, axis=0).max()
         weight = (field.magnitude / (recipe.reach * size)) ** 2
-        return (yield from finding_guided(surface, degree, unit(field.vectors), weight))
+        guided = finding_guided(surface, degree, unit(field.vectors), weight)
+        return (yield from part(guided, end, 1.0))
     if recipe.kind == "features":
         return (yield from _following_features(surface, recipe, degree))
     if recipe.kind == "guided":
@@ -232,6 +234,11 @@ def _shaded_smoothly(surface: Surface) -> Surface:
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
+    """The field of `finding_curvature`."""
+    return drain(finding_curvature(surface, degree))
+
+
+def finding_curvature(surface: Surface, degree: int) -> Work[RosyField]:
     """Members along the principal directions of curvature.
 
     Degree 2 follows the direction in which the surface bends most toward its inside (the greater
@@ -258,9 +265,13 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     degree = check_degree(degree)
     if degree % 2:
         raise RosyError(f"a curvature field has an even degree, not {degree}")
+    label = "finding the directions of curvature"
+    yield Progress(0.0, label)
     whole = _shaded_smoothly(surface)
+    yield Progress(0.3, label)
     x, y = face_frames(whole)
     mean, deviator = _curvature_of_faces(whole, x, y)
+    yield Progress(0.6, label)
     amount = np.abs(deviator)
     centre = whole.face_centre.mean(axis=0)
     offset = whole.face_centre - centre
@@ -271,7 +282,8 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     z = confidence * phase ** (degree // 2)
     turn = corner_rotations(whole.face_normal, x, whole.corner_face, whole.corner_normal)
     weights = corner_angles(whole)
-    for _ in range(SMOOTHING):
+    for number in range(SMOOTHING):
+        yield Progress(0.7 + 0.1 * number, label)
         z = smooth_faces(whole, z, turn, degree, weights)
     return RosyField(degree, from_representation(z, x, y, degree))
 
@@ -291,15 +303,14 @@ def _curvature_of_faces(
     bend = surface.corner_normal[ahead] - surface.corner_normal
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(bend, x[face]), dot(bend, y[face])
-    uu, uv, vv, up, mixed, vq = sum_over_faces(
-        np.stack([u * u, u * v, v * v, u * p, v * p + u * q, v * q], axis=1), surface.face_start
-    ).T
+    products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
+    uu, uv, vv, up, mixed, vq = (sum_over_faces(each, surface.face_start) for each in products)
     size = uu + vv
     size[size == 0] = 1.0
     ridge = 1e-9 * size  # faces without area get no curvature instead of no solution
-    matrix = np.zeros((len(uu), 3, 3))
-    matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2] = uu + ridge, uu + vv + ridge, vv + ridge
-    matrix[:, 0, 1] = matrix[:, 1, 0] = matrix[:, 1, 2] = matrix[:, 2, 1] = uv
-    right = np.stack([up, mixed, vq], axis=1)[..., None]
-    a, b, c = np.linalg.solve(matrix, right)[..., 0].T
+    uu, vv = uu + ridge, vv + ridge
+    # uu a + uv b = up,  uv a + (uu + vv) b + uv c = mixed,  uv b + vv c = vq
+    b = uu * vv * mixed - uv * (vv * up + uu * vq)
+    b /= (uu + vv) * (uu * vv - uv * uv)
+    a, c = (up - uv * b) / uu, (vq - uv * b) / vv
     return (a + c) / 2, (a - c) / 2 + 1j * b

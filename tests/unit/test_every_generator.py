@@ -11,7 +11,6 @@ from awkward import AWKWARD
 from rosy_addon.cli import main
 from rosy_addon.field.generate import KINDS
 
-
 #: Degrees of which the edges around each square, or each equilateral triangle, cancel out.
 CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
 

@@ -82,6 +82,7 @@ def finding_guided(
         raise RosyError(f"{surface.name}: there is no guide on any face with an area")
     weight = np.where(wish != 0, np.broadcast_to(weight, wish.shape), 0.0)
     connection = connect(surface)
+    yield Progress(0.04, "carrying the guides to the vertices")
     turn = corner_turns(surface, connection, x, y)
     toward_node = np.exp(-1j * degree * turn)
     owner = np.repeat(surface.triangle_face, 3)
@@ -95,10 +96,13 @@ def finding_guided(
     firm = np.abs(given) > 1e-6 * most
     given[~firm] = 0
     given[firm] /= np.abs(given[firm])
+    yield Progress(0.06, "connecting the vertices")
     z = given.copy()
     free = np.flatnonzero(~firm)
     if len(free):
-        matrix, moved = _reduced(laplacian(connection, degree), pull, firm, given)
+        matrix = laplacian(connection, degree)
+        yield Progress(0.08, "connecting the vertices")
+        matrix, moved = _reduced(matrix, pull, firm, given)
         solving = solve(matrix, (right - moved)[free])
         z[free] = yield from part(solving, 0.1, 0.95)
     yield Progress(0.95, "carrying the field to the faces")

@@ -10,7 +10,7 @@ import numpy as np
 
 from .frames import dot, unit
 from .rosy_field import RosyField
-from .surface import Surface
+from .surface import Surface, face_blocks, next_corners
 
 
 def power(numbers: np.ndarray, degree: int) -> np.ndarray:
@@ -78,15 +78,16 @@ def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     For faces without area both are zero, so that a field's representation is zero there too.
     """
     normal = surface.face_normal
-    points = surface.vertices[surface.corner_vertex]
-    start, stop = surface.face_start[:-1], surface.face_start[1:]
-    edge = points[surface.next_corner] - points
-    edge -= dot(edge, normal[surface.corner_face])[:, None] * normal[surface.corner_face]
-    length = np.sqrt(dot(edge, edge))
-    corner = np.arange(len(length))
-    usable = np.where(length > 0, corner, stop[surface.corner_face] - 1)
-    first = np.minimum.reduceat(usable, start)
-    x = unit(edge[first])
+    x = np.empty_like(normal)
+    for faces, corners, starts in face_blocks(surface.face_start):
+        points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
+        across = np.repeat(normal[faces], np.diff(starts), axis=0)
+        edge = points[next_corners(starts)] - points
+        edge -= dot(edge, across)[:, None] * across
+        length = np.sqrt(dot(edge, edge))
+        last = np.repeat(starts[1:] - 1, np.diff(starts))
+        usable = np.where(length > 0, np.arange(len(length)), last)
+        x[faces] = unit(edge[np.minimum.reduceat(usable, starts[:-1])])
     x[~normal.any(axis=1)] = 0.0
     return x, np.cross(normal, x)
 

@@ -22,6 +22,9 @@ from .surface import Surface
 FOUND = 1e-4
 MOST_ROUNDS = 200
 
+#: Triangles that are worked on at once: bounds memory, and fits the caches.
+BLOCK = 1 << 14
+
 #: Rounds on coarser levels, which save some on the finest.
 COARSE_ROUNDS = 12
 
@@ -226,18 +229,30 @@ def corner_turns(
 
     The middle of a corner is the same direction in both.
     """
-    face = surface.triangle_face
-    points = surface.vertices[surface.triangle_vertex]
-    edge = np.roll(points, -1, axis=1) - points
-    first = np.arctan2(dot(edge, y[face][:, None]), dot(edge, x[face][:, None])).ravel()
-    return first + 0.5 * connection.opening - connection.middle
+    first = np.empty(surface.triangle_vertex.shape)
+    for start in range(0, len(first), BLOCK):
+        part = slice(start, start + BLOCK)
+        face = surface.triangle_face[part]
+        here_x, here_y = x.take(face, axis=0), y.take(face, axis=0)
+        points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[part].T]
+        for corner in range(3):
+            edge = points[(corner + 1) % 3] - points[corner]
+            first[part, corner] = np.arctan2(dot(edge, here_y), dot(edge, here_x))
+    first = first.ravel()
+    first += 0.5 * connection.opening
+    first -= connection.middle
+    return first
 
 
 def sum_on_faces(
     surface: Surface, connection: Connection, z: np.ndarray, turn: np.ndarray, degree: int
 ) -> np.ndarray:
     """(F,) complex: values at the corners of each face, summed with the areas of triangles."""
-    on_corner = z[connection.node] * np.exp(1j * degree * turn)
-    on_corner *= np.repeat(connection.area, 3)
-    owner, count = np.repeat(surface.triangle_face, 3), surface.face_count
-    return complex_sums(owner, on_corner, count)
+    total = np.empty((len(connection.area), 3), dtype=np.complex128)
+    node, turn = connection.node.reshape(-1, 3), turn.reshape(-1, 3)
+    for start in range(0, len(total), BLOCK):
+        part = slice(start, start + BLOCK)
+        angle = degree * turn[part]
+        np.multiply(z.take(node[part]), np.cos(angle) + 1j * np.sin(angle), out=total[part])
+        total[part] *= connection.area[part, None]
+    return complex_sums(surface.triangle_face, total.sum(axis=1), surface.face_count)

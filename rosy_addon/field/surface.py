@@ -199,7 +199,7 @@ def face_area_vectors(
     loses no digits.
     """
     area = np.empty((len(face_start) - 1, 3))
-    for faces, corners, starts in _blocks(face_start):
+    for faces, corners, starts in face_blocks(face_start):
         points = _from_first(vertices, corner_vertex[corners], starts)
         twice = sum_over_faces(np.cross(points, points[next_corners(starts)]), starts)
         np.multiply(twice, 0.5, out=area[faces])
@@ -214,7 +214,7 @@ def _from_first(
     return points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
 
 
-def _blocks(face_start: np.ndarray) -> Iterator[tuple[slice, slice, np.ndarray]]:
+def face_blocks(face_start: np.ndarray) -> Iterator[tuple[slice, slice, np.ndarray]]:
     """Some faces at once, which bounds memory: they, their corners, and starts among these."""
     count = len(face_start) - 1
     for first in range(0, count, BLOCK):
@@ -372,7 +372,7 @@ def _fan_normals(
 ) -> np.ndarray:
     """(C, 3) face normals averaged over each fan, weighted by the angle at the corner."""
     angle = np.empty(len(corner_vertex))
-    for _, corners, starts in _blocks(face_start):
+    for _, corners, starts in face_blocks(face_start):
         points = _from_first(vertices, corner_vertex[corners], starts)
         following = next_corners(starts)
         ahead = unit(points[following] - points)

@@ -122,8 +122,8 @@ def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[Rosy
             return field
         size = np.ptp(surface.vertices, axis=0).max()
         weight = (field.magnitude / (recipe.reach * size)) ** 2
-        guided = finding_guided(surface, degree, unit(field.vectors), weight)
-        return (yield from part(guided, end, 1.0))
+        following = _following(surface, degree, unit(field.vectors), weight, None)
+        return (yield from part(following, end, 1.0))
     if recipe.kind == "features":
         return (yield from _following_features(surface, recipe, degree))
     if recipe.kind == "guided":
@@ -148,7 +148,24 @@ def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[R
             f"{surface.name}: the edges of each face contradict each other in a field of degree "
             f"{degree}"
         )
-    return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
+    return (yield from _following(surface, degree, guides, 0.0, guides.any(axis=1)))
+
+
+def _following(
+    surface: Surface,
+    degree: int,
+    guides: np.ndarray,
+    weight: np.ndarray | float,
+    hard: np.ndarray | None,
+) -> Work[RosyField]:
+    """A guided field; pieces of the mesh without a guide have their smoothest one."""
+    guided = finding_guided(surface, degree, guides, weight, hard)
+    field = yield from part(guided, 0.0, 0.6)
+    left = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
+    if not left.any():
+        return field
+    smoothest = yield from part(finding_smoothest(surface, degree), 0.6, 1.0)
+    return RosyField(degree, np.where(left[:, None], smoothest.vectors, field.vectors))
 
 
 def _following_guides(surface: Surface, recipe: Recipe, degree: int) -> Work[RosyField]:
@@ -173,8 +190,9 @@ def _following_guides(surface: Surface, recipe: Recipe, degree: int) -> Work[Ros
     guides = mean_guides(surface, every, np.concatenate(found), degree)
     if recipe.reach:
         size = float(np.ptp(surface.vertices, axis=0).max())
-        return (yield from finding_guided(surface, degree, guides, (recipe.reach * size) ** -2))
-    return (yield from finding_guided(surface, degree, guides, 0.0, guides.any(axis=1)))
+        weight = (recipe.reach * size) ** -2
+        return (yield from _following(surface, degree, guides, weight, None))
+    return (yield from _following(surface, degree, guides, 0.0, guides.any(axis=1)))
 
 
 def axis_field(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import from_quads, icosphere, plane, torus
+from shapes import from_quads, from_triangles, icosphere, plane, torus
 
+from rosy_addon.field.analysis import field_energy
 from rosy_addon.field.frames import dot, unit
 from rosy_addon.field.generate import Recipe, generate
 from rosy_addon.field.guides import along_handles, along_strokes, along_uv
 from rosy_addon.field.meshfile import read_mesh
 from rosy_addon.field.nearest import nearest_triangles
 from rosy_addon.field.representation import face_frames, face_representation, to_representation
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface, cut_edges, cut_note
 
 BALL = icosphere(4)
@@ -76,6 +78,17 @@ def test_a_trembling_hand_is_smoothed():
     both = straight.any(axis=1) & shaken.any(axis=1)
     off = np.degrees(np.arccos(np.abs(dot(straight, shaken)[both]).clip(0, 1)))
     assert both.sum() > 5 and np.median(off) < 8
+
+
+def test_pieces_without_a_guide_are_smooth():
+    points = np.concatenate([BALL.vertices, BALL.vertices + 5])
+    triangles = np.concatenate([BALL.triangle_vertex, BALL.triangle_vertex + len(BALL.vertices)])
+    both = from_triangles(points, triangles)
+    field = generate(both, Recipe("guided", strokes=great_circles(2)), 4)
+    np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
+    alone = generate(BALL, "smoothest", 4)
+    other = RosyField(4, field.vectors[BALL.face_count :])
+    assert np.isclose(field_energy(BALL, other), field_energy(BALL, alone), rtol=0.1)  # several are
 
 
 def test_strokes_elsewhere_are_refused(error_of):

@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import Recipe, generate
+from rosy_addon.field.directions import directions_field, tensor_field
+from rosy_addon.field.frames import dot, unit
+from rosy_addon.field.generate import Recipe, axis_field, generate
+from rosy_addon.field.singularities import singularities
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.project import project
 
 from .page import ROOT
-from .shapes import sphere, suzanne
-from .sheet import Panel, display, save, sheet
+from .shapes import sphere, suzanne, torus
+from .sheet import Panel, display, dotted, save, sheet
 from .solid import compose_view, view
 
 IMAGES = ROOT / "docs" / "images"
 
 LOOK = Look(length=50, gain=2.8, supersampling=2)
 SIDE, WIDE = 256, 394
+
+#: Strokes on Suzanne, as places in her picture: start, middle and end of each.
+STROKES = (
+    ((0.33, 0.22), (0.50, 0.14), (0.66, 0.22)),
+    ((0.30, 0.44), (0.42, 0.33), (0.52, 0.42)),
+    ((0.58, 0.66), (0.67, 0.74), (0.76, 0.66)),
+    ((0.74, 0.34), (0.82, 0.42), (0.78, 0.54)),
+)
+INK = (214, 84, 20)
+
+#: Of singularities, by the sign of their index.
+DOTS = {1: (235, 90, 20), -1: (40, 100, 235)}
 
 
 def write() -> None:
@@ -41,6 +59,109 @@ def write() -> None:
         )
     ]
     save(sheet([along]), IMAGES / "fields-features.png")
+    save(sheet([_strokes(monkey)]), IMAGES / "fields-guided.png")
+    save(sheet([_free()]), IMAGES / "fields-directions.png")
+    save(sheet([_tensor()]), IMAGES / "fields-tensor.png")
+    save(sheet([_singular(monkey)]), IMAGES / "fields-singularities.png")
+
+
+def _strokes(monkey: Surface) -> list[Panel]:
+    """The smoothest field of Suzanne, and that which follows strokes drawn on her."""
+    camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
+    buffer = project([Body(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
+    place = np.full((camera.height * camera.width, 3), np.nan)
+    place[buffer.pixel] = (
+        buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
+    )
+    place = place.reshape(camera.height, camera.width, 3)
+    drawn = [_curve(*ends) for ends in STROKES]
+    strokes = []
+    for stroke in drawn:
+        column, row = (stroke * (camera.width, camera.height)).astype(int).T
+        points = place[camera.height - 1 - row, column]
+        strokes.append(points[np.isfinite(points).all(axis=1)])
+    panels = [_panel(monkey, "smoothest", 2, (-26, 8), "Smoothest, N = 2", WIDE)]
+    guided = _panel(
+        monkey, Recipe("guided", strokes=strokes), 2, (-26, 8), "Guided by four strokes", WIDE
+    )
+    picture = Image.fromarray(guided.picture)
+    pen = ImageDraw.Draw(picture)
+    for stroke in drawn:
+        line = [tuple(point) for point in (stroke * WIDE).tolist()]
+        pen.line(line, fill=(255, 255, 255), width=8, joint="curve")
+        pen.line(line, fill=INK, width=4, joint="curve")
+    return [*panels, Panel(np.asarray(picture), guided.label)]
+
+
+def _curve(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
+    """(n, 2) points of a parabola through three places, as shares of the picture from the top left."""
+    t = np.linspace(0, 1, 60)[:, None]
+    a, b, c = (np.array(point) for point in (start, middle, stop))
+    return (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
+
+
+def _free() -> list[Panel]:
+    """Two pairs of directions on a sphere, whose angle goes from 90 degrees to 25."""
+    ball = sphere()
+    up = 1 - np.abs(ball.face_centre[:, 2])
+    half = np.radians(12.5 + (45 - 12.5) * np.clip(up, 0, 1))
+    along = unit(axis_field(ball, 1).vectors)
+    across = np.cross(ball.face_normal, along)
+    pair = [
+        np.cos(half)[:, None] * along + sign * np.sin(half)[:, None] * across for sign in (1, -1)
+    ]
+    directions = np.stack([pair[0], pair[1], -pair[0], -pair[1]], axis=1)
+    field = directions_field(ball, directions)
+    panels = []
+    for text, look in (
+        ("Pairs at 25 to 90 degrees", LOOK),
+        ("Each with its hue", LOOK.with_settings({"hue": "families"})),
+    ):
+        camera = view(ball, (20, 24), (WIDE, WIDE), look.supersampling)
+        panels.append(Panel(display(compose_view(ball, field, look, camera).rgba), text))
+    return panels
+
+
+def _tensor() -> list[Panel]:
+    """The directions in which a ring is pulled and pressed by a force at its side."""
+    ring = torus()
+    offset = ring.face_centre - (1.2, -1.4, 0.6)
+    distance = np.sqrt(dot(offset, offset))[:, None, None]
+    away = unit(offset)
+    tensors = away[:, :, None] * away[:, None, :] / distance - 0.35 * np.eye(3) * distance
+    field = tensor_field(ring, tensors)
+    panels = []
+    for text, look in (
+        ("Major and minor, one hue", LOOK),
+        ("Orange: major, blue: minor", LOOK.with_settings({"hue": "families"})),
+    ):
+        camera = view(ring, (24, 44), (WIDE, 300), look.supersampling)
+        panels.append(Panel(display(compose_view(ring, field, look, camera).rgba), text))
+    return panels
+
+
+def _singular(monkey: Surface) -> list[Panel]:
+    """Where the smoothest fields are singular."""
+    panels = []
+    for degree in (2, 4):
+        field = generate(monkey, "smoothest", degree)
+        vertex, index = singularities(monkey, field)
+        camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
+        picture = display(compose_view(monkey, field, LOOK, camera).rgba)
+        buffer = project([Body(monkey, np.eye(4), field)], camera)
+        depth = np.full(camera.height * camera.width, -np.inf)
+        depth[buffer.pixel] = buffer.position[:, 2]
+        clip = np.c_[monkey.vertices[vertex], np.ones(len(vertex))]
+        clip = clip @ (camera.projection @ camera.view).T
+        x, y = ((clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)).T
+        z = (monkey.vertices[vertex] @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
+        pixel = y.astype(int) * camera.width + x.astype(int)
+        seen = z > depth[pixel] - 0.03
+        for across, up, sign in zip(x[seen], y[seen], np.sign(index[seen]), strict=True):
+            finer = LOOK.supersampling
+            picture = dotted(picture, across / finer, WIDE - up / finer, DOTS[int(sign)])
+        panels.append(Panel(picture, f"Singularities, N = {degree}"))
+    return panels
 
 
 def _box() -> Surface:

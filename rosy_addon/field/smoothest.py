@@ -18,9 +18,11 @@ from .rosy_field import RosyField, check_degree
 from .sparse import Level, cycle, hierarchy
 from .surface import Surface
 
-#: Change of the eigenvector, as a sine, at which it counts as found.
-FOUND = 1e-4
-MOST_ROUNDS = 200
+#: Change of the eigenvector, as a sine, at which it counts as found: its energy is, to eight digits.
+#: Of fewer nodes than `FEW` more is asked, so that the field is the same however they are numbered;
+#: of more it would take seconds to tell almost equal eigenvectors apart, and nobody would see it.
+FOUND, FINELY_FOUND, FEW = 1e-4, 1e-8, 30_000
+MOST_ROUNDS = 60
 
 #: Triangles that are worked on at once: bounds memory, and fits the caches.
 BLOCK = 1 << 14
@@ -114,6 +116,7 @@ def _descend(
 ) -> Work[tuple[np.ndarray, np.ndarray]]:
     """Locally optimal descent of the Rayleigh quotient of each piece (Knyazev 2001)."""
     matrix, count = levels[0].matrix, int(piece.max()) + 1
+    goal = FOUND if len(matrix) > FEW else FINELY_FOUND
 
     def products(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
         """(pieces, k, k) a_i* b_j of each piece, a Hermitian matrix."""
@@ -165,7 +168,7 @@ def _descend(
         z, image = mixed([z, z_change], own), mixed([image, i_change], own)
         z, image = scaled(z, image)
         ahead = [scaled(z_change, i_change)]
-        if change < FOUND:
+        if change < goal:
             break
     return z, energy
 

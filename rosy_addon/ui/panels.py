@@ -93,7 +93,8 @@ def _draw_field_there(
     box = layout.box().column(align=True)
     box.label(text=thing.name, icon="OUTLINER_OB_MESH")
     box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
-    box.label(text=f"Attribute '{mesh.rosy.attribute}'")
+    own = mesh.rosy.attribute in mesh.attributes
+    box.label(text=f"Attribute '{mesh.rosy.attribute}'" if own else "Attributes dir0, dir1 ...")
     box.prop(thing.rosy, "include")
     row = layout.row(align=True)
     row.operator("rosy.field_import", text="Import", icon="IMPORT")

@@ -7,6 +7,7 @@ import bpy
 from ..rosy_addon.ui import overlay
 from . import (
     bake,
+    bake_animation,
     field_convert,
     field_export,
     field_generate,
@@ -25,6 +26,7 @@ MODULES = (
     field_export,
     singularities,
     bake,
+    bake_animation,
     show,
     remove,
     preset_apply,

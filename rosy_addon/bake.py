@@ -78,8 +78,8 @@ def baking(
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
     depsgraph = _depsgraph(scene) if depsgraph is None else depsgraph
-    views = [_camera(scene, depsgraph, source, size) for source in sources]
-    fine = [_scaled(view, look.supersampling) for view in views]
+    views = [camera_view(scene, depsgraph, source, size) for source in sources]
+    fine = [scaled_camera(view, look.supersampling) for view in views]
     reading = read_scene(depsgraph, objects, _undefined(scene), KEPT)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
@@ -88,7 +88,7 @@ def baking(
         start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
         middle = start + 0.4 * (stop - start)
         gbuffer = yield from part(
-            _projecting(reading.bodies, fine[number], look.display), start, middle
+            project_kept(reading.bodies, fine[number], look.display), start, middle
         )
         picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
         shots.append(Shot(picture, views[number], _camera_object(scene, source)))
@@ -121,7 +121,7 @@ def bake(
     )
 
 
-def _projecting(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
+def project_kept(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
     """`projecting`, or what an earlier bake has found if nothing has moved since."""
     view = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     key = "gbuffer", tuple(map(id, bodies)), view, camera.name, display
@@ -140,12 +140,13 @@ def _camera_object(scene: bpy.types.Scene, source: Source) -> bpy.types.Object |
     return thing if thing is not None and thing.type == "CAMERA" else None
 
 
-def _camera(
+def camera_view(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     source: Source,
     size: tuple[int, int] | None,
 ) -> Camera:
+    """What a camera of the scene sees, in the size that is asked for or that the scene says."""
     if isinstance(source, Camera):
         return source
     if size is None:
@@ -153,7 +154,7 @@ def _camera(
     return camera_of_object(scene, depsgraph, source, *check_size(*size))
 
 
-def _scaled(camera: Camera, factor: int) -> Camera:
+def scaled_camera(camera: Camera, factor: int) -> Camera:
     """The same camera with more pixels."""
     return Camera(
         camera.view,

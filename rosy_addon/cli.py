@@ -33,6 +33,8 @@ from .field.rosy_field import RosyField, check_degree
 from .field.singularities import euler_characteristic, singularities
 from .field.surface import Surface, cut_note
 from .files import check_writable
+from .jobs import frame_range, own_command, run_here, run_on_cluster
+from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
 from .projection.project import project
@@ -148,9 +150,14 @@ def _compared(
 
 
 def bake(options: argparse.Namespace) -> None:
-    """Draw the fields of a Blender file as its cameras see them."""
+    """Draw the fields of a Blender file as its cameras see them, at one frame or at many."""
+    _check_frames(options)
     if options.out is None and not options.save:
         raise RosyError("bake would keep nothing: give --out DIR for the pictures, --save, or both")
+    if _is_spread(options):
+        _spread(options)
+        if not options.save:
+            return
     try:
         import bpy
     except ImportError:
@@ -172,6 +179,9 @@ def bake(options: argparse.Namespace) -> None:
     settings = settings_of(scene)
     if options.out is not None:
         settings = replace(settings, folder=options.out.resolve())
+    if options.frames is not None:
+        _bake_frames(options, scene, settings)
+        return
     baked = bake_scene(
         scene,
         objects=rosy_objects(bpy.context.view_layer, options.object),
@@ -187,6 +197,113 @@ def bake(options: argparse.Namespace) -> None:
         print(f"{picture.camera}: {place}")
     if options.save:
         print(save_file())
+
+
+def _check_frames(options: argparse.Namespace) -> None:
+    """Refuse what makes no sense together, before anything is opened."""
+    if options.frames is None and _is_spread(options):
+        raise RosyError("--jobs and --scheduler spread frames: give --frames A-B")
+    if options.frames is not None and options.out is None:
+        raise RosyError("--frames writes files: give --out DIR")
+    if options.jobs < 1:
+        raise RosyError(f"--jobs {options.jobs}: 1 or more is wanted")
+
+
+def _is_spread(options: argparse.Namespace) -> bool:
+    return options.jobs > 1 or options.scheduler is not None
+
+
+def _spread(options: argparse.Namespace) -> None:
+    """Have other processes, here or on a cluster, do the frames."""
+    blender = sys.modules["bpy"].app.binary_path if "bpy" in sys.modules else ""
+    scene = options.scene
+    if scene is None:
+        data = sys.modules["bpy"].data if "bpy" in sys.modules else None
+        if data is None or not data.filepath or data.is_dirty:
+            raise RosyError("--jobs and --scheduler work on a file: save it, or give SCENE.blend")
+        scene = Path(data.filepath)
+    if not scene.is_file():
+        raise RosyError(f"{scene}: cannot be read: no such file")
+    command = own_command(blender, scene.resolve()) + _same_for_others(options)
+    frames = frame_range(options.frames)
+    if options.scheduler is not None:
+        said = run_on_cluster(command, frames, options.scheduler)
+    else:
+        said = run_here(command, frames, options.jobs)
+    for line in said:
+        if line.startswith("frame "):
+            print(line, flush=True)
+
+
+def _bake_frames(options: argparse.Namespace, scene: Any, settings: Any) -> None:
+    """`bake --frames`, in this process."""
+    import bpy
+
+    from .animation import baking_animation
+    from .scene.bodies import rosy_objects
+    from .scene.files import save_file
+
+    frames = frame_range(options.frames)
+    if _is_spread(options):
+        # All are there: what is left is to have the materials play them.
+        frames = range(frames[0], frames[-1] + 1, max(len(frames) - 1, 1) * frames.step)
+    changed = bool(options.preset or options.set)
+    work = baking_animation(
+        scene,
+        frames,
+        objects=rosy_objects(bpy.context.view_layer, options.object),
+        cameras=_cameras(scene, options),
+        look=_look(options, look_of_scene(scene)) if changed else None,
+        size=options.size,
+        settings=settings,
+        show=options.save,
+    )
+    made = _shown(work)
+    for each in made:
+        if each.kept:
+            print(f"{len(each.kept)} frames of {each.camera} were there")
+        print(f"{each.camera}: {each.strip.path}")
+    if options.save:
+        print(save_file())
+
+
+def _shown(work: Work[Any]) -> Any:
+    """Run work to its end, and say what it is at, a line for each frame."""
+    last = ""
+    while True:
+        try:
+            step = next(work)
+        except StopIteration as done:
+            return done.value
+        if step.label != last and step.label.startswith("frame "):
+            last = step.label
+            print(f"{step.label} ({100 * step.fraction:.0f} %)", flush=True)
+
+
+def look_of_scene(scene: Any) -> Look:
+    """The look that a Blender scene says."""
+    from .scene.looks import look_of
+
+    return look_of(scene.rosy)
+
+
+def _same_for_others(options: argparse.Namespace) -> list[str]:
+    """The options of this command that other processes get as well."""
+    words = ["--out", str(options.out.resolve())]
+    if options.object:
+        words += ["--object", *options.object]
+    if options.camera is not None:
+        words += ["--camera", options.camera]
+    if options.all_cameras:
+        words += ["--all-cameras"]
+    if options.size is not None:
+        words += ["--size", f"{options.size[0]}x{options.size[1]}"]
+    if options.preset is not None:
+        preset = Path(options.preset)
+        words += ["--preset", str(preset.resolve()) if preset.suffix else options.preset]
+    for text in options.set:
+        words += ["--set", text]
+    return words
 
 
 def _cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
@@ -362,6 +479,19 @@ def _add_bake(verbs: Any) -> None:
         "--out", type=Path, metavar="DIR", help="write the pictures there as .png files"
     )
     verb.add_argument("--save", action="store_true", help="save the Blender file")
+    verb.add_argument(
+        "--frames",
+        metavar="A-B[:STEP]",
+        help="a picture of each frame, as the camera that renders it sees it; those that are there "
+        "and up to date stay",
+    )
+    spread = verb.add_mutually_exclusive_group()
+    spread.add_argument(
+        "--jobs", type=int, default=1, metavar="J", help="so many processes for the frames"
+    )
+    spread.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster whose workers do the frames"
+    )
 
 
 def _add_render(verbs: Any) -> None:
@@ -530,7 +660,11 @@ def _with_signed_values(arguments: Sequence[str]) -> list[str]:
     """`--view -30,20` as `--view=-30,20`: argparse takes the first for an option without a value."""
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in ("--view", "--axis") and re.match(r"-[\d.]", argument):
+        if (
+            joined
+            and joined[-1] in ("--view", "--axis", "--frames")
+            and re.match(r"-[\d.]", argument)
+        ):
             joined[-1] += f"={argument}"
         else:
             joined.append(argument)

@@ -112,6 +112,7 @@ def build_surface(
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
     corner_normal: np.ndarray | None = None,
+    corner_fan: np.ndarray | None = None,
     triangles: np.ndarray | None = None,
     triangle_face: np.ndarray | None = None,
     rest: np.ndarray | None = None,
@@ -132,6 +133,8 @@ def build_surface(
         Faces that mix with none of their neighbours.
     corner_normal : (C, 3) array_like, optional
         Angle-weighted means over each smooth fan if not given.
+    corner_fan : (C,) array_like of int, optional
+        Of `smooth_fans`, if that is known.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
         Each face triangulated if not given.
     rest : (V, 3) array_like, optional
@@ -148,10 +151,10 @@ def build_surface(
     _check_polygons(name, vertices, corner_vertex, face_start)
     if triangles is None:
         triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
-    smooth_pairs = _smooth_corner_pairs(
-        vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-    )
-    corner_fan = connected(len(corner_vertex), smooth_pairs)
+    if corner_fan is None:
+        corner_fan = smooth_fans(
+            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+        )
     if corner_normal is None:
         corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(
@@ -165,6 +168,24 @@ def build_surface(
         corner_fan=corner_fan,
         rest=None if rest is None else np.ascontiguousarray(rest, dtype=np.float64),
     )
+
+
+def smooth_fans(
+    vertices: np.ndarray,
+    corner_vertex: np.ndarray,
+    face_start: np.ndarray,
+    sharp_edges: np.ndarray | None = None,
+    sharp_angle: float | None = None,
+    flat_faces: np.ndarray | None = None,
+) -> np.ndarray:
+    """(C,) int32 `Surface.corner_fan`; see `build_surface`.
+
+    Without a sharp angle the positions of the vertices make no difference.
+    """
+    pairs = _smooth_corner_pairs(
+        vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+    )
+    return connected(len(corner_vertex), pairs)
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:
@@ -295,6 +316,13 @@ def cut_note(surface: Surface) -> str:
     return (
         f"{surface.name}: along {cut} edges faces disagree on which side is out, and the field is "
         "cut there: recalculate the normals, unless it is a Möbius strip, which has but one side"
+    )
+
+
+def corners_are_sound(vertices: np.ndarray, corner_vertex: np.ndarray) -> bool:
+    """Whether all corners are at vertices that exist; `build_surface` says what is wrong."""
+    return bool(corner_vertex.min(initial=0) >= 0) and bool(
+        corner_vertex.max(initial=-1) < len(vertices)
     )
 
 

@@ -28,9 +28,9 @@ from ..projection.camera import Camera
 from .attributes import attribute_name, field_degree
 from .bodies import MADE, Reading, is_rosy_modifier
 from .capabilities import is_editable
-from .images import check_folder, new_image
+from .images import check_folder, load_strip, new_image
 from .looks import look_of
-from .nodes import material_of_group, new_group, new_material
+from .nodes import material_of_group, new_group, new_material, play
 
 MODIFIER = "RoSy"
 
@@ -101,6 +101,8 @@ class Bake:
         Why the picture is out of date, empty if it is not.
     shown : bool
         Whether any object shows it; others are kept, to be shown instead.
+    frames : str
+        Of a sequence, from which to which; empty for one picture.
     """
 
     camera: str
@@ -109,6 +111,7 @@ class Bake:
     image: bpy.types.Image
     stale: str
     shown: bool
+    frames: str = ""
 
 
 @dataclass(frozen=True)
@@ -247,6 +250,74 @@ def apply_picture(
     return Baked(name, image, material, tuple(owners), shot.picture, tuple(_notes(scene)))
 
 
+@dataclass(frozen=True)
+class Strip:
+    """A sequence of pictures on disk.
+
+    Attributes
+    ----------
+    name : str
+        Of the camera, or of the scene if that changes.
+    path : Path
+        Of the first frame.
+    first, last : int
+        Frames.
+    width, height : int
+        Pixels.
+    """
+
+    name: str
+    path: Path
+    first: int
+    last: int
+    width: int
+    height: int
+
+
+def apply_strip(
+    scene: bpy.types.Scene, reading: Reading, strip: Strip, camera: Camera, settings: Settings
+) -> None:
+    """Have the objects of a scene play a sequence of pictures, in place of an older one.
+
+    The pictures fill the frame of the camera that renders, each at its own frame: any machine that
+    has the files shows them, with or without RoSy.
+    """
+    made: list[bpy.types.ID] = []
+    try:
+        image = load_strip(strip.path, settings.as_float)
+        made.append(image)
+        image.name = f"RoSy {strip.name}"
+        material = new_material(
+            image.name,
+            image,
+            camera.projection @ camera.view,
+            window=True,
+            emission=settings.emission,
+            diffuse=settings.diffuse,
+        )
+        made.append(material)
+        play(material, strip.first, strip.last)
+        owners = list(dict.fromkeys(reading.owners))
+        groups = [new_group(f"RoSy {thing.name}", material, None) for thing in owners]
+        made += groups
+        for datablock in made:
+            datablock[MADE] = True
+    except BaseException:
+        for datablock in reversed(made):
+            _delete(datablock)
+        raise
+    for thing, group in zip(owners, groups, strict=True):
+        _show(thing, group)
+    record = _record_of(scene, strip.name, image, material)
+    record.width, record.height = strip.width, strip.height
+    record.frames = f"{strip.first} to {strip.last}"
+    record.look, record.camera_state = _look_state(look_of(scene.rosy)), ""
+    record.objects.clear()
+    for thing in owners:
+        entry = record.objects.add()
+        entry.name = thing.name
+
+
 def use_bake(scene: bpy.types.Scene, camera: str) -> None:
     """Have the objects show the picture that was baked from a camera.
 
@@ -320,7 +391,8 @@ def bakes(scene: bpy.types.Scene) -> list[Bake]:
         if record.image is None:
             continue
         stale, shown = _why_stale(scene, record), _is_shown(record)
-        found.append(Bake(record.name, record.width, record.height, record.image, stale, shown))
+        size = record.width, record.height
+        found.append(Bake(record.name, *size, record.image, stale, shown, record.frames))
     return sorted(found, key=lambda bake: bake.camera)
 
 
@@ -385,18 +457,8 @@ def _remember(
     matrices: dict[bpy.types.Object, np.ndarray | None],
 ) -> None:
     """Record a picture, and replace the older one from the same camera."""
-    name = shot.camera.name
-    record = scene.rosy.bakes.get(name)
-    if record is None:
-        record = scene.rosy.bakes.add()
-        record.name = name
-    old = (record.material, record.image)
-    record.image, record.material = image, material
-    for before, after in zip(old, (material, image), strict=True):
-        if before is not None:
-            before.user_remap(after)
-            _delete(before)
-            after.name = f"RoSy {name}"
+    record = _record_of(scene, shot.camera.name, image, material)
+    record.frames = ""
     record.height, record.width = shot.picture.rgba.shape[:2]
     record.look = _look_state(look_of(scene.rosy))
     record.camera_state = (
@@ -410,6 +472,24 @@ def _remember(
         entry.state = _object_state(thing, fresh=True)
 
 
+def _record_of(
+    scene: bpy.types.Scene, name: str, image: bpy.types.Image, material: bpy.types.Material
+) -> bpy.types.PropertyGroup:
+    """The record of a picture's name, with a new image and material in place of older ones."""
+    record = scene.rosy.bakes.get(name)
+    if record is None:
+        record = scene.rosy.bakes.add()
+        record.name = name
+    old = (record.material, record.image)
+    record.image, record.material = image, material
+    for before, after in zip(old, (material, image), strict=True):
+        if before is not None:
+            before.user_remap(after)
+            _delete(before)
+            after.name = f"RoSy {name}"
+    return record
+
+
 def _notes(scene: bpy.types.Scene) -> list[str]:
     transform = scene.view_settings.view_transform
     if transform in FAITHFUL:
@@ -421,6 +501,8 @@ def _notes(scene: bpy.types.Scene) -> list[str]:
 
 
 def _why_stale(scene: bpy.types.Scene, record: bpy.types.PropertyGroup) -> str:
+    if record.frames:
+        return ""  # the notes beside the frames know
     if record.look != _look_state(look_of(scene.rosy)):
         return "the look was changed"
     if record.camera_state:

@@ -42,6 +42,24 @@ def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
     return scene.camera
 
 
+def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
+    """The camera that renders a frame: that of the last marker bound to one, or the scene's.
+
+    Raises
+    ------
+    RosyError
+        If there is none.
+    """
+    bound = [marker for marker in scene.timeline_markers if marker.camera is not None]
+    if not bound:
+        return render_camera(scene)
+    # As Blender chooses: the last one up to here, or else the first.
+    passed = [marker for marker in bound if marker.frame <= frame]
+    if passed:
+        return max(passed, key=lambda marker: marker.frame).camera
+    return min(bound, key=lambda marker: marker.frame).camera
+
+
 def picture_size(scene: bpy.types.Scene, percentage: float | None = None) -> tuple[int, int]:
     """(width, height) in pixels: that of renders, in percent if given."""
     render = scene.render

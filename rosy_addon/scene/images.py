@@ -111,6 +111,56 @@ def check_folder(folder: Path) -> None:
     check_writable(folder / "picture.png")
 
 
+def frame_path(folder: Path, name: str, frame: int, as_float: bool) -> Path:
+    """The file of one frame of a sequence, numbered as Blender finds it."""
+    stem = bpy.path.clean_name(f"RoSy {name}")
+    return folder / f"{stem}_{frame:04d}{'.exr' if as_float else '.png'}"
+
+
+def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
+    """Write one frame: 8 bit .png, or half floats as .exr; all of it or nothing.
+
+    Raises
+    ------
+    RosyError
+        If it cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_writable(path)
+    rgba = with_margin(picture.rgba)
+    if not as_float:
+        write_png(path, rgba)
+        return
+    height, width = rgba.shape[:2]
+    image = bpy.data.images.new(path.stem, width, height, alpha=True, float_buffer=True)
+    # Blender writes by the settings of a scene; one of its own, since the user's stays as it is.
+    scene = bpy.data.scenes.new(path.stem)
+    aside = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        written = scene.render.image_settings
+        written.file_format, written.color_mode, written.color_depth = "OPEN_EXR", "RGBA", "16"
+        image.save_render(str(aside), scene=scene)
+        os.replace(aside, path)
+    except (RuntimeError, OSError) as reason:
+        aside.unlink(missing_ok=True)
+        raise RosyError(f"{path}: cannot be written: {reason}") from reason
+    finally:
+        bpy.data.images.remove(image)
+        bpy.data.scenes.remove(scene)
+
+
+def load_strip(path: Path, as_float: bool) -> bpy.types.Image:
+    """A sequence of pictures as one image, by the file of its first frame."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    image.source = "SEQUENCE"
+    image.alpha_mode = "CHANNEL_PACKED"
+    image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
+    image.filepath = _relative(path)
+    return image
+
+
 def _save(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
     """Have a file hold what an image holds; it takes the place of one from an earlier bake."""
     path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))

@@ -76,6 +76,16 @@ def new_material(
     return material
 
 
+def play(material: bpy.types.Material, first: int, last: int) -> None:
+    """Have a material show the frames of its image, each at its own number."""
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeTexImage":
+            user = node.image_user
+            user.frame_start, user.frame_offset = first, first - 1
+            user.frame_duration = last - first + 1
+            user.use_auto_refresh = True
+
+
 def _clip_position(build: _Builder, view_projection: np.ndarray) -> bpy.types.Node:
     """A node with outputs X, Y and Z: clip-space x, y and w."""
     links = build.tree.links

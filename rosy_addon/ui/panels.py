@@ -163,6 +163,8 @@ def _draw_picture(
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
+    row = layout.row()
+    row.operator("rosy.bake_animation", icon="RENDER_ANIMATION")
     if not drawn:
         layout.label(text="Needs a field to draw", icon="INFO")
     if made:
@@ -177,6 +179,8 @@ def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:
     box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
     row = box.row()
     row.label(text=f"{bake.width} x {bake.height} pixels")
+    if bake.frames:
+        box.label(text=f"Frames {bake.frames}", icon="RENDER_ANIMATION")
     if several and bake.shown:
         row.label(text="Shown", icon="HIDE_OFF")
     elif several:
@@ -184,7 +188,7 @@ def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:
     if bake.stale:
         box.label(text="Out of date:", icon="ERROR")
         box.label(text=bake.stale)
-    else:
+    elif not bake.frames:
         box.label(text="Up to date", icon="CHECKMARK")
 
 

@@ -80,6 +80,7 @@ class RosyBake(bpy.types.PropertyGroup):
     material: bpy.props.PointerProperty(type=bpy.types.Material)
     width: bpy.props.IntProperty()
     height: bpy.props.IntProperty()
+    frames: bpy.props.StringProperty(description="Of a sequence; empty for one picture")
     look: bpy.props.StringProperty(description="The scene's look at the time, as JSON")
     camera_state: bpy.props.StringProperty(description="Digest of the camera; empty for a view")
     objects: bpy.props.CollectionProperty(type=RosyBakedObject)

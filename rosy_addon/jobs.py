@@ -1,0 +1,177 @@
+"""Frames spread over processes of this machine, or over the workers of a Dask cluster.
+
+Both run the very command that a user would run for some frames, which may be run again, or twice at
+once, without harm. Nothing here knows how a frame is made.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from .errors import RosyError
+
+#: How often a worker may be lost with a frame before the frame counts as failed.
+RETRIES = 3
+
+
+def frame_range(text: str) -> range:
+    """The frames of ``A``, ``A-B`` or ``A-B:STEP``.
+
+    Raises
+    ------
+    RosyError
+        If it is none of these, or holds no frame.
+    """
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", text.strip())
+    first = int(match[1]) if match else 0
+    last = int(match[2]) if match and match[2] else first
+    step = int(match[3]) if match and match[3] else 1
+    if match is None or last < first or not step:
+        raise RosyError(f"frames '{text}': A, A-B or A-B:STEP is wanted, such as 1-250 or 1-250:10")
+    return range(first, last + 1, step)
+
+
+def own_command(blender: str, scene: Path) -> list[str]:
+    """How this program is started on a Blender file: in Blender if it has one, else in Python.
+
+    Parameters
+    ----------
+    blender : str
+        Path of Blender's program; empty in Python.
+    scene : Path
+    """
+    if blender:
+        return [blender, "-b", str(scene), "--command", "rosy", "bake"]
+    return [sys.executable, "-m", "rosy_addon", "bake", str(scene)]
+
+
+def environment() -> dict[str, str]:
+    """That of the processes: they find this package, and keep to one thread each."""
+    inside = str(Path(__file__).resolve().parents[1])
+    paths = [inside, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
+
+
+def run_here(command: Sequence[str], frames: range, count: int) -> Iterator[str]:
+    """Run a command for every frame, on so many processes at once.
+
+    Each has every count-th frame, so that slow stretches are shared.
+
+    Yields
+    ------
+    str
+        What the processes say, line by line.
+
+    Raises
+    ------
+    RosyError
+        If one of them fails, after all have ended, with what it said.
+    """
+    count = max(min(count, len(frames)), 1)
+    running = []
+    for number in range(count):
+        own = frames[number::count]
+        running.append((own, _start([*command, "--frames", frames_text(own)])))
+    failed = []
+    try:
+        for own, process in running:
+            said, complaint = process.communicate()
+            yield from said.splitlines()
+            if process.returncode:
+                failed.append(f"frames {frames_text(own)}: {_last_line(complaint)}")
+    finally:
+        for _, process in running:
+            if process.poll() is None:
+                process.terminate()
+    if failed:
+        raise RosyError("; ".join(failed))
+
+
+def run_on_cluster(command: Sequence[str], frames: range, address: str) -> Iterator[str]:
+    """Run a command for every frame on the workers of a Dask cluster.
+
+    Workers need the same program and files under the same paths. A frame whose worker is lost goes to
+    another one.
+
+    Parameters
+    ----------
+    command : sequence of str
+    frames : range
+    address : str
+        Of the scheduler.
+
+    Yields
+    ------
+    str
+        What each frame's process says.
+
+    Raises
+    ------
+    RosyError
+        If Dask is not installed, there is no scheduler, or frames failed, after all others have
+        ended: each with its number and reason.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise RosyError("--scheduler needs Dask: pip install distributed") from None
+    try:
+        client = Client(address, timeout="20s")
+    except (OSError, ValueError) as reason:
+        raise RosyError(f"--scheduler {address}: no answer: {reason}") from None
+    failed = []
+    with client:
+        work = {
+            client.submit(
+                subprocess.run,
+                [*command, "--frames", str(frame)],
+                capture_output=True,
+                text=True,
+                key=f"rosy-{frame}-{time.time_ns()}",
+                retries=RETRIES,
+                pure=False,
+            ): frame
+            for frame in frames
+        }
+        for done in as_completed(list(work)):
+            frame = work[done]
+            if done.status == "error":
+                failed.append((frame, f"{done.exception()!r}"))
+                continue
+            result = done.result()
+            if result.returncode:
+                failed.append((frame, _last_line(result.stderr)))
+            else:
+                yield from result.stdout.splitlines()
+    if failed:
+        raise RosyError("; ".join(f"frame {frame}: {why}" for frame, why in sorted(failed)))
+
+
+def frames_text(frames: range) -> str:
+    """A range as the command line takes it."""
+    if len(frames) == 1:
+        return str(frames[0])
+    return f"{frames[0]}-{frames[-1]}" + (f":{frames.step}" if frames.step > 1 else "")
+
+
+def _start(command: list[str]) -> subprocess.Popen:
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def _last_line(complaint: str) -> str:
+    lines = [line for line in complaint.splitlines() if line.strip()]
+    said = [line for line in lines if line.startswith("rosy: ")]
+    return (said or lines or ["ended without a word"])[-1].removeprefix("rosy: ")

@@ -1,0 +1,282 @@
+"""Frames: what is drawn, what stays, and what is left when work is broken off."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.animation import bake_animation
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.jobs import frame_range, frames_text, own_command, run_here
+from rosy.rosy_addon.scene.apply import Settings, bakes, remove
+from rosy.rosy_addon.scene.cameras import frame_camera
+from scenes import contents, link, pixels, render
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def moving(scene, camera, monkey):
+    """Suzanne, who turns and opens her mouth, before a camera that moves."""
+    scene.render.resolution_x, scene.render.resolution_y = 96, 72
+    for frame, angle in ((1, 0.0), (20, 1.0)):
+        monkey.rotation_euler = (0.0, 0.0, angle)
+        monkey.keyframe_insert("rotation_euler", frame=frame)
+    monkey.shape_key_add(name="Basis")
+    key = monkey.shape_key_add(name="Open")
+    for point in key.data[:200]:
+        point.co.z -= 0.2
+    for frame, value in ((1, 0.0), (20, 1.0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    camera.keyframe_insert("location", frame=1)
+    camera.location.x += 1.0
+    camera.keyframe_insert("location", frame=20)
+    scene.frame_set(3)
+    return scene
+
+
+def frames_of(folder):
+    """Names and bytes of the pictures."""
+    return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}
+
+
+def test_ranges():
+    assert frame_range("7") == range(7, 8)
+    assert frame_range("1-5") == range(1, 6)
+    assert list(frame_range("-2-4:3")) == [-2, 1, 4]
+    for text in ("5-1", "a", "1-5:0", "", "1-"):
+        with pytest.raises(RosyError, match="is wanted"):
+            frame_range(text)
+    for frames in (range(3, 4), range(1, 9), range(-4, 9, 3)):
+        assert frame_range(frames_text(frames)) == range(frames[0], frames[-1] + 1, frames.step)
+
+
+def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
+    (made,) = bake_animation(moving, [5, 9], settings=Settings(folder=tmp_path))
+    assert made.drawn == (5, 9) and made.kept == () and moving.frame_current == 3
+    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0009.png")))
+    moving.frame_set(9)
+    (single,) = bake(moving)
+    np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
+
+
+def test_frames_that_are_up_to_date_stay(moving, tmp_path):
+    settings = Settings(folder=tmp_path)
+    bake_animation(moving, range(1, 5), settings=settings)
+    before = frames_of(tmp_path)
+    assert len(before) == 4
+    (again,) = bake_animation(moving, range(1, 6), settings=settings)
+    assert again.drawn == (5,) and again.kept == (1, 2, 3, 4)
+    # A change draws again what it touches, and a picture that is gone.
+    (tmp_path / "RoSy_Scene_0002.png").unlink()
+    (again,) = bake_animation(moving, range(1, 6), settings=settings)
+    assert again.drawn == (2,)
+    moving.rosy.look.gain = 1.0
+    (again,) = bake_animation(moving, range(1, 6), settings=settings)
+    assert again.drawn == (1, 2, 3, 4, 5)
+    moving.rosy.look.gain = 2.5
+    bake_animation(moving, range(1, 6), settings=settings)
+    assert {**frames_of(tmp_path), **before} == frames_of(tmp_path)
+
+
+def test_only_what_a_change_touches_is_drawn_again(moving, tmp_path):
+    settings = Settings(folder=tmp_path)
+    bake_animation(moving, range(1, 5), settings=settings)
+    monkey = bpy.data.objects["Suzanne"]
+    for curve in _curves(monkey):
+        if curve.data_path == "rotation_euler":
+            point = curve.keyframe_points.insert(4, 0.3)
+            point.interpolation = "LINEAR"
+            curve.keyframe_points.insert(3, curve.evaluate(3))
+            curve.keyframe_points.insert(2, curve.evaluate(2))
+            for each in curve.keyframe_points:
+                each.interpolation = "CONSTANT"
+    (again,) = bake_animation(moving, range(1, 5), settings=settings)
+    assert 1 in again.kept and 4 in again.drawn
+
+
+def _curves(thing):
+    action = thing.animation_data.action
+    if hasattr(action, "fcurves"):
+        return action.fcurves
+    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
+            for curve in bag.fcurves]  # fmt: skip
+
+
+def test_markers_choose_the_camera(moving, tmp_path):
+    other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
+    other.matrix_world = moving.camera.matrix_world.copy()
+    other.location.z += 1.5
+    for name, frame, camera in (("a", 1, moving.camera), ("b", 4, other)):
+        moving.timeline_markers.new(name, frame=frame).camera = camera
+    assert [frame_camera(moving, frame) == other for frame in (0, 1, 3, 4, 9)] == [
+        False, False, False, True, True,
+    ]  # fmt: skip
+    (made,) = bake_animation(moving, range(3, 5), settings=Settings(folder=tmp_path))
+    moving.timeline_markers.clear()
+    moving.camera = other
+    moving.frame_set(4)
+    (single,) = bake(moving)
+    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
+    np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
+    assert made.drawn == (3, 4)
+
+
+def test_all_cameras_have_a_sequence_each(moving, tmp_path):
+    other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
+    other.matrix_world = moving.camera.matrix_world.copy()
+    made = bake_animation(
+        moving, range(1, 3), cameras=[moving.camera, other], settings=Settings(folder=tmp_path)
+    )
+    assert [each.camera for each in made] == [moving.camera.name, "Other"]
+    assert len(frames_of(tmp_path)) == 4
+
+
+def test_materials_play_the_frames(moving, tmp_path):
+    before = contents()
+    bake_animation(moving, range(4, 8), settings=Settings(folder=tmp_path / "frames"))
+    (bake_,) = bakes(moving)
+    assert bake_.frames == "4 to 7" and not bake_.stale
+    moving.view_settings.view_transform = "Standard"
+    moving.rosy.look.shading = 0.0
+    for frame in (4, 6):
+        moving.frame_set(frame)
+        seen = render(moving, tmp_path / f"seen{frame}.exr", samples=1)
+        path = tmp_path / "frames" / f"RoSy_Scene_{frame:04d}.png"
+        image = bpy.data.images.load(str(path))
+        wanted = pixels(image)
+        linear = np.where(wanted <= 0.04045, wanted / 12.92, ((wanted + 0.055) / 1.055) ** 2.4)
+        inside = (seen[..., 3] > 0.99) & (wanted[..., 3] > 0.99)
+        assert inside.mean() > 0.05
+        assert np.abs(seen[..., :3] - linear[..., :3])[inside].mean() < 0.01, frame
+        bpy.data.images.remove(image)
+    moving.frame_set(3)
+    remove(moving)
+    for name in ("images", "materials", "node_groups"):
+        assert contents()[name] == [
+            x for x in contents()[name] if x in before[name] or "Render" in x
+        ]
+
+
+def test_half_floats(moving, tmp_path):
+    before = sorted(scene.name for scene in bpy.data.scenes)
+    settings = Settings(folder=tmp_path, as_float=True)
+    bake_animation(moving, [2], settings=settings)
+    path = tmp_path / "RoSy_Scene_0002.exr"
+    image = bpy.data.images.load(str(path))
+    assert image.is_float
+    channels = path.read_bytes().split(b"chlist\0", 1)[1][4:]
+    name, _, kind = channels.partition(b"\0")
+    assert name == b"A" and kind[:4] == b"\1\0\0\0"  # half
+    bake_animation(moving, [2], settings=Settings(folder=tmp_path))
+    png = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
+    linear = np.where(png <= 0.04045, png / 12.92, ((png + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(pixels(image)[..., :3], linear[..., :3], atol=0.01)
+    assert sorted(scene.name for scene in bpy.data.scenes) == before
+
+
+def test_errors_name_the_frame(moving, tmp_path):
+    with pytest.raises(RosyError, match="saved to a folder"):
+        bake_animation(moving, [1])
+    monkey = bpy.data.objects["Suzanne"]
+    monkey.keyframe_insert("location", frame=1)
+    monkey.location.x = 500
+    monkey.keyframe_insert("location", frame=2)
+    with pytest.raises(RosyError, match=r"frame 2: .* outside the frame"):
+        bake_animation(moving, range(1, 4), settings=Settings(folder=tmp_path))
+    assert len(frames_of(tmp_path)) == 1 and moving.frame_current == 3
+
+
+# --- processes -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def file(moving, tmp_path):
+    path = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def start(file, folder, *more):
+    return subprocess.Popen(
+        [sys.executable, "-m", "rosy_addon", "bake", str(file), "--out", str(folder), *more],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+
+
+def finished(process):
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return out
+
+
+def test_killed_again_and_again_it_ends_the_same(file, tmp_path):
+    finished(start(file, tmp_path / "whole", "--frames", "1-20"))
+    whole = frames_of(tmp_path / "whole")
+    assert len(whole) == 20
+    folder, chance = tmp_path / "broken", random.Random(1)
+    for _ in range(4):
+        process = start(file, folder, "--frames", "1-20")
+        there = len(frames_of(folder)) if folder.exists() else 0
+        late = time.monotonic() + 60
+        while process.poll() is None and time.monotonic() < late:
+            if folder.exists() and len(frames_of(folder)) >= there + chance.randint(1, 4):
+                break
+            time.sleep(0.01)
+        time.sleep(chance.random() * 0.05)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    said = finished(start(file, folder, "--frames", "1-20"))
+    assert frames_of(folder) == whole
+    assert "frames of Scene were there" in said
+
+
+def test_two_at_once_do_no_harm(file, tmp_path):
+    finished(start(file, tmp_path / "one", "--frames", "1-8"))
+    both = [start(file, tmp_path / "two", "--frames", "1-8") for _ in range(2)]
+    for process in both:
+        finished(process)
+    assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
+    assert not [path for path in (tmp_path / "two").iterdir() if path.name.startswith(".")]
+
+
+def test_several_processes(file, tmp_path):
+    finished(start(file, tmp_path / "one", "--frames", "1-7"))
+    finished(start(file, tmp_path / "two", "--frames", "1-7", "--jobs", "3", "--save"))
+    assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    (bake_,) = bakes(bpy.context.scene)
+    assert bake_.frames == "1 to 7"
+
+
+def test_a_frame_that_fails_is_named(file, tmp_path, monkeypatch):
+    command = [*own_command("", file), "--out", str(tmp_path / "out"), "--camera", "Nobody"]
+    monkeypatch.chdir(ROOT)
+    with pytest.raises(RosyError, match=r"frames 1-5:2: there is no camera 'Nobody'"):
+        list(run_here(command, range(1, 7), 2))
+
+
+def test_what_makes_no_sense_is_refused(file, tmp_path):
+    for words, wanted in (
+        (["--jobs", "2"], "give --frames"),
+        (["--frames", "1-3", "--jobs", "0"], "1 or more"),
+        (["--frames", "3-1"], "is wanted"),
+        (["--frames", "1-3", "--scheduler", "tcp://127.0.0.1:1"], "--scheduler"),
+    ):
+        process = start(file, tmp_path / "out", *words)
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 2 and wanted in err, err

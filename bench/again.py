@@ -41,7 +41,7 @@ def measure(runs: int) -> Iterator[Case]:
     from rosy_addon.reuse import KEPT
 
     for triangles in (12_000, 200_000):
-        scene = _scene(bpy, triangles)
+        scene = ball_scene(bpy, triangles)
         view = cases.camera()
 
         def baked(look: Look, scene: object = scene, view: Camera = view) -> None:
@@ -67,7 +67,7 @@ def measure(runs: int) -> Iterator[Case]:
             )
 
 
-def _scene(bpy, triangles: int) -> object:
+def ball_scene(bpy, triangles: int) -> object:
     """The ball with a field of degree 4, alone in Blender."""
     from rosy_addon.scene.attributes import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered

@@ -28,6 +28,7 @@ SCRIPTS = (
     "planar_rlic",
     "surface_vtk",
     "again",
+    "animation",
     "memory",
     "fields",
 )

@@ -11,19 +11,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import bpy
 
-from .bake import Source, camera_view, project_kept, scaled_camera
+from .bake import Source, camera_view, scaled_camera
 from .compositor.compose import composing
 from .compositor.look import Look
 from .errors import RosyError
 from .files import read_bytes, write_bytes
 from .progress import Progress, Work, drain, part
-from .reuse import KEPT, digest
+from .projection.project import projecting
+from .reuse import Kept, digest
 from .scene.apply import Settings, Strip, apply_strip, check_appliable, settings_of
-from .scene.bodies import Reading, read_scene
+from .scene.bodies import Reading, prepared, read_scene, rosy_objects
 from .scene.cameras import frame_camera
 from .scene.images import check_folder, frame_path, write_frame
 from .scene.lights import read_lights
@@ -31,6 +33,10 @@ from .scene.looks import look_of
 
 #: How the note of a frame ends; it begins as the picture's name.
 NOTE = ".rosy.txt"
+
+#: Bytes kept from frame to frame: of the meshes that stay the same. Pictures and G-buffers of past
+#: frames would be of no use, and their memory is the next frame's.
+LIMIT = 1 << 27
 
 #: What a note says first. Changes of how pictures are drawn change it, too.
 FORMAT = "rosy frame 1"
@@ -104,13 +110,18 @@ def baking_animation(
     views: dict[str, tuple] = {}
     began, spent = time.monotonic(), 0
     reading = None
+    held, known = ExitStack(), Kept(LIMIT)
     try:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        drawn_ones = rosy_objects(bpy.context.view_layer) if objects is None else list(objects)
+        undefined = "zero" if scene.rosy.undefined else "error"
+        held.enter_context(prepared(depsgraph, drawn_ones, undefined, known))
         for number, frame in enumerate(frames):
             start, stop = number / len(frames), (number + 1) / len(frames)
             yield Progress(start, f"frame {frame}{_time_left(began, spent, len(frames) - number)}")
             scene.frame_set(frame)
             try:
-                steps = _frame(scene, frame, cameras, objects, look, size, settings)
+                steps = _frame(scene, frame, cameras, objects, look, size, settings, known)
                 reading, results = yield from part(steps, start, stop)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -131,6 +142,7 @@ def baking_animation(
             made.append(Frames(name, *mine, strip))
         return made
     finally:
+        held.close()
         scene.frame_set(before[0], subframe=before[1])
 
 
@@ -147,6 +159,7 @@ def _frame(
     look: Look | None,
     size: tuple[int, int] | None,
     settings: Settings,
+    kept: Kept,
 ) -> Work[tuple[Reading, dict]]:
     """Draw one frame from all cameras; by the names of the sequences their views, and whether the
     picture was there."""
@@ -155,7 +168,7 @@ def _frame(
     chosen = {None: frame_camera(scene, frame)} if cameras is None else dict.fromkeys(cameras)
     sources = list(chosen.values()) if cameras is None else list(cameras)
     undefined = "zero" if scene.rosy.undefined else "error"
-    reading = read_scene(depsgraph, objects, undefined, KEPT)
+    reading = read_scene(depsgraph, objects, undefined, kept)
     check_appliable(reading.owners, settings)
     results = {}
     for number, source in enumerate(sources):
@@ -169,16 +182,15 @@ def _frame(
         was_there = path.is_file() and note.is_file() and read_bytes(note) == inputs
         if not was_there:
             fine = scaled_camera(view, look.supersampling)
-            gbuffer = yield from part(
-                project_kept(reading.bodies, fine, look.display), start, (start + stop) / 2
-            )
+            seeing = projecting(reading.bodies, fine, look.display)
+            gbuffer = yield from part(seeing, start, (start + stop) / 2)
             drawing = composing(gbuffer, look, lights)
             picture = yield from part(drawing, (start + stop) / 2, stop)
             note.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
             write_bytes(note, inputs)
         results[name] = view, was_there
-    KEPT.trim()
+    kept.trim()
     return reading, results
 
 

@@ -14,6 +14,9 @@ from .colour import to_display
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _EIGHT_BITS, _RGBA, _PERCEPTUAL = 8, 6, 0
 
+#: Of zlib: more effort takes five times as long for a tenth, as streaks are noise.
+LEVEL = 1
+
 
 def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     """Write a picture with 8 bits a channel, declared to be sRGB.
@@ -48,7 +51,7 @@ def png_bytes(rgba: np.ndarray) -> bytes:
     chunks = [
         (b"IHDR", header),
         (b"sRGB", bytes([_PERCEPTUAL])),
-        (b"IDAT", zlib.compress(rows.tobytes())),
+        (b"IDAT", zlib.compress(rows.tobytes(), LEVEL)),
         (b"IEND", b""),
     ]
     return _SIGNATURE + b"".join(_chunk(kind, data) for kind, data in chunks)

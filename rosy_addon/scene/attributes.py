@@ -289,7 +289,11 @@ def read_carried_field(
         )
 
     given = values, former, *pairs, stored, source, undefined
-    return _found_or_made(kept, surface, make, "carried", *given)
+    if kept is None or surface.rest is None:
+        return _found_or_made(kept, surface, make, "carried", *given)
+    # The shape at rest is all that counts: that of now is another from frame to frame.
+    shape = surface.rest, surface.corner_vertex, surface.face_start
+    return kept.find_or_make(("carried", digest(*shape, *given)), make)
 
 
 def _carried(

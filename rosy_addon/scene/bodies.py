@@ -126,7 +126,7 @@ def read_scene(
         raise RosyError("no visible object has a RoSy field: make or import one first")
     shown = set(_shown_objects(view_layer))
     kept = Kept() if kept is None else kept
-    with _prepared(depsgraph, objects, undefined, kept) as names:
+    with prepared(depsgraph, objects, undefined, kept) as names:
         reader = _Reader(names, undefined, kept)
         for instance in depsgraph.object_instances:
             if _is_seen(instance, shown):
@@ -212,13 +212,15 @@ def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
 
 
 @contextmanager
-def _prepared(
+def prepared(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object],
     undefined: str,
     kept: Kept,
 ) -> Iterator[dict[bpy.types.Object, Stored]]:
     """Have Blender carry what a field needs through the modifiers, and take it away afterwards.
+
+    Held open over many readings, it is done but once.
 
     These are undeformed positions, the normals of the faces on which vectors were given, and
     vectors where the field is stored in another way. Yields how each object's field is found in its

@@ -246,7 +246,7 @@ def _bake_frames(options: argparse.Namespace, scene: Any, settings: Any) -> None
     frames = frame_range(options.frames)
     if _is_spread(options):
         # All are there: what is left is to have the materials play them.
-        frames = range(frames[0], frames[-1] + 1, max(len(frames) - 1, 1) * frames.step)
+        frames = sorted({frames[0], frames[-1]})
     changed = bool(options.preset or options.set)
     work = baking_animation(
         scene,

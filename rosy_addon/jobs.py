@@ -13,22 +13,31 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from .errors import RosyError
+
+#: Frames that one worker does in one go: a Blender takes as long to start as for several frames.
+CHUNK = 8
 
 #: How often a worker may be lost with a frame before the frame counts as failed.
 RETRIES = 3
 
 
-def frame_range(text: str) -> range:
-    """The frames of ``A``, ``A-B`` or ``A-B:STEP``.
+def frame_range(text: str) -> Sequence[int]:
+    """The frames of ``A``, ``A-B`` or ``A-B:STEP``, or of several of these with commas between.
 
     Raises
     ------
     RosyError
         If it is none of these, or holds no frame.
     """
-    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", text.strip())
+    parts = [_one_range(part.strip(), text) for part in text.split(",")]
+    return parts[0] if len(parts) == 1 else sorted(set().union(*parts))
+
+
+def _one_range(part: str, text: str) -> range:
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", part)
     first = int(match[1]) if match else 0
     last = int(match[2]) if match and match[2] else first
     step = int(match[3]) if match and match[3] else 1
@@ -58,7 +67,7 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
 
 
-def run_here(command: Sequence[str], frames: range, count: int) -> Iterator[str]:
+def run_here(command: Sequence[str], frames: Sequence[int], count: int) -> Iterator[str]:
     """Run a command for every frame, on so many processes at once.
 
     Each has every count-th frame, so that slow stretches are shared.
@@ -93,7 +102,7 @@ def run_here(command: Sequence[str], frames: range, count: int) -> Iterator[str]
         raise RosyError("; ".join(failed))
 
 
-def run_on_cluster(command: Sequence[str], frames: range, address: str) -> Iterator[str]:
+def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
     """Run a command for every frame on the workers of a Dask cluster.
 
     Workers need the same program and files under the same paths. A frame whose worker is lost goes to
@@ -102,7 +111,7 @@ def run_on_cluster(command: Sequence[str], frames: range, address: str) -> Itera
     Parameters
     ----------
     command : sequence of str
-    frames : range
+    frames : sequence of int
     address : str
         Of the scheduler.
 
@@ -127,36 +136,45 @@ def run_on_cluster(command: Sequence[str], frames: range, address: str) -> Itera
         raise RosyError(f"--scheduler {address}: no answer: {reason}") from None
     failed = []
     with client:
-        work = {
-            client.submit(
+        frames = list(frames)
+        waiting = {}
+
+        def submit(some: list[int]) -> Any:
+            text = frames_text(some)
+            task = client.submit(
                 subprocess.run,
-                [*command, "--frames", str(frame)],
+                [*command, "--frames", text],
                 capture_output=True,
                 text=True,
-                key=f"rosy-{frame}-{time.time_ns()}",
+                key=f"rosy-{text}-{time.time_ns()}",
                 retries=RETRIES,
                 pure=False,
-            ): frame
-            for frame in frames
-        }
-        for done in as_completed(list(work)):
-            frame = work[done]
-            if done.status == "error":
-                failed.append((frame, f"{done.exception()!r}"))
-                continue
-            result = done.result()
-            if result.returncode:
-                failed.append((frame, _last_line(result.stderr)))
+            )
+            waiting[task] = some
+            return task
+
+        chunks = [frames[start : start + CHUNK] for start in range(0, len(frames), CHUNK)]
+        running = as_completed([submit(chunk) for chunk in chunks])
+        for done in running:
+            some = waiting.pop(done)
+            broken = done.status == "error"
+            if not broken and not done.result().returncode:
+                yield from done.result().stdout.splitlines()
+            elif len(some) > 1:
+                # Which of them it was, and the others.
+                for frame in some:
+                    running.add(submit([frame]))
             else:
-                yield from result.stdout.splitlines()
+                why = repr(done.exception()) if broken else _last_line(done.result().stderr)
+                failed.append((some[0], why))
     if failed:
         raise RosyError("; ".join(f"frame {frame}: {why}" for frame, why in sorted(failed)))
 
 
-def frames_text(frames: range) -> str:
-    """A range as the command line takes it."""
-    if len(frames) == 1:
-        return str(frames[0])
+def frames_text(frames: Sequence[int]) -> str:
+    """Frames as the command line takes them."""
+    if len(frames) == 1 or not isinstance(frames, range):
+        return ",".join(map(str, frames))
     return f"{frames[0]}-{frames[-1]}" + (f":{frames.step}" if frames.step > 1 else "")
 
 
@@ -174,4 +192,5 @@ def _start(command: list[str]) -> subprocess.Popen:
 def _last_line(complaint: str) -> str:
     lines = [line for line in complaint.splitlines() if line.strip()]
     said = [line for line in lines if line.startswith("rosy: ")]
-    return (said or lines or ["ended without a word"])[-1].removeprefix("rosy: ")
+    last = (said or lines or ["ended without a word"])[-1].removeprefix("rosy: ")
+    return re.sub(r"^frame -?\d+: ", "", last)

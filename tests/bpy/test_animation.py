@@ -270,6 +270,46 @@ def test_a_frame_that_fails_is_named(file, tmp_path, monkeypatch):
         list(run_here(command, range(1, 7), 2))
 
 
+@pytest.fixture
+def cluster(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # the workers' processes are to find the package
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        yield cluster
+
+
+def test_a_cluster_does_the_frames_and_loses_none(file, tmp_path, cluster):
+    finished(start(file, tmp_path / "one", "--frames", "1-20"))
+    address = cluster.scheduler_address
+    process = start(file, tmp_path / "two", "--frames", "1-20", "--scheduler", address)
+    late = time.monotonic() + 60
+    while len(frames_of(tmp_path / "two")) < 3 and time.monotonic() < late:
+        time.sleep(0.02)
+    victim = next(iter(cluster.workers.values()))
+    os.kill(victim.pid, signal.SIGKILL)
+    finished(process)
+    assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
+
+
+def test_a_cluster_names_the_frames_that_fail(file, tmp_path, cluster):
+    monkey = bpy.data.objects["Suzanne"]
+    for frame, x in ((4, 0.0), (5, 500.0), (6, 0.0)):
+        monkey.location.x = x
+        monkey.keyframe_insert("location", frame=frame)
+    for curve in _curves(monkey):
+        for point in curve.keyframe_points:
+            point.interpolation = "CONSTANT"
+    bpy.ops.wm.save_mainfile()
+    address = cluster.scheduler_address
+    process = start(file, tmp_path / "out", "--frames", "1-10", "--scheduler", address)
+    _, err = process.communicate(timeout=200)
+    assert process.returncode == 2
+    assert err.startswith("rosy: frame 5: no RoSy object is in view") and err.count("\n") == 1, err
+    assert len(frames_of(tmp_path / "out")) == 9
+
+
 def test_what_makes_no_sense_is_refused(file, tmp_path):
     for words, wanted in (
         (["--jobs", "2"], "give --frames"),

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A job type for Flamenco, Blender's render farm manager: RoSy's pictures of a frame range, in chunks.
+// Put this file into the folder `scripts` beside the manager and restart it. Workers need Blender with
+// the RoSy extension, and the .blend file and the folder under the same paths.
+
+const JOB_TYPE = {
+    label: "RoSy Bake",
+    description: "Draw the RoSy fields of a scene at every frame, as image sequences",
+    settings: [
+        {
+            key: "frames",
+            type: "string",
+            required: true,
+            eval: "f'{C.scene.frame_start}-{C.scene.frame_end}'",
+            evalInfo: { showLinkButton: true, description: "Scene frame range" },
+            description: "Frames to draw, such as '47', '1-30', or '3, 5-10, 47-327'",
+        },
+        {
+            key: "chunk_size",
+            type: "int32",
+            default: 10,
+            description: "Frames that one worker draws in one go",
+            visible: "submission",
+        },
+        {
+            key: "cameras",
+            type: "string",
+            default: "",
+            description: "Names of cameras, with commas between, a sequence of each; empty: the camera "
+                + "that renders each frame",
+        },
+        {
+            key: "folder",
+            type: "string",
+            subtype: "dir_path",
+            required: true,
+            eval: "bpy.path.abspath(C.scene.rosy.directory)",
+            description: "Where the pictures go; all workers must be able to write there",
+        },
+        {
+            key: "preset",
+            type: "string",
+            default: "",
+            description: "A look by its name; empty: the scene's",
+        },
+        {
+            key: "blendfile",
+            type: "string",
+            required: true,
+            eval: "bpy.data.filepath",
+            description: "The scene",
+            visible: "web",
+        },
+    ],
+};
+
+function compileJob(job) {
+    const settings = job.settings;
+    for (const camera of cameraNames(settings.cameras)) {
+        for (const chunk of frameChunker(settings.frames, settings.chunk_size)) {
+            job.addTask(bakeTask(settings, camera, chunk));
+        }
+    }
+}
+
+// One task: the command that a user would run for these frames. Frames that are there and up to date
+// stay, so it may be run again, or twice at once.
+function bakeTask(settings, camera, chunk) {
+    const args = ["--out", settings.folder, "--frames", chunk];
+    if (camera) {
+        args.push("--camera", camera);
+    }
+    if (settings.preset) {
+        args.push("--preset", settings.preset);
+    }
+    const task = author.Task(camera ? `${camera} ${chunk}` : `frames ${chunk}`, "blender");
+    task.addCommand(author.Command("exec", {
+        exe: "{blender}",
+        args: ["-b", settings.blendfile, "--command", "rosy", "bake"].concat(args),
+    }));
+    return task;
+}
+
+// The names that are given, or one that stands for the camera that renders.
+function cameraNames(text) {
+    const names = (text || "").split(",").map((name) => name.trim()).filter((name) => name);
+    return names.length ? names : [""];
+}

@@ -17,6 +17,7 @@ from . import (
     show,
     singularities,
     ticking,
+    turntable,
 )
 
 MODULES = (
@@ -27,6 +28,7 @@ MODULES = (
     singularities,
     bake,
     bake_animation,
+    turntable,
     show,
     remove,
     preset_apply,

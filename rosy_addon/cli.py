@@ -9,7 +9,7 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -38,13 +38,14 @@ from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
 from .projection.project import project
+from .turntable import Encoder, check_film, has_ffmpeg, pictures, write_film
 
 #: Exit statuses: done, something the user can put right, stopped by Ctrl-C.
 DONE, WRONG, STOPPED = 0, 2, 130
 
 #: Looking down a little from the front left, as portraits are taken.
 DEFAULT_VIEW = (-25.0, 20.0)
-DEFAULT_SIZE = (1024, 1024)
+DEFAULT_SIZE, DEFAULT_FILM_SIZE = (1024, 1024), (512, 512)
 
 #: What points up in files of each kind, as Blender's importers take it.
 UP = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
@@ -96,6 +97,41 @@ def render(options: argparse.Namespace) -> None:
     body = Body(surface, matrix, field)
     picture = compose(project([body], camera, look.display), look)
     write_png(options.output, picture.rgba)
+
+
+def turntable(options: argparse.Namespace) -> None:
+    """Draw the field of a mesh file from all around, as a film."""
+    check_writable(options.output)
+    check_film(options.output)
+    if options.pictures < 2 or not options.rate > 0:
+        raise RosyError("a film has 2 pictures or more, and a rate above 0")
+    encode = _encoder(options.output)
+    look = _look(options, Look(supersampling=2))
+    surface, field = _mesh_and_field(options)
+    body = Body(surface, UPRIGHT[options.up or UP[options.mesh.suffix.lower()]], field)
+    size = check_size(*options.size)
+    frames = pictures(body, look, options.pictures, size, options.view, not options.ortho)
+    write_film(options.output, _counted(frames, options.pictures), options.rate, encode)
+
+
+def _encoder(path: Path) -> Encoder | None:
+    """Blender's, if a film needs one and there is no ffmpeg."""
+    if path.suffix.lower() != ".mp4" or has_ffmpeg():
+        return None
+    try:
+        from .scene.movie import encode
+    except ImportError:
+        raise RosyError(
+            f"{path}: an .mp4 needs the program ffmpeg, or Blender; a .gif needs neither"
+        ) from None
+    return encode
+
+
+def _counted(frames: Iterator[np.ndarray], count: int) -> Iterator[np.ndarray]:
+    """The same, with a line said for each."""
+    for number, frame in enumerate(frames, 1):
+        print(f"picture {number} of {count}", flush=True)
+        yield frame
 
 
 def field(options: argparse.Namespace) -> None:
@@ -457,7 +493,7 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         prog=prog, description="Draw N-way rotational symmetry fields on meshes."
     )
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    for add in (_add_bake, _add_render, _add_field, _add_info):
+    for add in (_add_bake, _add_render, _add_turntable, _add_field, _add_info):
         add(verbs)
     return parser
 
@@ -498,6 +534,11 @@ def _add_render(verbs: Any) -> None:
     verb = _verb(verbs, "render", render)
     _add_mesh(verb)
     verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
+    _add_view(verb, DEFAULT_SIZE)
+    _add_look(verb)
+
+
+def _add_view(verb: argparse.ArgumentParser, size: tuple[int, int]) -> None:
     verb.add_argument(
         "--view",
         type=_numbers(2, "AZ,EL"),
@@ -510,8 +551,21 @@ def _add_render(verbs: Any) -> None:
         choices=list(UPRIGHT),
         help="the file's upward axis; y for .obj and .off if not given",
     )
-    verb.add_argument("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH")
+    verb.add_argument("--size", type=_size, default=size, metavar="WxH")
     verb.add_argument("--ortho", action="store_true", help="without perspective")
+
+
+def _add_turntable(verbs: Any) -> None:
+    verb = _verb(verbs, "turntable", turntable)
+    _add_mesh(verb)
+    verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
+    verb.add_argument(
+        "--pictures", type=int, default=72, metavar="N", help="of a full turn (%(default)d)"
+    )
+    verb.add_argument(
+        "--rate", type=float, default=24.0, metavar="N", help="pictures a second (%(default)g)"
+    )
+    _add_view(verb, DEFAULT_FILM_SIZE)
     _add_look(verb)
 
 

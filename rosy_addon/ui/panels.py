@@ -163,8 +163,9 @@ def _draw_picture(
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.bake", text="Bake Again" if made else "Bake", icon="RENDER_STILL")
-    row = layout.row()
-    row.operator("rosy.bake_animation", icon="RENDER_ANIMATION")
+    row = layout.row(align=True)
+    row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
+    row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
     if not drawn:
         layout.label(text="Needs a field to draw", icon="INFO")
     if made:

@@ -320,3 +320,22 @@ def test_what_makes_no_sense_is_refused(file, tmp_path):
         process = start(file, tmp_path / "out", *words)
         _, err = process.communicate(timeout=120)
         assert process.returncode == 2 and wanted in err, err
+
+
+# --- turntables ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", ["64x64", "65x33"])
+def test_a_film_by_blender(size, tmp_path):
+    mesh = tmp_path / "mesh.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    film = tmp_path / "film.mp4"
+    done = subprocess.run(
+        [sys.executable, "-m", "rosy_addon", "turntable", str(mesh), "-o", str(film),
+         "--pictures", "7", "--size", size, "--generate", "axis"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    clip = bpy.data.movieclips.load(str(film))
+    width, height = (int(side) // 2 * 2 for side in size.split("x"))
+    assert clip.frame_duration == 7 and tuple(clip.size) == (width, height)

@@ -28,8 +28,20 @@ MAY_IMPORT = {
     "bake": BASE | {"field", "projection", "compositor", "scene", "reuse"},
     "animation": BASE | {"field", "projection", "compositor", "scene", "reuse", "bake"},
     "jobs": BASE,
+    "turntable": BASE | {"field", "projection", "compositor"},
     "ui": BASE | {"field", "projection", "compositor", "scene", "bake"},
-    "cli": BASE | {"field", "projection", "compositor", "scene", "bake", "ui", "animation", "jobs"},
+    "cli": BASE
+    | {
+        "field",
+        "projection",
+        "compositor",
+        "scene",
+        "bake",
+        "ui",
+        "animation",
+        "jobs",
+        "turntable",
+    },
     "__main__": {"cli"},
     "__init__": set(),
 }
@@ -88,7 +100,7 @@ def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         for path in FILES
-        if room_of(path) in (*NUMPY_ROOMS, "cli") and path.stem != "__init__"
+        if room_of(path) in (*NUMPY_ROOMS, "cli", "jobs", "turntable") and path.stem != "__init__"
     ]
     assert len(modules) > 20
     code = "\n".join(

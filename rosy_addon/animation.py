@@ -118,11 +118,12 @@ def baking_animation(
         held.enter_context(prepared(depsgraph, drawn_ones, undefined, known))
         for number, frame in enumerate(frames):
             start, stop = number / len(frames), (number + 1) / len(frames)
-            yield Progress(start, f"frame {frame}{_time_left(began, spent, len(frames) - number)}")
+            label = f"frame {frame}{_time_left(began, spent, len(frames) - number)}"
+            yield Progress(start, label)
             scene.frame_set(frame)
             try:
                 steps = _frame(scene, frame, cameras, objects, look, size, settings, known)
-                reading, results = yield from part(steps, start, stop)
+                reading, results = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
             for name, (view, was_there) in results.items():

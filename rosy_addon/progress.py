@@ -36,11 +36,12 @@ def drain(work: Work[Result]) -> Result:
             return done.value
 
 
-def part(work: Work[Result], start: float, stop: float) -> Work[Result]:
-    """Run `work` as the stretch from `start` to `stop` of something longer."""
+def part(work: Work[Result], start: float, stop: float, label: str | None = None) -> Work[Result]:
+    """Run `work` as the stretch from `start` to `stop` of something longer, under a label of that."""
     while True:
         try:
             step = next(work)
         except StopIteration as done:
             return done.value
-        yield Progress(start + (stop - start) * step.fraction, step.label)
+        fraction = start + (stop - start) * step.fraction
+        yield Progress(fraction, step.label if label is None else label)

@@ -168,3 +168,36 @@ def test_edit_mode_and_shared_mesh(with_field, scene):
     else:
         assert done == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_bake_animation(with_field, tmp_path):
+    scene = bpy.context.scene
+    for frame, x in ((1, -0.4), (4, 0.4)):
+        with_field.location.x = x
+        with_field.keyframe_insert("location", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 4
+    scene.rosy.directory = str(tmp_path)
+    scene.frame_set(2)
+    assert bpy.ops.rosy.bake_animation() == {"FINISHED"}
+    names = sorted(path.name for path in tmp_path.glob("*.png"))
+    assert names == [f"RoSy_Scene_{frame:04d}.png" for frame in (1, 2, 3, 4)]
+    assert scene.frame_current == 2
+    times = [path.stat().st_mtime_ns for path in sorted(tmp_path.glob("*.png"))]
+    assert bpy.ops.rosy.bake_animation(first=2, last=3) == {"FINISHED"}
+    assert times == [path.stat().st_mtime_ns for path in sorted(tmp_path.glob("*.png"))]
+    (record,) = scene.rosy.bakes
+    assert record.frames == "2 to 3" and record.image.source == "SEQUENCE"
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert len(list(tmp_path.glob("*.png"))) == 4
+
+
+def test_turntable(with_field, tmp_path):
+    for kind in (".gif", ".mp4"):
+        path = tmp_path / f"film{kind}"
+        made = bpy.ops.rosy.turntable(
+            filepath=str(path), film=kind, pictures=4, width=48, height=32
+        )
+        assert made == {"FINISHED"} and path.stat().st_size > 500
+    clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
+    assert clip.frame_duration == 4
+    assert len(bpy.data.scenes) == 1

@@ -34,10 +34,6 @@ from .scene.looks import look_of
 #: How the note of a frame ends; it begins as the picture's name.
 NOTE = ".rosy.txt"
 
-#: Bytes kept from frame to frame: of the meshes that stay the same. Pictures and G-buffers of past
-#: frames would be of no use, and their memory is the next frame's.
-LIMIT = 1 << 27
-
 #: What a note says first. Changes of how pictures are drawn change it, too.
 FORMAT = "rosy frame 1"
 
@@ -110,7 +106,8 @@ def baking_animation(
     views: dict[str, tuple] = {}
     began, spent = time.monotonic(), 0
     reading = None
-    held, known = ExitStack(), Kept(LIMIT)
+    # What a frame has not used, none of the next ones will: its memory is theirs.
+    held, known = ExitStack(), Kept()
     try:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         drawn_ones = rosy_objects(bpy.context.view_layer) if objects is None else list(objects)
@@ -191,7 +188,7 @@ def _frame(
             write_frame(path, picture, settings.as_float)
             write_bytes(note, inputs)
         results[name] = view, was_there
-    kept.trim()
+    kept.forget_unused()
     return reading, results
 
 

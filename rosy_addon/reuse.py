@@ -32,17 +32,20 @@ class Kept:
     def __init__(self, limit: int = LIMIT) -> None:
         self._limit = limit
         self._entries: OrderedDict[Hashable, Any] = OrderedDict()
+        self._used: set[Hashable] = set()
 
     def find(self, key: Hashable) -> Any | None:
         """What was put under a key, None if that is no longer there."""
         if key not in self._entries:
             return None
         self._entries.move_to_end(key)
+        self._used.add(key)
         return self._entries[key]
 
     def put(self, key: Hashable, result: Result) -> Result:
         """Keep a result, and return it."""
         self._entries[key] = result
+        self._used.add(key)
         return result
 
     def find_or_make(self, key: Hashable, make: Callable[[], Result]) -> Result:
@@ -59,9 +62,16 @@ class Kept:
             if total > self._limit:
                 del self._entries[key]
 
+    def forget_unused(self) -> None:
+        """Give up what was neither put nor found since this was asked for last."""
+        for key in [key for key in self._entries if key not in self._used]:
+            del self._entries[key]
+        self._used.clear()
+
     def clear(self) -> None:
         """Give up everything."""
         self._entries.clear()
+        self._used.clear()
 
     def __len__(self) -> int:
         return len(self._entries)

@@ -13,7 +13,7 @@ from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.bodies import rosy_objects
 from ..rosy_addon.scene.cameras import camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.ui.properties import CAMERAS
-from .meshes import is_idle
+from .meshes import can_draw
 from .ticking import Ticking
 
 
@@ -30,12 +30,7 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_idle(cls):
-            return False
-        if not rosy_objects(context.view_layer):
-            cls.poll_message_set("No visible mesh has a field: make or import one first")
-            return False
-        return True
+        return can_draw(cls, context)
 
     def work(self, context: bpy.types.Context) -> Work[list[Baked]]:
         return baking(context.scene, cameras=self._cameras(context))

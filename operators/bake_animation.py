@@ -14,7 +14,7 @@ from ..rosy_addon.progress import Work
 from ..rosy_addon.scene.apply import settings_of
 from ..rosy_addon.scene.bodies import rosy_objects
 from ..rosy_addon.scene.cameras import scene_cameras
-from .meshes import is_idle
+from .meshes import can_draw
 from .ticking import Ticking
 
 
@@ -36,12 +36,7 @@ class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_idle(cls):
-            return False
-        if not rosy_objects(context.view_layer):
-            cls.poll_message_set("No visible mesh has a field: make or import one first")
-            return False
-        return True
+        return can_draw(cls, context)
 
     def work(self, context: bpy.types.Context) -> Work[list[Frames]]:
         scene = context.scene

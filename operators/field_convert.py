@@ -24,7 +24,7 @@ from ..rosy_addon.scene.attributes import (
     write_mesh_field,
 )
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, give_fields, selected_meshes
+from .meshes import can_change_fields, give_fields, has_field_selected, selected_meshes
 from .ticking import Ticking
 
 
@@ -33,12 +33,7 @@ class _OnFields:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not can_change_fields(cls, context):
-            return False
-        if not has_field(selected_meshes(context)[0]):
-            cls.poll_message_set("The active mesh has no field: make or import one first")
-            return False
-        return True
+        return can_change_fields(cls, context) and has_field_selected(cls, context)
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(thing.data for thing in selected_meshes(context) if has_field(thing))

@@ -9,9 +9,9 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.fieldfile import write_field
-from ..rosy_addon.scene.attributes import has_field, read_mesh_field
+from ..rosy_addon.scene.attributes import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, selected_meshes
+from .meshes import can_change_fields, has_field_selected, selected_meshes, with_ending
 
 #: The kinds of files, by the end of their name.
 FORMATS = {
@@ -43,19 +43,11 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not can_change_fields(cls, context):
-            return False
-        if not has_field(selected_meshes(context)[0]):
-            cls.poll_message_set("The active mesh has no field: make or import one first")
-            return False
-        return True
+        return can_change_fields(cls, context) and has_field_selected(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
         """Keep the name's ending in step with the format, in the file browser."""
-        name = str(Path(self.filepath).with_suffix(self.file_format))
-        changed = name != self.filepath
-        self.filepath = name
-        return changed
+        return with_ending(self, self.file_format)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         thing = selected_meshes(context)[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 import bpy
 
@@ -11,9 +12,11 @@ from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.attributes import (
     DEFAULT_NAME,
     attribute_name,
+    has_field,
     is_native,
     write_mesh_field,
 )
+from ..rosy_addon.scene.bodies import rosy_objects
 from ..rosy_addon.scene.capabilities import is_editable
 from ..rosy_addon.scene.singular import singular_vertices
 from ..rosy_addon.ui import overlay, status
@@ -48,6 +51,33 @@ def is_idle(operator: type[bpy.types.Operator]) -> bool:
         operator.poll_message_set("RoSy is at work: wait, or press ESC to cancel")
         return False
     return True
+
+
+def has_field_selected(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether the active mesh has a field; says so if not."""
+    meshes = selected_meshes(context)
+    if not meshes or not has_field(meshes[0]):
+        operator.poll_message_set("The active mesh has no field: make or import one first")
+        return False
+    return True
+
+
+def can_draw(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether there is a field to draw; says why not."""
+    if not is_idle(operator):
+        return False
+    if not rosy_objects(context.view_layer):
+        operator.poll_message_set("No visible mesh has a field: make or import one first")
+        return False
+    return True
+
+
+def with_ending(operator: bpy.types.Operator, ending: str) -> bool:
+    """Keep the name in a file browser in step with the kind of file; whether it was changed."""
+    name = str(Path(operator.filepath).with_suffix(ending))
+    changed = name != operator.filepath
+    operator.filepath = name
+    return changed
 
 
 def give_fields(

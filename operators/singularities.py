@@ -8,7 +8,7 @@ from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.attributes import has_field
 from ..rosy_addon.scene.singular import add_points, remove_points, singular_vertices
 from ..rosy_addon.ui import overlay
-from .meshes import is_idle, selected_meshes
+from .meshes import has_field_selected, is_idle, selected_meshes
 
 
 class ROSY_OT_singularities(bpy.types.Operator):
@@ -30,12 +30,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_idle(cls):
-            return False
-        if not any(has_field(thing) for thing in selected_meshes(context)):
-            cls.poll_message_set("Select a mesh with a field: make or import one first")
-            return False
-        return True
+        return is_idle(cls) and has_field_selected(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         things = [thing for thing in selected_meshes(context) if has_field(thing)]

@@ -11,12 +11,11 @@ from bpy_extras.io_utils import ExportHelper
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.files import check_writable
 from ..rosy_addon.projection.camera import check_size
-from ..rosy_addon.scene.attributes import has_field
 from ..rosy_addon.scene.bodies import read_scene
 from ..rosy_addon.scene.looks import look_of
 from ..rosy_addon.scene.movie import encode
 from ..rosy_addon.turntable import check_film, has_ffmpeg, pictures, write_film
-from .meshes import is_idle, selected_meshes
+from .meshes import has_field_selected, is_idle, selected_meshes, with_ending
 
 
 class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
@@ -51,19 +50,11 @@ class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not is_idle(cls):
-            return False
-        if not any(has_field(thing) for thing in selected_meshes(context)[:1]):
-            cls.poll_message_set("Select a mesh with a field: make or import one first")
-            return False
-        return True
+        return is_idle(cls) and has_field_selected(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
         """Keep the name's ending in step with the kind of film, in the file browser."""
-        name = str(Path(self.filepath).with_suffix(self.film))
-        changed = name != self.filepath
-        self.filepath = name
-        return changed
+        return with_ending(self, self.film)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         thing = selected_meshes(context)[0]

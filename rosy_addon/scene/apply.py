@@ -14,7 +14,8 @@ from __future__ import annotations
 import json
 import time
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -219,8 +220,7 @@ def apply_picture(
     check_appliable(owners, settings)
     name = shot.camera.name
     matrices = _object_matrices(reading, shot.camera)
-    made: list[bpy.types.ID] = []
-    try:
+    with _all_or_nothing() as made:
         image = new_image(
             f"RoSy {name}", shot.picture, as_float=settings.as_float, folder=settings.folder
         )
@@ -238,16 +238,24 @@ def apply_picture(
         for thing in owners:
             groups.append(new_group(f"RoSy {thing.name}", material, matrices[thing]))
             made.append(groups[-1])
+    for thing, group in zip(owners, groups, strict=True):
+        _show(thing, group)
+    _remember(scene, shot, image, material, matrices)
+    return Baked(name, image, material, tuple(owners), shot.picture, tuple(_notes(scene)))
+
+
+@contextmanager
+def _all_or_nothing() -> Iterator[list[bpy.types.ID]]:
+    """A list for datablocks that are made: marked as RoSy's in the end, or deleted on an error."""
+    made: list[bpy.types.ID] = []
+    try:
+        yield made
         for datablock in made:
             datablock[MADE] = True
     except BaseException:
         for datablock in reversed(made):
             _delete(datablock)
         raise
-    for thing, group in zip(owners, groups, strict=True):
-        _show(thing, group)
-    _remember(scene, shot, image, material, matrices)
-    return Baked(name, image, material, tuple(owners), shot.picture, tuple(_notes(scene)))
 
 
 @dataclass(frozen=True)
@@ -282,8 +290,7 @@ def apply_strip(
     The pictures fill the frame of the camera that renders, each at its own frame: any machine that
     has the files shows them, with or without RoSy.
     """
-    made: list[bpy.types.ID] = []
-    try:
+    with _all_or_nothing() as made:
         image = load_strip(strip.path, settings.as_float)
         made.append(image)
         image.name = f"RoSy {strip.name}"
@@ -300,12 +307,6 @@ def apply_strip(
         owners = list(dict.fromkeys(reading.owners))
         groups = [new_group(f"RoSy {thing.name}", material, None) for thing in owners]
         made += groups
-        for datablock in made:
-            datablock[MADE] = True
-    except BaseException:
-        for datablock in reversed(made):
-            _delete(datablock)
-        raise
     for thing, group in zip(owners, groups, strict=True):
         _show(thing, group)
     record = _record_of(scene, strip.name, image, material)

@@ -24,6 +24,7 @@ class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
     bl_idname = "rosy.bake_animation"
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
+    if_stopped = "frames that are done stay"
 
     first: bpy.props.IntProperty(name="First", description="Frame", default=1)
     last: bpy.props.IntProperty(name="Last", description="Frame", default=250)

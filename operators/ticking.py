@@ -161,6 +161,9 @@ class Ticking:
 
     _job: Job | None = None
 
+    #: What is true when work was stopped.
+    if_stopped = "nothing was changed"
+
     def work(self, context: bpy.types.Context) -> Work[Any]:
         """What is to be done. An error may be raised here or by the work itself."""
         raise NotImplementedError
@@ -205,7 +208,7 @@ class Ticking:
                 self.report({"ERROR"}, str(error))
                 return {"CANCELLED"}
         if job.why is not None:
-            self.report({"INFO"}, f"RoSy stopped, nothing was changed: {job.why}")
+            self.report({"INFO"}, f"RoSy stopped, {self.if_stopped}: {job.why}")
             return {"CANCELLED"}
         return {"PASS_THROUGH"}
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .bake import Source, camera_view, scaled_camera
+from .bake import Source, camera_view, scaled_camera, scene_depsgraph
 from .compositor.compose import composing
 from .compositor.look import Look
 from .errors import RosyError
@@ -109,8 +109,8 @@ def baking_animation(
     # What a frame has not used, none of the next ones will: its memory is theirs.
     held, known = ExitStack(), Kept()
     try:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        drawn_ones = rosy_objects(bpy.context.view_layer) if objects is None else list(objects)
+        depsgraph = scene_depsgraph(scene)
+        drawn_ones = rosy_objects(depsgraph.view_layer) if objects is None else list(objects)
         undefined = "zero" if scene.rosy.undefined else "error"
         held.enter_context(prepared(depsgraph, drawn_ones, undefined, known))
         for number, frame in enumerate(frames):
@@ -162,7 +162,7 @@ def _frame(
     """Draw one frame from all cameras; by the names of the sequences their views, and whether the
     picture was there."""
     look = look_of(scene.rosy) if look is None else look
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph = scene_depsgraph(scene)
     chosen = {None: frame_camera(scene, frame)} if cameras is None else dict.fromkeys(cameras)
     sources = list(chosen.values()) if cameras is None else list(cameras)
     undefined = "zero" if scene.rosy.undefined else "error"

@@ -77,7 +77,7 @@ def baking(
     settings = settings_of(scene) if settings is None else settings
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
-    depsgraph = _depsgraph(scene) if depsgraph is None else depsgraph
+    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     views = [camera_view(scene, depsgraph, source, size) for source in sources]
     fine = [scaled_camera(view, look.supersampling) for view in views]
     reading = read_scene(depsgraph, objects, _undefined(scene), KEPT)
@@ -169,7 +169,8 @@ def _undefined(scene: bpy.types.Scene) -> str:
     return "zero" if scene.rosy.undefined else "error"
 
 
-def _depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """That of the view layer in the context, or of the scene's first one if that is of another."""
     context = bpy.context
     if context.scene == scene:
         return context.evaluated_depsgraph_get()

@@ -41,6 +41,8 @@ _handlers: list[Any] = []
 def show(name: str, found: Singular) -> None:
     """Show the singularities of the object of a name, in place of what was shown of it."""
     _shown[name] = found
+    if _forget not in bpy.app.handlers.load_pre:
+        bpy.app.handlers.load_pre.append(_forget)
     if not _handlers and not bpy.app.background:
         add = bpy.types.SpaceView3D.draw_handler_add
         _handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
@@ -54,9 +56,16 @@ def hide(name: str | None = None) -> None:
         _shown.clear()
     _shown.pop(name, None)
     if not _shown:
+        if _forget in bpy.app.handlers.load_pre:
+            bpy.app.handlers.load_pre.remove(_forget)
         while _handlers:
             bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
     _redraw()
+
+
+def _forget(*_: Any) -> None:
+    """Another file has other objects, which may have the same names."""
+    hide()
 
 
 def is_shown(name: str) -> bool:

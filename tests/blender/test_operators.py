@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import bpy
 import numpy as np
 import pytest
@@ -328,6 +330,8 @@ def test_singularities_as_points(scene):
     assert sum(value.value for value in values) == 8
     place = points.data.attributes["position"].data
     assert all(abs(point.vector.length - 1) < 0.02 for point in place)
+    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    assert overlay.is_shown("Icosphere")
     # Again: in their place.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
     assert [o.name for o in bpy.data.objects if "singularities" in o.name] == [name]
@@ -336,6 +340,17 @@ def test_singularities_as_points(scene):
     assert not len(bpy.data.pointclouds) and len(bpy.data.meshes) == len(
         {o.data for o in bpy.data.objects if o.type == "MESH"}
     )
+
+
+def test_another_file_has_no_singularities(scene):
+    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    handlers = len(bpy.app.handlers.load_pre)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    bpy.ops.rosy.singularities(show="OVERLAY")
+    assert overlay.is_shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers + 1
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not overlay.is_shown("Icosphere") and len(bpy.app.handlers.load_pre) == handlers
 
 
 def test_exports_and_imports(suzanne, tmp_path):

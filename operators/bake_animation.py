@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import bpy
 
 from ..rosy_addon.animation import Frames, baking_animation
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.progress import Work
-from ..rosy_addon.scene.apply import settings_of
+from ..rosy_addon.scene.apply import folder_of, settings_of
 from ..rosy_addon.scene.bodies import rosy_objects
 from ..rosy_addon.scene.cameras import scene_cameras
 from .meshes import can_draw
@@ -53,7 +52,9 @@ class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
         if not len(frames):
             raise RosyError(f"frames {chosen['first']} to {chosen['last']}: there are none")
         cameras = scene_cameras(scene) if self.all_cameras else None
-        return baking_animation(scene, frames, cameras=cameras, settings=_with_folder(scene))
+        # Frames go to the scene's folder even if single pictures are packed.
+        settings = replace(settings_of(scene), folder=folder_of(scene))
+        return baking_animation(scene, frames, cameras=cameras, settings=settings)
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return rosy_objects(context.view_layer)
@@ -64,17 +65,6 @@ class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
                 {"INFO"},
                 f"{len(each.drawn)} frames drawn, {len(each.kept)} were there: {each.strip.path}",
             )
-
-
-def _with_folder(scene: bpy.types.Scene):
-    """The scene's settings; frames go to its folder even if single pictures are packed."""
-    settings = settings_of(scene)
-    if settings.folder is not None:
-        return settings
-    directory = scene.rosy.directory
-    if directory.startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{directory}: save the .blend file first, or choose a folder")
-    return replace(settings, folder=Path(bpy.path.abspath(directory)))
 
 
 CLASSES = (ROSY_OT_bake_animation,)

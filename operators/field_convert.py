@@ -7,13 +7,11 @@ from dataclasses import replace
 from math import pi
 
 import bpy
-import numpy as np
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.convert import smoothing, to_degree, turned, with_magnitude
-from ..rosy_addon.field.generate import MAGNITUDES, curvature_magnitude
-from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
-from ..rosy_addon.field.surface import Surface
+from ..rosy_addon.field.convert import Conversion, converting
+from ..rosy_addon.field.generate import MAGNITUDES
+from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Work, part
 from ..rosy_addon.scene.attributes import (
     FORMS,
@@ -94,30 +92,15 @@ class ROSY_OT_field_convert(_OnFields, Ticking, bpy.types.Operator):
             surface = mesh_surface(mesh)
             field = read_mesh_field(mesh, surface=surface)
             values = read_scalars(mesh, self.values) if self.magnitude == "values" else None
-            converting = self._converting(surface, field, values)
-            made[mesh] = yield from part(
-                converting, number / len(meshes), (number + 1) / len(meshes)
-            )
+            if values is not None and values.min() < 0:
+                raise RosyError(f"{surface.name}: '{self.values}' has values below 0, no lengths")
+            kept = values if self.magnitude in ("keep", "values") else self.magnitude
+            wished = Conversion(self.degree or None, self.angle, self.smooth, kept)
+            work = converting(surface, field, wished)
+            field = yield from part(work, number / len(meshes), (number + 1) / len(meshes))
+            made[mesh] = replace(field, given=None)
         give_fields(self, context, made)
         return len(made)
-
-    def _converting(
-        self, surface: Surface, field: RosyField, values: np.ndarray | None
-    ) -> Work[RosyField]:
-        if self.degree:
-            field = to_degree(surface, field, self.degree)
-        if self.angle:
-            field = turned(surface, field, self.angle)
-        if self.smooth:
-            size = float(np.ptp(surface.vertices, axis=0).max())
-            field = yield from smoothing(surface, field, (self.smooth * size) ** 2)
-        if values is not None:
-            if values.min() < 0:
-                raise RosyError(f"{surface.name}: '{self.values}' has values below 0, no lengths")
-            field = with_magnitude(field, values)
-        elif self.magnitude != "keep":
-            field = with_magnitude(field, curvature_magnitude(surface, self.magnitude))
-        return replace(field, given=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
         self.report({"INFO"}, f"Converted the fields of {result} meshes")
@@ -148,12 +131,11 @@ class ROSY_OT_field_store(_OnFields, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        usual = "rosy_angle" if self.form == "ANGLE" else attribute_name
         try:
             fields = {mesh: read_mesh_field(mesh) for mesh in self.needed(context)}
             for mesh, field in fields.items():
-                name = self.attribute or (usual if isinstance(usual, str) else usual(mesh))
-                write_mesh_field(mesh, field, name, self.form)
+                usual = "rosy_angle" if self.form == "ANGLE" else attribute_name(mesh)
+                write_mesh_field(mesh, field, self.attribute or usual, self.form)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import degrees
 from pathlib import Path
 
 import bpy
@@ -66,7 +67,7 @@ class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
             look = look_of(context.scene.rosy)
             look = replace(look, supersampling=max(look.supersampling, 2))
             body = read_scene(context.evaluated_depsgraph_get(), [thing]).bodies[0]
-            view = -25.0, self.elevation * 57.29577951308232
+            view = -25.0, degrees(self.elevation)
             size = check_size(self.width, self.height)
             manager.progress_begin(0, self.pictures)
             frames = pictures(body, look, self.pictures, size, view)

@@ -16,12 +16,14 @@ from dataclasses import dataclass
 
 import bpy
 
-from .bake import Source, camera_view, scaled_camera, scene_depsgraph
+from .bake import Source, camera_view, scaled_camera, scene_depsgraph, undefined_of
 from .compositor.compose import composing
 from .compositor.look import Look
+from .compositor.shading import Light
 from .errors import RosyError
 from .files import read_bytes, write_bytes
 from .progress import Progress, Work, drain, part
+from .projection.camera import Camera
 from .projection.project import projecting
 from .reuse import Kept, digest
 from .scene.apply import Settings, Strip, apply_strip, check_appliable, settings_of
@@ -103,7 +105,7 @@ def baking_animation(
     before = scene.frame_current, scene.frame_subframe
     drawn: dict[str, list[int]] = {}
     kept: dict[str, list[int]] = {}
-    views: dict[str, tuple] = {}
+    views: dict[str, Camera] = {}
     began, spent = time.monotonic(), 0
     reading = None
     # What a frame has not used, none of the next ones will: its memory is theirs.
@@ -111,8 +113,9 @@ def baking_animation(
     try:
         depsgraph = scene_depsgraph(scene)
         drawn_ones = rosy_objects(depsgraph.view_layer) if objects is None else list(objects)
-        undefined = "zero" if scene.rosy.undefined else "error"
-        held.enter_context(prepared(depsgraph, drawn_ones, undefined, known))
+        if show:
+            check_appliable(drawn_ones, settings)
+        held.enter_context(prepared(depsgraph, drawn_ones, undefined_of(scene), known))
         for number, frame in enumerate(frames):
             start, stop = number / len(frames), (number + 1) / len(frames)
             label = f"frame {frame}{_time_left(began, spent, len(frames) - number)}"
@@ -163,11 +166,8 @@ def _frame(
     picture was there."""
     look = look_of(scene.rosy) if look is None else look
     depsgraph = scene_depsgraph(scene)
-    chosen = {None: frame_camera(scene, frame)} if cameras is None else dict.fromkeys(cameras)
-    sources = list(chosen.values()) if cameras is None else list(cameras)
-    undefined = "zero" if scene.rosy.undefined else "error"
-    reading = read_scene(depsgraph, objects, undefined, kept)
-    check_appliable(reading.owners, settings)
+    sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
+    reading = read_scene(depsgraph, objects, undefined_of(scene), kept)
     results = {}
     for number, source in enumerate(sources):
         start, stop = number / len(sources), (number + 1) / len(sources)
@@ -192,7 +192,9 @@ def _frame(
     return reading, results
 
 
-def _inputs(reading: Reading, look: Look, view, lights, settings: Settings) -> bytes:
+def _inputs(
+    reading: Reading, look: Look, view: Camera, lights: Sequence[Light], settings: Settings
+) -> bytes:
     """A digest of all that a picture is drawn from."""
     parts: list = [look, view.view, view.projection, view.width, view.height, settings.as_float]
     if look.light == "scene":

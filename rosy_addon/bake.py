@@ -80,7 +80,7 @@ def baking(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     views = [camera_view(scene, depsgraph, source, size) for source in sources]
     fine = [scaled_camera(view, look.supersampling) for view in views]
-    reading = read_scene(depsgraph, objects, _undefined(scene), KEPT)
+    reading = read_scene(depsgraph, objects, undefined_of(scene), KEPT)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
     shots = []
@@ -88,7 +88,7 @@ def baking(
         start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
         middle = start + 0.4 * (stop - start)
         gbuffer = yield from part(
-            project_kept(reading.bodies, fine[number], look.display), start, middle
+            _projecting(reading.bodies, fine[number], look.display), start, middle
         )
         picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
         shots.append(Shot(picture, views[number], _camera_object(scene, source)))
@@ -121,7 +121,7 @@ def bake(
     )
 
 
-def project_kept(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
+def _projecting(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
     """`projecting`, or what an earlier bake has found if nothing has moved since."""
     view = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     key = "gbuffer", tuple(map(id, bodies)), view, camera.name, display
@@ -165,7 +165,8 @@ def scaled_camera(camera: Camera, factor: int) -> Camera:
     )
 
 
-def _undefined(scene: bpy.types.Scene) -> str:
+def undefined_of(scene: bpy.types.Scene) -> str:
+    """What the scene says is done about vectors that are not finite."""
     return "zero" if scene.rosy.undefined else "error"
 
 

@@ -22,12 +22,12 @@ from .compositor.png import write_png
 from .compositor.presets import load_preset, preset_names
 from .errors import RosyError
 from .field.analysis import angle_errors, error_facts, field_energy
-from .field.convert import smoothed, to_degree, turned, with_magnitude
+from .field.convert import Conversion, convert
 from .field.fieldfile import READ, WRITTEN, load_field, write_field
 from .field.formats.obj import read_uv
 from .field.formats.sings import SINGULARITIES, read_sings
 from .field.formats.strokes import read_strokes
-from .field.generate import KINDS, MAGNITUDES, Recipe, curvature_magnitude, generate
+from .field.generate import KINDS, MAGNITUDES, Recipe, generate
 from .field.meshfile import read_mesh
 from .field.rosy_field import RosyField, check_degree
 from .field.singularities import euler_characteristic, singularities
@@ -138,6 +138,9 @@ def field(options: argparse.Namespace) -> None:
     """Make a field file, or convert one: its format, its degree, its directions, its lengths."""
     check_writable(options.output)
     surface, made = _mesh_and_field(options)
+    turn = np.radians(options.turn)
+    wished = Conversion(options.to_degree, turn, options.smooth, options.magnitude)
+    made = convert(surface, made, wished)
     write_field(options.output, made, surface)
 
 
@@ -278,6 +281,7 @@ def _bake_frames(options: argparse.Namespace, scene: Any, settings: Any) -> None
     from .animation import baking_animation
     from .scene.bodies import rosy_objects
     from .scene.files import save_file
+    from .scene.looks import look_of
 
     frames = frame_range(options.frames)
     if _is_spread(options):
@@ -289,7 +293,7 @@ def _bake_frames(options: argparse.Namespace, scene: Any, settings: Any) -> None
         frames,
         objects=rosy_objects(bpy.context.view_layer, options.object),
         cameras=_cameras(scene, options),
-        look=_look(options, look_of_scene(scene)) if changed else None,
+        look=_look(options, look_of(scene.rosy)) if changed else None,
         size=options.size,
         settings=settings,
         show=options.save,
@@ -314,13 +318,6 @@ def _shown(work: Work[Any]) -> Any:
         if step.label != last and step.label.startswith("frame "):
             last = step.label
             print(f"{step.label} ({100 * step.fraction:.0f} %)", flush=True)
-
-
-def look_of_scene(scene: Any) -> Look:
-    """The look that a Blender scene says."""
-    from .scene.looks import look_of
-
-    return look_of(scene.rosy)
 
 
 def _same_for_others(options: argparse.Namespace) -> list[str]:
@@ -370,13 +367,13 @@ def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
             options.field, surface, options.degree, undefined, mesh=options.field_mesh
         )
         _note(loaded.note)
-        return surface, _converted(options, surface, loaded.field)
+        return surface, loaded.field
     _note(cut_note(surface))
     degree = 4 if options.degree is None else options.degree
     guided = options.strokes is not None or options.guides is not None
     usual = "guided" if guided else "curvature" if degree in (2, 4) else "axis"
-    made = generate(surface, _recipe(options, surface, options.generate or usual, degree), degree)
-    return surface, _converted(options, surface, made)
+    recipe = _recipe(options, surface, options.generate or usual, degree)
+    return surface, generate(surface, recipe, degree)
 
 
 def _recipe(options: argparse.Namespace, surface: Surface, kind: str, degree: int) -> Recipe:
@@ -393,20 +390,6 @@ def _recipe(options: argparse.Namespace, surface: Surface, kind: str, degree: in
             raise RosyError(f"{options.mesh}: has no UV map; those of .obj files are read")
         recipe = replace(recipe, uv=uv)
     return recipe
-
-
-def _converted(options: argparse.Namespace, surface: Surface, made: RosyField) -> RosyField:
-    """The field after what `field` may be asked to do with it."""
-    if getattr(options, "to_degree", None) is not None:
-        made = to_degree(surface, made, options.to_degree)
-    if getattr(options, "turn", 0.0):
-        made = turned(surface, made, np.radians(options.turn))
-    if getattr(options, "smooth", 0.0):
-        size = float(np.ptp(surface.vertices, axis=0).max())
-        made = smoothed(surface, made, (options.smooth * size) ** 2)
-    if getattr(options, "magnitude", None) is not None:
-        made = with_magnitude(made, curvature_magnitude(surface, options.magnitude))
-    return made
 
 
 def _note(text: str) -> None:

@@ -7,9 +7,11 @@ once, without harm. Nothing here knows how a frame is made.
 from __future__ import annotations
 
 import os
+import queue
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -87,19 +89,38 @@ def run_here(command: Sequence[str], frames: Sequence[int], count: int) -> Itera
     for number in range(count):
         own = frames[number::count]
         running.append((own, _start([*command, "--frames", frames_text(own)])))
-    failed = []
+    # All of them are listened to at once: one whose words nobody takes would wait.
+    said: queue.Queue[tuple[int, str | None]] = queue.Queue()
+    for number, (_, process) in enumerate(running):
+        threading.Thread(target=_listen, args=(number, process, said), daemon=True).start()
+    words: list[list[str]] = [[] for _ in running]
+    speaking = len(running)
     try:
-        for own, process in running:
-            said, complaint = process.communicate()
-            yield from said.splitlines()
-            if process.returncode:
-                failed.append(f"frames {frames_text(own)}: {_last_line(complaint)}")
+        while speaking:
+            number, line = said.get()
+            if line is None:
+                speaking -= 1
+            else:
+                words[number].append(line)
+                yield line
+        failed = [
+            f"frames {frames_text(own)}: {_last_line(words[number])}"
+            for number, (own, process) in enumerate(running)
+            if process.wait()
+        ]
     finally:
         for _, process in running:
             if process.poll() is None:
                 process.terminate()
     if failed:
         raise RosyError("; ".join(failed))
+
+
+def _listen(number: int, process: subprocess.Popen, said: queue.Queue) -> None:
+    """Pass on what a process says, and None when it is done."""
+    for line in process.stdout:
+        said.put((number, line.rstrip("\n")))
+    said.put((number, None))
 
 
 def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
@@ -165,7 +186,11 @@ def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) 
                 for frame in some:
                     running.add(submit([frame]))
             else:
-                why = repr(done.exception()) if broken else _last_line(done.result().stderr)
+                why = (
+                    repr(done.exception())
+                    if broken
+                    else _last_line(done.result().stderr.splitlines())
+                )
                 failed.append((some[0], why))
     if failed:
         raise RosyError("; ".join(f"frame {frame}: {why}" for frame, why in sorted(failed)))
@@ -182,15 +207,16 @@ def _start(command: list[str]) -> subprocess.Popen:
     return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         env=environment(),
         stdin=subprocess.DEVNULL,
     )
 
 
-def _last_line(complaint: str) -> str:
-    lines = [line for line in complaint.splitlines() if line.strip()]
+def _last_line(said: Sequence[str]) -> str:
+    """What an error is, of all that a process has said."""
+    lines = [line for line in said if line.strip()]
     said = [line for line in lines if line.startswith("rosy: ")]
     last = (said or lines or ["ended without a word"])[-1].removeprefix("rosy: ")
     return re.sub(r"^frame -?\d+: ", "", last)

@@ -6,7 +6,12 @@ import numpy as np
 
 from ..errors import RosyError
 from .frames import dot, unit
-from .representation import face_frames, face_representation, matching_angles
+from .representation import (
+    face_frames,
+    face_representation,
+    matching_angles,
+    to_representation,
+)
 from .rosy_field import RosyField
 from .surface import Surface, surface_edges
 
@@ -22,13 +27,13 @@ def field_energy(surface: Surface, field: RosyField) -> float:
 
     Faces on which the field is undefined do not count.
     """
-    z = face_representation(surface, field)
+    x, y = face_frames(surface)
+    z = to_representation(field.vectors, x, y, field.degree)
     size = np.abs(z)
     z = np.divide(z, size, out=np.zeros_like(z), where=size > 0)
     edges = surface_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.sides[:, 0], edges.sides[:, 1]
     one, other = surface.corner_face[a], surface.corner_face[b]
-    x, y = face_frames(surface)
     turn = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
     start = surface.vertices[surface.corner_vertex[a]]
     edge = surface.vertices[surface.corner_vertex[b]] - start

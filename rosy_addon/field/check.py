@@ -125,19 +125,19 @@ def checked_directions(
         As `checked_field`.
     """
     directions = np.array(directions, dtype=np.float64)
-    given = directions.copy() if field_domain(surface, len(directions)) == "face" else None
     count, degree = directions.shape[:2]
+    domain = field_domain(surface, count) if domain is None else domain
+    given = directions.copy() if domain == "face" else None
     lost = ~is_usable(directions).all(axis=(1, 2))
     directions[lost] = np.nan
-    domain = field_domain(surface, count) if domain is None else domain
-    if domain is not None and count == _elements(surface, domain):
+    fits = domain is not None and count == _elements(surface, domain)
+    if fits:
         normal = tangent_normals(surface, domain)
         x, y = tangent_frame(normal)
         sound = np.where(lost[:, None, None], 0.0, directions)
         w = dot(sound, x[:, None]) + 1j * dot(sound, y[:, None])
-    if domain is None or count != _elements(surface, domain) or is_rosy(w):
+    if not fits or is_rosy(w):
         vectors = directions[:, 0].copy()
-        vectors[lost] = np.nan
         vectors[~lost & ~directions.any(axis=2).all(axis=1)] = 0
         field = checked_field(surface, vectors, degree, source, undefined, domain)
         return replace(with_families(_at_rest(surface), field), given=given)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +11,54 @@ from ..progress import Work, drain
 from .connection import connect, laplacian
 from .directions import slips
 from .frames import unit
+from .generate import curvature_magnitude
 from .guided import solve
 from .representation import complex_sums, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import corner_turns, sum_on_faces
 from .sparse import from_entries
 from .surface import Surface, connected
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """What a field is converted to, in this order.
+
+    Attributes
+    ----------
+    degree : int or None
+        A multiple or a divisor of the field's.
+    turn : float
+        Radians.
+    smooth : float
+        Over which share of the surface's size it diffuses.
+    magnitude : str, (F,) ndarray or None
+        One of `generate.MAGNITUDES`, or values.
+    """
+
+    degree: int | None = None
+    turn: float = 0.0
+    smooth: float = 0.0
+    magnitude: str | np.ndarray | None = None
+
+
+def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyField:
+    """Convert a field; see `converting`."""
+    return drain(converting(surface, field, conversion))
+
+
+def converting(surface: Surface, field: RosyField, conversion: Conversion) -> Work[RosyField]:
+    """Convert a field: what a conversion leaves out stays as it is."""
+    if conversion.degree is not None:
+        field = to_degree(surface, field, conversion.degree)
+    if conversion.turn:
+        field = turned(surface, field, conversion.turn)
+    if conversion.smooth:
+        field = yield from smoothing(surface, field, (conversion.smooth * surface.size) ** 2)
+    magnitude = conversion.magnitude
+    if isinstance(magnitude, str):
+        magnitude = curvature_magnitude(surface, magnitude)
+    return field if magnitude is None else with_magnitude(field, magnitude)
 
 
 def to_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:

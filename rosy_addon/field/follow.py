@@ -43,7 +43,7 @@ def follow(source: Surface, field: RosyField, target: Surface, name: str) -> Ros
     centre = _centres(target)
     triangle, distance = nearest_triangles(source, centre)
     face = source.triangle_face[triangle]
-    size = max(float(np.ptp(source.vertices, axis=0).max()), 1e-300)
+    size = max(source.size, 1e-300)
     normal = target.face_normal
     facing = dot(normal, source.face_normal[face])
     away = (distance > APART * size) | (facing < np.cos(TILT))

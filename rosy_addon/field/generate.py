@@ -120,9 +120,8 @@ def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[Rosy
         field = yield from part(finding_curvature(surface, degree), 0.0, end)
         if not recipe.reach:
             return field
-        size = np.ptp(surface.vertices, axis=0).max()
-        weight = (field.magnitude / (recipe.reach * size)) ** 2
-        following = _following(surface, degree, unit(field.vectors), weight, None)
+        weight = (field.magnitude / (recipe.reach * surface.size)) ** 2
+        following = _following(surface, degree, unit(field.vectors), weight)
         return (yield from part(following, end, 1.0))
     if recipe.kind == "features":
         return (yield from _following_features(surface, recipe, degree))
@@ -148,18 +147,21 @@ def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[R
             f"{surface.name}: the edges of each face contradict each other in a field of degree "
             f"{degree}"
         )
-    return (yield from _following(surface, degree, guides, 0.0, guides.any(axis=1)))
+    return (yield from _following(surface, degree, guides))
 
 
 def _following(
     surface: Surface,
     degree: int,
     guides: np.ndarray,
-    weight: np.ndarray | float,
-    hard: np.ndarray | None,
+    weight: np.ndarray | float | None = None,
 ) -> Work[RosyField]:
-    """A guided field; pieces of the mesh without a guide have their smoothest one."""
-    guided = finding_guided(surface, degree, guides, weight, hard)
+    """A guided field; pieces of the mesh without a guide have their smoothest one.
+
+    Without a weight guides are met exactly.
+    """
+    hard = guides.any(axis=1) if weight is None else None
+    guided = finding_guided(surface, degree, guides, 0.0 if weight is None else weight, hard)
     field = yield from part(guided, 0.0, 0.6)
     left = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
     if not left.any():
@@ -188,11 +190,8 @@ def _following_guides(surface: Surface, recipe: Recipe, degree: int) -> Work[Ros
         raise RosyError(f"{surface.name}: there is nothing to follow")
     every = np.tile(np.arange(surface.face_count), len(found))
     guides = mean_guides(surface, every, np.concatenate(found), degree)
-    if recipe.reach:
-        size = float(np.ptp(surface.vertices, axis=0).max())
-        weight = (recipe.reach * size) ** -2
-        return (yield from _following(surface, degree, guides, weight, None))
-    return (yield from _following(surface, degree, guides, 0.0, guides.any(axis=1)))
+    weight = (recipe.reach * surface.size) ** -2 if recipe.reach else None
+    return (yield from _following(surface, degree, guides, weight))
 
 
 def axis_field(
@@ -240,8 +239,7 @@ def curvature_magnitude(surface: Surface, kind: str) -> np.ndarray:
         raise RosyError(f"no magnitude is named '{kind}'; there are {', '.join(MAGNITUDES)}")
     whole = _shaded_smoothly(surface)
     mean, deviator = _curvature_of_faces(whole, *face_frames(whole))
-    size = float(np.ptp(surface.vertices, axis=0).max())
-    return (np.abs(mean) + np.abs(deviator)) * size
+    return (np.abs(mean) + np.abs(deviator)) * surface.size
 
 
 def _shaded_smoothly(surface: Surface) -> Surface:

@@ -14,7 +14,7 @@ from ..errors import RosyError
 from .frames import dot, unit
 from .nearest import nearest_triangles
 from .representation import complex_sums, face_frames, from_representation, to_representation
-from .surface import Surface, mean_over_faces, surface_edges
+from .surface import Surface, mean_over_faces, sum_over_faces, surface_edges
 
 #: Points of strokes that are farther from the surface, as a share of its size, do not count.
 AWAY = 0.05
@@ -46,14 +46,9 @@ def along_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
     corner = np.flatnonzero(np.isin(key, ends[:, 0] * span + ends[:, 1]))
     face = surface.corner_face[corner]
     edge = unit(surface.vertices[head[corner]] - surface.vertices[tail[corner]])
-    x, y = face_frames(surface)
     # In the plane of a face that is not flat an edge is shorter, but counts no less.
     edge -= dot(edge, surface.face_normal[face])[:, None] * surface.face_normal[face]
-    z = to_representation(unit(edge), x[face], y[face], degree)
-    total = complex_sums(face, z, surface.face_count)
-    size = np.abs(total)
-    total = np.divide(total, size, out=np.zeros_like(total), where=size > 1e-6)
-    return from_representation(total, x, y, degree)
+    return mean_guides(surface, face, unit(edge), degree)
 
 
 def feature_edges(surface: Surface, angle: float) -> np.ndarray:
@@ -110,7 +105,7 @@ def along_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree: int) 
     point, way = np.concatenate(points), np.concatenate(ways)
     if len(point):
         triangle, distance = nearest_triangles(surface, point)
-        near = distance <= AWAY * float(np.ptp(surface.vertices, axis=0).max())
+        near = distance <= AWAY * surface.size
         face, way = surface.triangle_face[triangle[near]], way[near]
     if not len(point) or not len(face):
         raise RosyError(f"{surface.name}: no stroke comes near it")
@@ -170,10 +165,8 @@ def along_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     middle = mean_over_faces(np.asarray(uv, dtype=np.float64), surface.face_start)
     u, v = (np.asarray(uv, dtype=np.float64) - middle[face]).T
     # The linear map from (u, v) to the face that fits its corners best: least squares.
-    uu, uv_, vv = (
-        np.add.reduceat(product, surface.face_start[:-1]) for product in (u * u, u * v, v * v)
-    )
-    up, vp = (np.add.reduceat(part * place, surface.face_start[:-1]) for part in (u, v))
+    uu, uv_, vv = (sum_over_faces(product, surface.face_start) for product in (u * u, u * v, v * v))
+    up, vp = (sum_over_faces(part * place, surface.face_start) for part in (u, v))
     area = uu * vv - uv_**2
     flat = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_ * vp, uu * vp - uv_ * up

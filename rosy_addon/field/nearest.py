@@ -42,7 +42,6 @@ def nearest_triangles(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
         every = np.arange(len(points))
         grid.measure(
             points,
-            every,
             np.repeat(every, len(grid.large)),
             np.tile(grid.large, len(points)),
             triangle,
@@ -129,9 +128,7 @@ class _Grid:
             count = np.searchsorted(self.key, key, side="right") - first
             owner = np.repeat(some, len(offset))[exists]
             place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - first, count)
-            self.measure(
-                points, some, np.repeat(owner, count), self.triangle[place], triangle, distance
-            )
+            self.measure(points, np.repeat(owner, count), self.triangle[place], triangle, distance)
 
     def _away(self, points: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """(n k,) how far n points are from the k cells at some offset from their own."""
@@ -142,7 +139,6 @@ class _Grid:
     def measure(
         self,
         points: np.ndarray,
-        some: np.ndarray,
         owner: np.ndarray,
         candidate: np.ndarray,
         triangle: np.ndarray,

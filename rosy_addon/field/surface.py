@@ -62,6 +62,11 @@ class Surface:
         return len(self.face_start) - 1
 
     @cached_property
+    def size(self) -> float:
+        """The longest side of its box, Blender units."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
     def corner_face(self) -> np.ndarray:
         """(C,) int32: the face of each corner."""
         return corner_faces(self.face_start)
@@ -316,13 +321,6 @@ def cut_note(surface: Surface) -> str:
     return (
         f"{surface.name}: along {cut} edges faces disagree on which side is out, and the field is "
         "cut there: recalculate the normals, unless it is a Möbius strip, which has but one side"
-    )
-
-
-def corners_are_sound(vertices: np.ndarray, corner_vertex: np.ndarray) -> bool:
-    """Whether all corners are at vertices that exist; `build_surface` says what is wrong."""
-    return bool(corner_vertex.min(initial=0) >= 0) and bool(
-        corner_vertex.max(initial=-1) < len(vertices)
     )
 
 

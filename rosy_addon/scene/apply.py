@@ -157,11 +157,7 @@ def settings_of(scene: bpy.types.Scene) -> Settings:
         If they are to be saved beside a .blend file that has not been saved.
     """
     chosen = scene.rosy
-    folder = None
-    if chosen.store == "SAVED":
-        if chosen.directory.startswith("//") and not bpy.data.filepath:
-            raise RosyError(f"{chosen.directory}: save the .blend file first, or choose a folder")
-        folder = Path(bpy.path.abspath(chosen.directory))
+    folder = folder_of(scene) if chosen.store == "SAVED" else None
     return Settings(
         window=chosen.placement == "WINDOW",
         emission=chosen.emission,
@@ -169,6 +165,20 @@ def settings_of(scene: bpy.types.Scene) -> Settings:
         as_float=chosen.image_format == "FLOAT",
         folder=folder,
     )
+
+
+def folder_of(scene: bpy.types.Scene) -> Path:
+    """Where the scene's pictures are saved.
+
+    Raises
+    ------
+    RosyError
+        If that is beside a .blend file that has not been saved.
+    """
+    directory = scene.rosy.directory
+    if directory.startswith("//") and not bpy.data.filepath:
+        raise RosyError(f"{directory}: save the .blend file first, or choose a folder")
+    return Path(bpy.path.abspath(directory))
 
 
 def check_appliable(objects: Iterable[bpy.types.Object], settings: Settings) -> None:

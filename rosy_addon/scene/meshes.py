@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..field.surface import Surface, build_surface, corners_are_sound, smooth_fans
+from ..field.surface import Surface, build_surface, smooth_fans
 from ..reuse import Kept, digest
 
 #: What edges may be marked as: the property, its name, and what it does.
@@ -73,22 +73,13 @@ def mesh_surface(
 
     if kept is None:
         return build()
-    topology = (
-        parts["corner_vertex"],
-        parts["face_start"],
-        parts["sharp_edges"],
-        parts["flat_faces"],
-    )
-
-    def fans() -> np.ndarray:
-        """Which deformations leave as they are."""
-        corner_vertex, face_start, sharp_edges, flat_faces = topology
-        return smooth_fans(
-            parts["vertices"], corner_vertex, face_start, sharp_edges, None, flat_faces
+    if not plain:
+        # Deformations leave fans as they are.
+        names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
+        topology = {name: parts[name] for name in names}
+        parts["corner_fan"] = kept.find_or_make(
+            ("fans", digest(*topology.values())), lambda: smooth_fans(parts["vertices"], **topology)
         )
-
-    if not plain and corners_are_sound(parts["vertices"], parts["corner_vertex"]):
-        parts["corner_fan"] = kept.find_or_make(("fans", digest(*topology)), fans)
     # Triangles are slow to read, and follow from the rest.
     return kept.find_or_make(("surface", digest(*parts.values())), build)
 

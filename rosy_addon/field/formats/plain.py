@@ -33,10 +33,9 @@ def read_text(path: Path) -> Given:
 
 def read_npy(path: Path) -> Given:
     """An array (n, 3), (n, 3 N), (n, N, 3) or, of symmetric tensors, (n, 3, 3)."""
+    data = read_bytes(path)
     try:
-        values = np.load(io.BytesIO(read_bytes(path)), allow_pickle=False)
-    except RosyError:
-        raise
+        values = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # its header is read as Python, and may fail in any way
         what = str(reason).splitlines() or [type(reason).__name__]
         raise RosyError(f"{path}: is no .npy file of numbers: {what[0]}") from None

@@ -28,10 +28,15 @@ def map_colours(values: np.ndarray, name: str) -> np.ndarray:
     (P, 3) float32 ndarray
         Display values (sRGB), 0 to 1.
     """
-    stops = np.array([list(bytes.fromhex(code)) for code in _MAPS[name].split()]) / 255
+    stops = colour_stops(name)
     place = np.linspace(0, 1, len(stops))
     channels = [np.interp(values, place, stops[:, channel]) for channel in range(3)]
     return np.stack(channels, axis=1).astype(np.float32)
+
+
+def colour_stops(name: str) -> np.ndarray:
+    """(n, 3) float64 display values of a map at even places from 0 to 1, linear in between."""
+    return np.array([list(bytes.fromhex(code)) for code in _MAPS[name].split()]) / 255
 
 
 def to_linear(display: np.ndarray) -> np.ndarray:

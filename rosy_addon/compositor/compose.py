@@ -50,7 +50,7 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     Picture
     """
     camera = gbuffer.camera
-    finer = _scaled(look)
+    finer = scaled_look(look)
     colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     degree_of = np.asarray(gbuffer.degrees)[gbuffer.body]
     layers = []
@@ -107,7 +107,7 @@ def compose_planar(
     return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
 
 
-def _scaled(look: Look) -> Look:
+def scaled_look(look: Look) -> Look:
     """The look with its lengths in the pixels of the supersampled frame."""
     factor = look.supersampling
     return replace(

@@ -1,0 +1,139 @@
+"""The shaders without Blender: a plain OpenGL context through EGL, on whatever card there is.
+
+Stands in for `rosy_addon.gpu.device.BlenderDevice`; both are told the same by `passes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from rosy_addon.gpu.device import Values
+from rosy_addon.gpu.passes import GROUP, Compute, Drawing
+
+FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
+
+#: What Blender defines for shaders that draw into its views.
+BLENDER = "#define blender_srgb_to_framebuffer_space(colour) (colour)\n"
+
+
+class EglDevice:
+    """As `rosy_addon.gpu.device.Device`."""
+
+    def __init__(self) -> None:
+        self.context = moderngl.create_standalone_context(backend="egl", require=430)
+        self._programs: dict[str, Any] = {}
+
+    @property
+    def name(self) -> str:
+        """The driver's word for what it draws with."""
+        return self.context.info["GL_RENDERER"]
+
+    def texture(
+        self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
+    ) -> Any:
+        """As `Device.texture`."""
+        if data is not None:
+            data = np.ascontiguousarray(data, dtype=FORMATS[kind])
+        if layers:
+            return self.context.texture_array((width, height, layers), 4, data, dtype=FORMATS[kind])
+        return self.context.texture((width, height), 4, data, dtype=FORMATS[kind])
+
+    def depth(self, width: int, height: int) -> Any:
+        """As `Device.depth`."""
+        return self.context.depth_texture((width, height))
+
+    def clear(self, texture: Any) -> None:
+        """As `Device.clear`."""
+        self.context.framebuffer([texture]).clear()
+
+    def batch(self, corners: np.ndarray) -> Any:
+        """As `Device.batch`."""
+        return self.context.buffer(np.ascontiguousarray(corners, dtype=np.float32))
+
+    def compute(
+        self,
+        shader: Compute,
+        size: Sequence[int],
+        textures: Values,
+        images: Values,
+        constants: Values,
+    ) -> None:
+        """As `Device.compute`."""
+        program = self._bound(shader, textures, constants)
+        for slot, (name, _) in enumerate(shader.images):
+            images[_plain(name)].bind_to_image(slot, read=False, write=True)
+        width, height, layers = (*size, 1)[:3]
+        program.run(-(-width // GROUP[0]), -(-height // GROUP[1]), layers)
+        self.context.memory_barrier()
+
+    def draw(
+        self,
+        shader: Drawing,
+        batches: Sequence[tuple[Any, Values]],
+        target: tuple[Any, Any],
+        constants: Values,
+    ) -> None:
+        """As `Device.draw`."""
+        colour, depth = target
+        framebuffer = self.context.framebuffer([colour], depth)
+        framebuffer.use()
+        framebuffer.clear(depth=1.0)
+        self.context.enable_only(moderngl.DEPTH_TEST)
+        for batch, own in batches:
+            program = self._bound(shader, {}, {**constants, **own})
+            self.context.vertex_array(program, [(batch, "4f", "corner")]).render()
+
+    def read(self, texture: Any, width: int, height: int) -> np.ndarray:
+        """As `Device.read`."""
+        return np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
+
+    def finish(self) -> None:
+        """Wait until all is done."""
+        self.context.finish()
+
+    def _bound(self, shader: Compute | Drawing, textures: Values, constants: Values) -> Any:
+        if shader.name not in self._programs:
+            self._programs[shader.name] = self._compiled(shader)
+        program = self._programs[shader.name]
+        for slot, name in enumerate(shader.textures):
+            textures[_plain(name)].use(slot)
+            if _plain(name) in program:
+                program[_plain(name)] = slot
+        for name, _ in shader.constants:
+            # A driver leaves out what has no effect.
+            if name in program:
+                program[name] = constants[name]
+        return program
+
+    def _compiled(self, shader: Compute | Drawing) -> Any:
+        head = "#version 430\n"
+        for name in shader.textures:
+            head += f"uniform sampler2D{'Array' * name.endswith('[]')} {_plain(name)};\n"
+        for name, kind in shader.constants:
+            head += f"uniform {kind} {name};\n"
+        if isinstance(shader, Compute):
+            head += f"layout(local_size_x={GROUP[0]}, local_size_y={GROUP[1]}) in;\n"
+            for slot, (name, kind) in enumerate(shader.images):
+                head += (
+                    f"layout({kind.lower()}, binding={slot}) writeonly uniform "
+                    f"image2D{'Array' * name.endswith('[]')} {_plain(name)};\n"
+                )
+            return self.context.compute_shader(head + shader.source)
+        ways = [
+            f"{'flat ' * (name == 'triangle')}{{}} {kind} {name};\n"
+            for name, kind in shader.varyings
+        ]
+        vertex = head + "in vec4 corner;\n" + "".join(way.format("out") for way in ways)
+        fragment = head + BLENDER + f"out vec4 {shader.target};\n"
+        fragment += "".join(way.format("in") for way in ways)
+        return self.context.program(
+            vertex + shader.vertex_source, fragment_shader=fragment + shader.fragment_source
+        )
+
+
+def _plain(name: str) -> str:
+    return name.removesuffix("[]")

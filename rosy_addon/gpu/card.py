@@ -1,0 +1,505 @@
+"""Bodies and a camera to a picture, on the graphics card: project, compose.
+
+The stages and what flows between them are those of the numpy rooms, on images instead of lists of
+pixels. Streamlines are followed from every pixel and line through it: a card has the arithmetic for
+that which a processor lacks, so no averages are shared between neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..compositor.colour import colour_stops
+from ..compositor.compose import scaled_look
+from ..compositor.contrast import averaging_gain, expected_deviation
+from ..compositor.hues import PALETTE, SHARPNESS
+from ..compositor.look import Look
+from ..compositor.noise import image_noise, streak_statistics
+from ..compositor.shading import Light
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..projection.camera import Camera
+from ..projection.carried import Trait
+from ..projection.gbuffer import Body
+from ..projection.steps import OBLIQUE_TOLERANCE, STEEPEST, TOLERANCE
+from . import passes
+from .device import Device
+from .shapes import Shape, placement, shape_of, traits_of
+
+#: The noise is made for whole tiles of so many pixels, so that a frame may grow a little.
+TILE = 256
+
+#: Steps of all streamlines that one run of the shader may take: drivers give up on long ones.
+MOST_STEPS = 1 << 29
+
+#: How the magnitude of the field drives a look, for the shader.
+DRIVES = {"none": 0, "colour": 1, "length": 2, "both": 3}
+
+#: Planes that clip nothing.
+NO_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A body as it is on the card."""
+
+    shape: _OnCard
+    field: RosyField | None
+    moving: np.ndarray
+
+
+@dataclass(eq=False)
+class _OnCard:
+    """A shape on the card, and what keeps its key its own."""
+
+    shape: Shape
+    batch: Any
+    records: Any
+    owners: tuple[Any, ...]
+    used: int = 0
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Fields of one degree: N, its covering, and what they have besides the representation."""
+
+    degree: int
+    layers: tuple[Trait, ...]
+
+    @property
+    def deviations(self) -> list[int]:
+        """j of the harmonics, which are the first layers."""
+        return [number for kind, number in self.layers if kind == "deviation"]
+
+    @property
+    def lines(self) -> int:
+        """M, as `Flow.lines`."""
+        paired = self.degree % 2 == 0 and not any(j % 2 for j in self.deviations)
+        return self.degree // 2 if paired else self.degree
+
+    @property
+    def around(self) -> int:
+        """Sheets of a full turn, as `covering.sheets_around`."""
+        unpaired = self.deviations and self.lines == self.degree
+        return self.degree if unpaired else 2 * self.lines
+
+    @property
+    def families(self) -> int:
+        """How many, and 1 if lines are not told apart."""
+        return self.layers[-1][1] if self.layers and self.layers[-1][0] == "family" else 1
+
+
+def kinds_of(fields: Iterable[RosyField]) -> dict[int, Kind]:
+    """The kinds of some fields, by degree."""
+    traits: dict[int, set[Trait]] = {}
+    for field in fields:
+        traits.setdefault(field.degree, set()).update(traits_of(field))
+    return {degree: Kind(degree, _layers(found)) for degree, found in sorted(traits.items())}
+
+
+def _layers(found: set[Trait]) -> tuple[Trait, ...]:
+    """Deviations without a gap, then one trait of families."""
+    orders = [number for kind, number in found if kind == "deviation"]
+    layers: list[Trait] = []
+    if orders:
+        layers = [("deviation", j) for j in range(min(orders), max(orders) + 1)]
+    return (*layers, *sorted(trait for trait in found if trait[0] == "family")[:1])
+
+
+class Card:
+    """What is kept on a device from picture to picture.
+
+    Parameters
+    ----------
+    device : Device
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._shapes: dict[tuple, _OnCard] = {}
+        self._images: dict[str, tuple[tuple, Any]] = {}
+        self._tables: dict[str, tuple[Any, Any]] = {}
+        self._drawn = 0
+
+    @property
+    def textures(self) -> int:
+        """How many are kept."""
+        records = sum(entry.records is not None for entry in self._shapes.values())
+        return records + len(self._images) + len(self._tables)
+
+    def release(self) -> None:
+        """Let go of everything."""
+        self._shapes.clear()
+        self._images.clear()
+        self._tables.clear()
+
+    def place(self, bodies: Sequence[Body], display: str) -> list[Placed]:
+        """Bring bodies to the card, but for shapes that are there; those not among them go.
+
+        Parameters
+        ----------
+        bodies : sequence of Body
+        display : {"smooth", "flat"}
+        """
+        self._drawn += 1
+        kinds = kinds_of(body.field for body in bodies if body.field is not None)
+        placed = [self._placed(body, display, kinds) for body in bodies]
+        for key in [key for key, entry in self._shapes.items() if entry.used != self._drawn]:
+            del self._shapes[key]
+        return placed
+
+    def _placed(self, body: Body, display: str, kinds: dict[int, Kind]) -> Placed:
+        linear, moving = placement(body.matrix)
+        layers = () if body.field is None else kinds[body.field.degree].layers
+        key = id(body.surface), id(body.field), linear.tobytes(), display, layers
+        if key not in self._shapes:
+            self._shapes[key] = self._brought(body.surface, linear, body.field, display, layers)
+        entry = self._shapes[key]
+        entry.used = self._drawn
+        return Placed(entry, body.field, moving)
+
+    def _brought(
+        self,
+        surface: Surface,
+        linear: np.ndarray,
+        field: RosyField | None,
+        display: str,
+        layers: Sequence[Trait],
+    ) -> _OnCard:
+        shape = shape_of(surface, linear, field, display, layers)
+        records = None
+        if shape.records is not None:
+            height, width = shape.records.shape[:2]
+            records = self.device.texture(width, height, "RGBA32F", data=shape.records)
+        return _OnCard(shape, self.device.batch(shape.corners), records, (surface, field))
+
+    def draw(
+        self,
+        placed: Sequence[Placed],
+        camera: Camera,
+        look: Look,
+        lights: Sequence[Light] = (),
+        planes: np.ndarray | None = None,
+    ) -> Any:
+        """A picture of bodies.
+
+        Parameters
+        ----------
+        placed : sequence of Placed
+            From `place`, with the look's display.
+        camera : Camera
+            Of `look.supersampling` times the size of the picture each way.
+        look : Look
+            Its method does not count: the covering's streamlines are followed.
+        lights : sequence of Light
+        planes : (6, 4) ndarray, optional
+            World space; what is on their negative side is cut away.
+
+        Returns
+        -------
+        texture
+            (H, W, 4) linear, as `Picture.rgba`. Kept by the card, and drawn over next time.
+        """
+        self._project(placed, camera, NO_PLANES if planes is None else planes)
+        fine = self._image("picture", camera.width, camera.height)
+        self.device.clear(fine)
+        boxes = [_window(entry, camera) for entry in placed]
+        fields = [entry.field for entry in placed if entry.field is not None]
+        for degree, kind in kinds_of(fields).items():
+            own = [
+                box
+                for box, entry in zip(boxes, placed, strict=True)
+                if entry.field is not None and entry.field.degree == degree
+            ]
+            self._compose(kind, _around(own), camera, look, lights, fine)
+        if look.supersampling == 1:
+            return fine
+        return self._averaged(fine, camera, look.supersampling)
+
+    def read(self, picture: Any, width: int, height: int) -> np.ndarray:
+        """(H, W, 4) float32: what `draw` has drawn."""
+        return self.device.read(picture, width, height)
+
+    def gbuffer(self, camera: Camera) -> dict[str, np.ndarray]:
+        """The G-buffer of what was drawn last, by the names of its images."""
+        size = camera.width, camera.height
+        return {
+            name: self.device.read(self._image(name, *size), *size)
+            for name in ("seen", "normals", "values_seen")
+        }
+
+    def _project(self, placed: Sequence[Placed], camera: Camera, planes: np.ndarray) -> None:
+        width, height = camera.width, camera.height
+        seen, depth = self._image("seen", width, height), self._depth(width, height)
+        batches = [
+            (entry.shape.batch, {"body": float(number), **on_clip(entry, camera, planes)})
+            for number, entry in enumerate(placed)
+        ]
+        self.device.draw(passes.SEEN, batches, (seen, depth), {})
+        values = self._image("values_seen", width, height)
+        self.device.clear(values)
+        layers = max((entry.shape.shape.texels - 8) // 2 for entry in placed)
+        images = {
+            "normals": self._image("normals", width, height),
+            "values_seen": values,
+            "slopes": self._image("slopes", width, height),
+            "traits_seen": self._image("traits_seen", width, height, layers=max(layers, 1)),
+        }
+        shared = {
+            **_camera_constants(camera),
+            "pixels_per_unit": camera.pixels_per_unit,
+            "STEEPEST": STEEPEST,
+            "TOLERANCE": TOLERANCE,
+            "OBLIQUE_TOLERANCE": OBLIQUE_TOLERANCE,
+        }
+        for number, entry in enumerate(placed):
+            if entry.field is None:
+                continue
+            left, bottom, right, top = _window(entry, camera)
+            place = camera.view @ entry.moving
+            constants = {
+                **shared,
+                "corner": (left, bottom),
+                "body": float(number),
+                "texels": entry.shape.shape.texels,
+                "traits": (entry.shape.shape.texels - 8) // 2,
+                "place_x": tuple(place[0]),
+                "place_y": tuple(place[1]),
+                "place_z": tuple(place[2]),
+                "scale": float(np.linalg.norm(place[:3, 0])),
+            }
+            self.device.compute(
+                passes.RESOLVE,
+                (right - left, top - bottom),
+                {"seen": seen, "triangles": entry.shape.records},
+                images,
+                constants,
+            )
+
+    def _compose(
+        self,
+        kind: Kind,
+        window: tuple[int, int, int, int],
+        camera: Camera,
+        look: Look,
+        lights: Sequence[Light],
+        picture: Any,
+    ) -> None:
+        """Draw the fields of one kind into the picture."""
+        width, height = camera.width, camera.height
+        left, bottom, right, top = window
+        size = right - left, top - bottom
+        covering = {
+            **_camera_constants(camera),
+            "corner": (left, bottom),
+            "degree": kind.degree,
+            "lines": kind.lines,
+            "around": kind.around,
+            "guiding_angle": look.guiding_angle,
+        }
+        gbuffer = {
+            name: self._image(name, width, height) for name in ("normals", "values_seen", "slopes")
+        }
+        gbuffer["traits_seen"] = self._images["traits_seen"][1]
+        cells = self._image("cells", width, height)
+        ways = self._image("ways", width, height, "RGBA16F", kind.lines)
+        turning = self._image("turning", width, height, "RGBA16F", kind.lines)
+        deviations = kind.deviations
+        self.device.compute(
+            passes.FLOW,
+            size,
+            {**gbuffer, "noise": self._noise(width, height, look)},
+            {"cells": cells, "ways": ways},
+            {
+                **covering,
+                "to_pixels": _to_pixels(camera),
+                "aligned": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
+                "foreshorten": int(look.foreshorten),
+                "harmonics": len(deviations),
+                "lowest": deviations[0] if deviations else 0,
+            },
+        )
+        read = {"cells": cells, "ways": ways}
+        self.device.compute(
+            passes.TURNING, (*size, kind.lines), read, {"turning": turning}, covering
+        )
+        drives = DRIVES[look.magnitude]
+        textures = {
+            **gbuffer,
+            "cells": cells,
+            "turning": turning,
+            "largest": self._largest(gbuffer["values_seen"], width, height, kind.degree)
+            if drives and not look.magnitude_range
+            else cells,
+            "colours": self._table(
+                "colours", look.colour_map, lambda: colour_stops(look.colour_map)
+            ),
+            "palette": self._table("palette", None, lambda: PALETTE),
+            "lights": self._light_table(lights if look.light == "scene" else ()),
+        }
+        constants = {**covering, **_look_constants(kind, look, len(lights))}
+        steps = size[0] * kind.lines * 2 * constants["walk_length"]
+        rows = max(MOST_STEPS // max(steps, 1), 8)
+        for start in range(bottom, top, rows):
+            constants["corner"] = (left, start)
+            part = size[0], min(rows, top - start)
+            self.device.compute(passes.WALK, part, textures, {"picture": picture}, constants)
+
+    def _averaged(self, fine: Any, camera: Camera, side: int) -> Any:
+        width, height = camera.width // side, camera.height // side
+        picture = self._image("averaged", width, height)
+        self.device.compute(
+            passes.AVERAGE, (width, height), {"fine": fine}, {"picture": picture}, {"side": side}
+        )
+        return picture
+
+    def _largest(self, values: Any, width: int, height: int, degree: int) -> Any:
+        """A texture of one texel: the largest magnitude of the fields of a degree."""
+        number, first = 0, 1
+        while (width, height) != (1, 1) or first:
+            width, height = -(-width // 16), -(-height // 16)
+            tiles = self._image(f"tiles {number}", width, height)
+            self.device.compute(
+                passes.LARGEST,
+                (width, height),
+                {"magnitudes": values},
+                {"tiles": tiles},
+                {"degree": degree, "first_time": first},
+            )
+            values, number, first = tiles, number + 1, 0
+        return values
+
+    # --- what is kept on the device -------------------------------------------------------------
+
+    def _image(
+        self, name: str, width: int, height: int, kind: str = "RGBA32F", layers: int = 0
+    ) -> Any:
+        """The image of a name, made anew if it is of another size."""
+        key = width, height, kind, layers
+        if name not in self._images or self._images[name][0] != key:
+            self._images[name] = key, self.device.texture(width, height, kind, layers)
+        return self._images[name][1]
+
+    def _depth(self, width: int, height: int) -> Any:
+        key = width, height
+        if "depth" not in self._images or self._images["depth"][0] != key:
+            self._images["depth"] = key, self.device.depth(width, height)
+        return self._images["depth"][1]
+
+    def _table(self, name: str, key: Any, make: Any) -> Any:
+        """A row of colours as a texture, made anew if its key is another."""
+        if name not in self._tables or self._tables[name][0] != key:
+            rgb = np.asarray(make(), dtype=np.float32)
+            data = np.ones((1, len(rgb), 4), dtype=np.float32)
+            data[0, :, :3] = rgb
+            self._tables[name] = key, self.device.texture(len(rgb), 1, "RGBA32F", data=data)
+        return self._tables[name][1]
+
+    def _light_table(self, lights: Sequence[Light]) -> Any:
+        data = np.zeros((max(len(lights), 1), 2, 4), dtype=np.float32)
+        for row, light in zip(data, lights, strict=False):
+            row[0, :3], row[0, 3] = light.vector, light.kind != "sun"
+            row[1, :3] = np.asarray(light.colour) * light.strength
+        key = data.tobytes()
+        if "lights" not in self._tables or self._tables["lights"][0] != key:
+            texture = self.device.texture(2, len(data), "RGBA32F", data=data)
+            self._tables["lights"] = key, texture
+        return self._tables["lights"][1]
+
+    def _noise(self, width: int, height: int, look: Look) -> Any:
+        """Noise for a frame of this size at least: it is the same for all of them."""
+        look = scaled_look(look)
+        channels = 3 if look.noise == "colour" else 1
+        key = look.grain, look.seed, channels, look.density, look.high_pass
+        kept = self._tables.get("noise")
+        if kept is None or kept[0][0] != key or width > kept[0][1] or height > kept[0][2]:
+            width, height = (-(-side // TILE) * TILE for side in (width, height))
+            pixel = np.arange(width * height, dtype=np.int32)
+            found = image_noise(
+                pixel,
+                width,
+                look.grain,
+                look.seed,
+                channels,
+                density=look.density,
+                high_pass=look.high_pass,
+            )
+            data = np.zeros((height, width, 4), dtype=np.float32)
+            data[:, :, :channels] = found.reshape(height, width, channels)
+            texture = self.device.texture(width, height, "RGBA32F", data=data)
+            kept = self._tables["noise"] = ((key, width, height), texture)
+        return kept[1]
+
+
+def on_clip(entry: Placed, camera: Camera, planes: np.ndarray) -> dict[str, tuple[float, ...]]:
+    """Where a body's corners lie in clip space, and beside which planes, as a shader takes it."""
+    clip = camera.projection @ camera.view @ entry.moving
+    constants = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
+    own = np.asarray(planes) @ entry.moving
+    constants.update({f"plane{number}": tuple(row) for number, row in enumerate(own)})
+    return constants
+
+
+def _camera_constants(camera: Camera) -> dict[str, Any]:
+    projection = camera.projection
+    shift = projection[:2, 2] if camera.is_perspective else -projection[:2, 3]
+    return {
+        "across": tuple(camera.across_axis.ravel()),
+        "shift": tuple(shift),
+        "perspective": int(camera.is_perspective),
+    }
+
+
+def _to_pixels(camera: Camera) -> tuple[float, ...]:
+    """As in `steps.screen_axes`."""
+    across = camera.projection[:2, :2] * [[camera.width], [camera.height]]
+    return tuple((across / (2 * camera.pixels_per_unit)).ravel())
+
+
+def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
+    """What of a look is told to the shader that walks, lengths in the pixels of the fine frame."""
+    finer = scaled_look(look)
+    full = (2 * finer.length + 1) * finer.step
+    _, crossing = streak_statistics(full, finer.grain, finer.high_pass, kind.lines)
+    gain = averaging_gain(finer) if look.supersampling > 1 else 1.0
+    return {
+        "walk_length": finer.length,
+        "step_length": finer.step,
+        "grain": finer.grain,
+        "crossing": crossing,
+        "gain": look.gain * gain,
+        "channels": 3 if look.noise == "colour" else 1,
+        "families": kind.families if look.hue == "families" else 1,
+        "family_layer": len(kind.layers) - 1,
+        "sharpness": SHARPNESS / expected_deviation(finer),
+        "magnitude_drives": DRIVES[look.magnitude],
+        "largest_known": look.magnitude_range,
+        "shading": look.shading,
+        "headlight": int(look.light == "headlight"),
+        "light_count": lights,
+    }
+
+
+Box = tuple[int, int, int, int]
+
+
+def _window(entry: Placed, camera: Camera) -> Box:
+    """Left, bottom, right and top of the pixels that a body may cover."""
+    points = np.concatenate([entry.shape.shape.bounds, np.ones((8, 1))], axis=1)
+    clip = points @ (camera.projection @ camera.view @ entry.moving).T
+    if (clip[:, 3] <= 0).any() or (clip[:, 2] < -clip[:, 3]).any():
+        return 0, 0, camera.width, camera.height
+    ends = clip[:, :2] / clip[:, 3:] * 0.5 + 0.5
+    size = np.array([camera.width, camera.height])
+    low = np.clip(np.floor(ends.min(axis=0) * size), 0, size).astype(int)
+    high = np.clip(np.ceil(ends.max(axis=0) * size), 0, size).astype(int)
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def _around(boxes: Sequence[Box]) -> Box:
+    left, bottom, right, top = zip(*boxes, strict=True)
+    return min(left), min(bottom), max(right), max(top)

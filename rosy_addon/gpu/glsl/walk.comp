@@ -1,0 +1,152 @@
+// The picture: along each line through a pixel, both ways, the mean of the noise; the mean of these
+// with the contrast of one; ink and light. A streamline's state is a pixel and a sheet of the
+// covering surface (`covering`), and each step is of Adams and Bashforth's second order.
+
+#define MEAN 0.5
+
+struct Half {
+  vec3 total;
+  float count;
+};
+
+// The noise along one half of the streamline that leaves a pixel on a sheet, without the start.
+Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
+{
+  Half found;
+  found.total = vec3(0.0);
+  found.count = 0.0;
+  vec2 offset = vec2(0.0), before = vec2(0.0);
+  for (int count = 0; count < steps; ++count) {
+    bool opposite = sheet >= lines;
+    vec4 way = texelFetch(turning, ivec3(pixel, opposite ? sheet - lines : sheet), 0);
+    vec2 ahead = way.xy + dot(way.zw, offset) * vec2(-way.y, way.x);
+    ahead *= opposite ? -sign_ : sign_;
+    offset += step_length * (count == 0 ? ahead : 1.5 * ahead - 0.5 * before);
+    before = ahead;
+    // No further than a neighbour, however sharply the direction turned.
+    vec2 whole = clamp(round(offset), -1.0, 1.0);
+    offset -= whole;
+    ivec2 move = ivec2(whole);
+    int bit = move.x + 3 * move.y + 4;
+    if (((joined_to(cell.x) >> bit) & 1) == 0) {
+      break;
+    }
+    if (bit != 4) {
+      pixel += move;
+      float turn = cell.x;
+      cell = texelFetch(cells, pixel, 0);
+      // k' = k + round((t(p) - t(q)) S / 2 pi) mod S
+      sheet += int(round(turn - cell.x));
+      sheet -= around * int(floor(float(sheet) / float(around)));
+    }
+    found.total += cell.yzw;
+    found.count += 1.0;
+  }
+  return found;
+}
+
+vec3 mapped_colour(float value)
+{
+  int last = textureSize(colours, 0).x - 1;
+  float place = clamp(value, 0.0, 1.0) * float(last);
+  int below = min(int(place), last - 1);
+  vec3 low = texelFetch(colours, ivec2(below, 0), 0).xyz;
+  vec3 high = texelFetch(colours, ivec2(below + 1, 0), 0).xyz;
+  return mix(low, high, place - float(below));
+}
+
+// The hue of a line: that of the family it belongs to (`hues.family_hues`).
+vec3 hue_of_line(int line, vec2 z, vec2 stored)
+{
+  // Of odd degree every other line is a member's opposite half.
+  float opposite = (around > degree && degree % 2 == 1 && line % 2 == 1) ? 0.5 * TAU : 0.0;
+  float at = atan(z.y, z.x) / float(degree) + guiding_angle + opposite;
+  at += TAU * float(line) / float(around);
+  int order = degree / families;
+  vec2 ahead = times(vec2(cos(at * float(order)), sin(at * float(order))), conjugate(stored));
+  int family = int(round(atan(ahead.y, ahead.x) * float(families) / TAU));
+  family -= families * int(floor(float(family) / float(families)));
+  return texelFetch(palette, ivec2(family % textureSize(palette, 0).x, 0), 0).xyz;
+}
+
+// What Lambert's law leaves (`shading.diffuse`). A light is two texels: where it is or, for a sun
+// (w = 0), the direction to it; and its colour times its strength.
+vec3 diffuse(vec3 normal, vec3 position, vec3 toward_eye)
+{
+  vec3 light = vec3(0.0);
+  if (headlight != 0) {
+    light = vec3(max(dot(normal, toward_eye), 0.0));
+  }
+  else {
+    for (int number = 0; number < light_count; ++number) {
+      vec4 source = texelFetch(lights, ivec2(0, number), 0);
+      vec3 colour = texelFetch(lights, ivec2(1, number), 0).xyz;
+      vec3 way = source.w == 0.0 ? source.xyz : source.xyz - position;
+      float squared = source.w == 0.0 ? 1.0 : max(dot(way, way), 1e-12);
+      light += colour * max(dot(normal, unit_or_zero(way)), 0.0) / squared;
+    }
+  }
+  return 1.0 - shading + shading * light;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + corner;
+  ivec2 frame = imageSize(picture);
+  if (any(greaterThanEqual(pixel, frame))) {
+    return;
+  }
+  vec4 cell = texelFetch(cells, pixel, 0);
+  if (cell.x == 0.0) {
+    return;
+  }
+  vec4 value = texelFetch(values_seen, pixel, 0);
+  float relative = 1.0;
+  if (magnitude_drives != 0) {
+    float top = largest_known > 0.0 ? largest_known : texelFetch(largest, ivec2(0), 0).x;
+    relative = min(length(value.xy) / (top > 0.0 ? top : 1.0), 1.0);
+  }
+  int steps = magnitude_drives >= 2 ? int(round(float(walk_length) * relative)) : walk_length;
+  float full = float(2 * walk_length + 1);
+
+  vec2 stored = families > 1 ? texelFetch(traits_seen, ivec3(pixel, family_layer), 0).xy : vec2(0.0);
+  float toward = float(degree) * guiding_angle;
+  vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
+  vec3 blend = vec3(0.0), hue = vec3(0.0);
+  float samples = 0.0, weights = 0.0;
+  for (int line = 0; line < lines; ++line) {
+    bool paired = around == 2 * lines;
+    Half ahead = followed(pixel, line, 1.0, cell, steps);
+    Half behind = followed(pixel, paired ? line + lines : line, paired ? 1.0 : -1.0, cell, steps);
+    float count = 1.0 + ahead.count + behind.count;
+    vec3 mean = (cell.yzw + ahead.total + behind.total) / count;
+    // Streamlines that ended early get the spread of whole ones (`contrast.even_out`).
+    mean = (mean - MEAN) * sqrt(count / full) * min(0.5 * count * step_length / grain, 1.0);
+    blend += mean;
+    samples += count;
+    if (families > 1) {
+      float weight = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
+      hue += weight * hue_of_line(line, z, stored);
+      weights += weight;
+    }
+  }
+  blend /= float(lines);
+  samples /= float(lines);
+  // The mean of M images has the contrast of one (equation 6, `contrast.blend_gain`).
+  float shared_ = clamp(crossing * full / samples, 0.0, float(lines - 1));
+  blend *= gain * sqrt(float(lines) / (1.0 + shared_));
+  vec3 tone = channels == 1 ? blend.xxx : blend;
+  vec3 ink = tone + MEAN;
+  if (magnitude_drives == 1 || magnitude_drives == 3) {
+    ink = mapped_colour(relative) * (1.0 + 1.5 * tone);
+  }
+  else if (families > 1) {
+    ink = hue / weights * (1.0 + 1.5 * tone);
+  }
+  vec4 normal = texelFetch(normals, pixel, 0);
+  vec2 ray = pixel_ray(pixel, vec2(frame), across, shift);
+  float depth = abs(normal.w);
+  vec3 position = vec3(ray * (perspective != 0 ? depth : 1.0), -depth);
+  vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
+  imageStore(picture, pixel, vec4(to_linear(ink) * light, 1.0));
+}

@@ -1,0 +1,212 @@
+"""The shaders, and what each of them reads and writes: all that a device has to be told.
+
+The sources stand beside this, in GLSL without declarations: these differ from one device to the
+next, and are made from what is listed here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+SOURCES = Path(__file__).with_name("glsl")
+
+#: Pixels of a work group, across and up.
+GROUP = (8, 8)
+
+#: Names and types of what a shader is told for one run.
+Constants = tuple[tuple[str, str], ...]
+
+_CLIP: Constants = tuple((f"clip_{axis}", "vec4") for axis in "xyzw")
+_PLANES: Constants = tuple((f"plane{number}", "vec4") for number in range(6))
+_WINDOW: Constants = (("corner", "ivec2"),)
+_CAMERA: Constants = (("across", "vec4"), ("shift", "vec2"), ("perspective", "int"))
+_COVERING: Constants = (("degree", "int"), ("lines", "int"), ("around", "int"))
+_GUIDE: Constants = (("guiding_angle", "float"),)
+
+
+@dataclass(frozen=True)
+class Compute:
+    """A shader over the pixels of an image.
+
+    Attributes
+    ----------
+    name : str
+        Of its source.
+    textures : tuple of str
+        What it reads; names that end in ``[]`` are arrays.
+    images : tuple of (str, str)
+        What it writes, and the format; names likewise.
+    constants : tuple of (str, str)
+        Names and GLSL types.
+    """
+
+    name: str
+    textures: tuple[str, ...]
+    images: tuple[tuple[str, str], ...]
+    constants: Constants
+
+    @property
+    def source(self) -> str:
+        """GLSL without declarations."""
+        return _read("common.glsl") + _read(f"{self.name}.comp")
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A shader over the triangles of a surface.
+
+    Attributes
+    ----------
+    name : str
+        Of its sources.
+    textures : tuple of str
+    varyings : tuple of (str, str)
+        From the vertices to the pixels: names and GLSL types.
+    target : str
+        What a pixel is given, a vec4.
+    constants : tuple of (str, str)
+    """
+
+    name: str
+    textures: tuple[str, ...]
+    varyings: Constants
+    target: str
+    constants: Constants
+
+    @property
+    def vertex_source(self) -> str:
+        """GLSL without declarations."""
+        return _read(f"{self.name}.vert")
+
+    @property
+    def fragment_source(self) -> str:
+        """GLSL without declarations."""
+        return _read("common.glsl") + _read(f"{self.name}.frag")
+
+
+def _read(name: str) -> str:
+    return (SOURCES / name).read_text(encoding="utf-8")
+
+
+_BEYOND: Constants = (("beyond", "vec4"), ("beyond_too", "vec2"))
+
+SEEN = Drawing(
+    "seen",
+    (),
+    (("triangle", "float"), *_BEYOND),
+    "seen",
+    (*_CLIP, *_PLANES, ("body", "float")),
+)
+
+RESOLVE = Compute(
+    "resolve",
+    ("seen", "triangles"),
+    (
+        ("normals", "RGBA32F"),
+        ("values_seen", "RGBA32F"),
+        ("slopes", "RGBA32F"),
+        ("traits_seen[]", "RGBA32F"),
+    ),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("pixels_per_unit", "float"),
+        ("place_x", "vec4"),
+        ("place_y", "vec4"),
+        ("place_z", "vec4"),
+        ("scale", "float"),
+        ("body", "float"),
+        ("texels", "int"),
+        ("traits", "int"),
+        ("STEEPEST", "float"),
+        ("TOLERANCE", "float"),
+        ("OBLIQUE_TOLERANCE", "float"),
+    ),
+)
+
+FLOW = Compute(
+    "flow",
+    ("normals", "values_seen", "slopes", "traits_seen[]", "noise"),
+    (("cells", "RGBA32F"), ("ways[]", "RGBA16F")),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        *_COVERING,
+        *_GUIDE,
+        ("to_pixels", "vec4"),
+        ("aligned", "float"),
+        ("foreshorten", "int"),
+        ("harmonics", "int"),
+        ("lowest", "int"),
+    ),
+)
+
+TURNING = Compute(
+    "turning",
+    ("cells", "ways[]"),
+    (("turning[]", "RGBA16F"),),
+    (*_WINDOW, *_COVERING[1:]),
+)
+
+WALK = Compute(
+    "walk",
+    (
+        "cells",
+        "turning[]",
+        "normals",
+        "values_seen",
+        "traits_seen[]",
+        "largest",
+        "colours",
+        "palette",
+        "lights",
+    ),
+    (("picture", "RGBA32F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        *_COVERING,
+        *_GUIDE,
+        ("walk_length", "int"),
+        ("step_length", "float"),
+        ("grain", "float"),
+        ("crossing", "float"),
+        ("gain", "float"),
+        ("channels", "int"),
+        ("families", "int"),
+        ("family_layer", "int"),
+        ("sharpness", "float"),
+        ("magnitude_drives", "int"),
+        ("largest_known", "float"),
+        ("shading", "float"),
+        ("headlight", "int"),
+        ("light_count", "int"),
+    ),
+)
+
+LARGEST = Compute(
+    "largest",
+    ("magnitudes",),
+    (("tiles", "RGBA32F"),),
+    (("degree", "int"), ("first_time", "int")),
+)
+
+AVERAGE = Compute("average", ("fine",), (("picture", "RGBA32F"),), (("side", "int"),))
+
+SHOW = Drawing(
+    "show",
+    ("picture",),
+    _BEYOND,
+    "shown",
+    (
+        *_CLIP,
+        *_PLANES,
+        ("nearer", "float"),
+        ("origin", "vec2"),
+        ("pixels", "vec2"),
+        ("opacity", "float"),
+    ),
+)
+
+ALL = (SEEN, RESOLVE, FLOW, TURNING, WALK, LARGEST, AVERAGE, SHOW)

@@ -1,0 +1,160 @@
+"""Surfaces and their fields as a device takes them: corners to draw, and a record a triangle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.directions import harmonics
+from ..field.frames import transformed
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..progress import drain
+from ..projection.carried import SIMILAR, Carried, Trait, carrying, order_of
+
+#: Texels of a row of the texture of records.
+ROW = 4096
+
+#: Texels of a record: three places, three normals, two of the representation; a trait has two more.
+PLACES, NORMALS, VALUES = 0, 3, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A surface that a device can draw, without where it stands.
+
+    Attributes
+    ----------
+    corners : (3 T, 4) float32 ndarray
+        Place of each corner of each triangle, and the triangle's number.
+    records : (rows, ROW, 4) float32 ndarray or None
+        What the pixels of a triangle are computed from, `texels` in a row each: see `_records`.
+        None without a field.
+    texels : int
+        Of a record.
+    bounds : (8, 3) float64 ndarray
+        Corners of the box around it.
+    """
+
+    corners: np.ndarray
+    records: np.ndarray | None
+    texels: int
+    bounds: np.ndarray
+
+
+def placement(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What of a body's place has a say in its shape, and what merely moves it.
+
+    Parameters
+    ----------
+    matrix : (4, 4) ndarray
+        Object to world space.
+
+    Returns
+    -------
+    linear : (3, 3) ndarray
+        The identity if the matrix does no more than turn, scale and shift: things that are moved
+        keep their shapes.
+    moving : (4, 4) ndarray
+        A rotation, a scale and a shift.
+    """
+    matrix = np.asarray(matrix, dtype=np.float64)
+    linear = matrix[:3, :3]
+    square = linear.T @ linear
+    scale = np.trace(square) / 3
+    mirrored = np.cross(linear[0], linear[1]) @ linear[2] <= 0
+    if mirrored or np.abs(square - scale * np.eye(3)).max() > SIMILAR * scale:
+        moving = np.eye(4)
+        moving[:3, 3] = matrix[:3, 3]
+        return linear, moving
+    return np.eye(3), matrix
+
+
+def traits_of(field: RosyField) -> list[Trait]:
+    """What a field has besides the representation."""
+    found: list[Trait] = [("deviation", j) for j in harmonics(field)]
+    if field.families > 1:
+        found.append(("family", field.families))
+    return found
+
+
+def shape_of(
+    surface: Surface,
+    linear: np.ndarray,
+    field: RosyField | None,
+    display: str,
+    layers: Sequence[Trait] = (),
+) -> Shape:
+    """A surface and its field as a device takes them.
+
+    Parameters
+    ----------
+    surface : Surface
+    linear : (3, 3) ndarray
+        Of `placement`.
+    field : RosyField or None
+        None for what only hides others.
+    display : {"smooth", "flat"}
+    layers : sequence of Trait
+        What each layer of the image of traits holds: that of all fields of this degree.
+    """
+    points = transformed(np.ascontiguousarray(surface.vertices.T), linear)
+    places = points.astype(np.float32).take(surface.triangle_vertex, axis=1)
+    count = places.shape[1]
+    corners = np.empty((count, 3, 4), dtype=np.float32)
+    corners[:, :, :3] = places.transpose(1, 2, 0)
+    corners[:, :, 3] = np.arange(count, dtype=np.float32)[:, None]
+    records, texels = None, 0
+    if field is not None:
+        matrix = np.eye(4)
+        matrix[:3, :3] = linear
+        carried = drain(carrying(surface, matrix, field, display))
+        records = _records(corners, carried, field.degree, layers)
+        texels = records.shape[1]
+        records = _in_rows(records)
+    return Shape(corners.reshape(-1, 4), records, texels, _box(points))
+
+
+def _records(
+    corners: np.ndarray, carried: Carried, degree: int, layers: Sequence[Trait]
+) -> np.ndarray:
+    """(T, texels, 4) float32.
+
+    Texels 0 to 2 are the places of the corners, 3 to 5 the normals there, 6 and 7 the values of the
+    representation there as `Carried.z` has them, with the power of the frame that they turn with;
+    then two texels a trait, with its power and its layer.
+    """
+    records = np.zeros((len(corners), VALUES + 2 * (1 + len(layers)), 4), dtype=np.float32)
+    records[:, PLACES:NORMALS, :3] = corners[:, :, :3]
+    records[:, NORMALS:VALUES, :3] = carried.normal.transpose(2, 0, 1)
+    _put_values(records, VALUES, carried.z, degree, 0)
+    for layer, trait in enumerate(layers):
+        # A RoSy deviates from itself by the factor 1.
+        usual = np.full_like(carried.z, 1 if trait == ("deviation", 0) else 0)
+        values = carried.traits.get(trait, usual)
+        _put_values(records, VALUES + 2 + 2 * layer, values, order_of(trait, degree), layer)
+    return records
+
+
+def _put_values(records: np.ndarray, at: int, values: np.ndarray, order: int, layer: int) -> None:
+    for corner, z in enumerate(values):
+        texel, column = at + corner // 2, corner % 2 * 2
+        records[:, texel, column], records[:, texel, column + 1] = z.real, z.imag
+    records[:, at + 1, 2], records[:, at + 1, 3] = order, layer
+
+
+def _in_rows(records: np.ndarray) -> np.ndarray:
+    """(rows, ROW, 4): the same numbers as a picture."""
+    flat = records.reshape(-1, 4)
+    rows = np.zeros((max(-(-len(flat) // ROW), 1) * ROW, 4), dtype=np.float32)
+    rows[: len(flat)] = flat
+    return rows.reshape(-1, ROW, 4)
+
+
+def _box(points: np.ndarray) -> np.ndarray:
+    """(8, 3) corners of the box around (3, V) points."""
+    ends = np.stack([points.min(axis=1), points.max(axis=1)])
+    which = np.indices((2, 2, 2)).reshape(3, 8)
+    return np.stack([ends[which[axis], axis] for axis in range(3)], axis=1)

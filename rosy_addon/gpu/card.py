@@ -7,7 +7,7 @@ that which a processor lacks, so no averages are shared between neighbours.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..compositor.noise import image_noise, streak_statistics
 from ..compositor.shading import Light
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..progress import Progress, Work, drain, part
 from ..projection.camera import Camera
 from ..projection.carried import Trait
 from ..projection.gbuffer import Body
@@ -35,6 +36,9 @@ TILE = 256
 
 #: Steps of all streamlines that one run of the shader may take: drivers give up on long ones.
 MOST_STEPS = 1 << 29
+
+#: So many times may bodies be placed before an image that nobody draws in is given up.
+LASTING = 8
 
 #: How the magnitude of the field drives a look, for the shader.
 DRIVES = {"none": 0, "colour": 1, "length": 2, "both": 3}
@@ -121,7 +125,8 @@ class Card:
     def __init__(self, device: Device) -> None:
         self.device = device
         self._shapes: dict[tuple, _OnCard] = {}
-        self._images: dict[str, tuple[tuple, Any]] = {}
+        self._images: dict[tuple, Any] = {}
+        self._used: dict[tuple, int] = {}
         self._tables: dict[str, tuple[Any, Any]] = {}
         self._drawn = 0
 
@@ -133,9 +138,8 @@ class Card:
 
     def release(self) -> None:
         """Let go of everything."""
-        self._shapes.clear()
-        self._images.clear()
-        self._tables.clear()
+        for kept in (self._shapes, self._images, self._used, self._tables):
+            kept.clear()
 
     def place(self, bodies: Sequence[Body], display: str) -> list[Placed]:
         """Bring bodies to the card, but for shapes that are there; those not among them go.
@@ -146,6 +150,7 @@ class Card:
         display : {"smooth", "flat"}
         """
         self._drawn += 1
+        self._forget_unused()
         kinds = kinds_of(body.field for body in bodies if body.field is not None)
         placed = [self._placed(body, display, kinds) for body in bodies]
         for key in [key for key, entry in self._shapes.items() if entry.used != self._drawn]:
@@ -177,15 +182,16 @@ class Card:
             records = self.device.texture(width, height, "RGBA32F", data=shape.records)
         return _OnCard(shape, self.device.batch(shape.corners), records, (surface, field))
 
-    def draw(
+    def drawing(
         self,
         placed: Sequence[Placed],
         camera: Camera,
         look: Look,
         lights: Sequence[Light] = (),
         planes: np.ndarray | None = None,
-    ) -> Any:
-        """A picture of bodies.
+        name: Hashable = None,
+    ) -> Work[Any]:
+        """A picture of bodies, in steps after each of which something else may be drawn.
 
         Parameters
         ----------
@@ -198,27 +204,46 @@ class Card:
         lights : sequence of Light
         planes : (6, 4) ndarray, optional
             World space; what is on their negative side is cut away.
+        name : hashable
+            Pictures of one name and size are drawn over each other.
 
         Returns
         -------
         texture
-            (H, W, 4) linear, as `Picture.rgba`. Kept by the card, and drawn over next time.
+            (H, W, 4) linear, as `Picture.rgba`. Kept by the card for a while.
         """
+        yield Progress(0.0, "finding what is seen")
         self._project(placed, camera, NO_PLANES if planes is None else planes)
-        fine = self._image("picture", camera.width, camera.height)
+        whole = look.supersampling == 1
+        fine = self._image(("picture", name if whole else None), camera.width, camera.height)
         self.device.clear(fine)
         boxes = [_window(entry, camera) for entry in placed]
         fields = [entry.field for entry in placed if entry.field is not None]
-        for degree, kind in kinds_of(fields).items():
+        kinds = kinds_of(fields)
+        for number, (degree, kind) in enumerate(kinds.items()):
             own = [
                 box
                 for box, entry in zip(boxes, placed, strict=True)
                 if entry.field is not None and entry.field.degree == degree
             ]
-            self._compose(kind, _around(own), camera, look, lights, fine)
-        if look.supersampling == 1:
+            work = self._composing(kind, _around(own), camera, look, lights, fine)
+            start, stop = number / len(kinds), (number + 1) / len(kinds)
+            yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
+        if whole:
             return fine
-        return self._averaged(fine, camera, look.supersampling)
+        return self._averaged(fine, camera, look.supersampling, name)
+
+    def draw(
+        self,
+        placed: Sequence[Placed],
+        camera: Camera,
+        look: Look,
+        lights: Sequence[Light] = (),
+        planes: np.ndarray | None = None,
+        name: Hashable = None,
+    ) -> Any:
+        """`drawing`, run to its end."""
+        return drain(self.drawing(placed, camera, look, lights, planes, name))
 
     def read(self, picture: Any, width: int, height: int) -> np.ndarray:
         """(H, W, 4) float32: what `draw` has drawn."""
@@ -243,11 +268,16 @@ class Card:
         values = self._image("values_seen", width, height)
         self.device.clear(values)
         layers = max((entry.shape.shape.texels - 8) // 2 for entry in placed)
+        self._traits = (
+            self._image("traits_seen", width, height, layers=layers)
+            if layers > 0
+            else self._image("traits_seen", 1, 1, layers=1)
+        )
         images = {
             "normals": self._image("normals", width, height),
             "values_seen": values,
             "slopes": self._image("slopes", width, height),
-            "traits_seen": self._image("traits_seen", width, height, layers=max(layers, 1)),
+            "traits_seen": self._traits,
         }
         shared = {
             **_camera_constants(camera),
@@ -280,7 +310,7 @@ class Card:
                 constants,
             )
 
-    def _compose(
+    def _composing(
         self,
         kind: Kind,
         window: tuple[int, int, int, int],
@@ -288,7 +318,7 @@ class Card:
         look: Look,
         lights: Sequence[Light],
         picture: Any,
-    ) -> None:
+    ) -> Work[None]:
         """Draw the fields of one kind into the picture."""
         width, height = camera.width, camera.height
         left, bottom, right, top = window
@@ -304,7 +334,7 @@ class Card:
         gbuffer = {
             name: self._image(name, width, height) for name in ("normals", "values_seen", "slopes")
         }
-        gbuffer["traits_seen"] = self._images["traits_seen"][1]
+        gbuffer["traits_seen"] = self._traits
         cells = self._image("cells", width, height)
         ways = self._image("ways", width, height, "RGBA16F", kind.lines)
         turning = self._image("turning", width, height, "RGBA16F", kind.lines)
@@ -346,12 +376,13 @@ class Card:
         rows = max(MOST_STEPS // max(steps, 1), 8)
         for start in range(bottom, top, rows):
             constants["corner"] = (left, start)
-            part = size[0], min(rows, top - start)
-            self.device.compute(passes.WALK, part, textures, {"picture": picture}, constants)
+            band = size[0], min(rows, top - start)
+            self.device.compute(passes.WALK, band, textures, {"picture": picture}, constants)
+            yield Progress((start + rows - bottom) / (top - bottom), "following streamlines")
 
-    def _averaged(self, fine: Any, camera: Camera, side: int) -> Any:
+    def _averaged(self, fine: Any, camera: Camera, side: int, name: Hashable) -> Any:
         width, height = camera.width // side, camera.height // side
-        picture = self._image("averaged", width, height)
+        picture = self._image(("picture", name), width, height)
         self.device.compute(
             passes.AVERAGE, (width, height), {"fine": fine}, {"picture": picture}, {"side": side}
         )
@@ -376,19 +407,25 @@ class Card:
     # --- what is kept on the device -------------------------------------------------------------
 
     def _image(
-        self, name: str, width: int, height: int, kind: str = "RGBA32F", layers: int = 0
+        self, name: Hashable, width: int, height: int, kind: str = "RGBA32F", layers: int = 0
     ) -> Any:
-        """The image of a name, made anew if it is of another size."""
-        key = width, height, kind, layers
-        if name not in self._images or self._images[name][0] != key:
-            self._images[name] = key, self.device.texture(width, height, kind, layers)
-        return self._images[name][1]
+        """The image of a name and size."""
+        key = name, width, height, kind, layers
+        return self._kept(key, lambda: self.device.texture(width, height, kind, layers))
 
     def _depth(self, width: int, height: int) -> Any:
-        key = width, height
-        if "depth" not in self._images or self._images["depth"][0] != key:
-            self._images["depth"] = key, self.device.depth(width, height)
-        return self._images["depth"][1]
+        return self._kept(("depth", width, height), lambda: self.device.depth(width, height))
+
+    def _kept(self, key: tuple, make: Callable[[], Any]) -> Any:
+        if key not in self._images:
+            self._images[key] = make()
+        self._used[key] = self._drawn
+        return self._images[key]
+
+    def _forget_unused(self) -> None:
+        """Let go of images of sizes that nobody has drawn in for a while."""
+        for key in [key for key, used in self._used.items() if used < self._drawn - LASTING]:
+            del self._images[key], self._used[key]
 
     def _table(self, name: str, key: Any, make: Any) -> Any:
         """A row of colours as a texture, made anew if its key is another."""

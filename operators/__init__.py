@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..rosy_addon import live
 from ..rosy_addon.ui import overlay
 from . import (
     bake,
@@ -18,6 +19,7 @@ from . import (
     singularities,
     ticking,
     turntable,
+    viewport,
 )
 
 MODULES = (
@@ -29,6 +31,7 @@ MODULES = (
     bake,
     bake_animation,
     turntable,
+    viewport,
     show,
     remove,
     preset_apply,
@@ -46,6 +49,7 @@ def unregister() -> None:
     """Take them away again, ending work under way."""
     ticking.stop_running()
     overlay.hide()
+    live.stop()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

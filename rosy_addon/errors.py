@@ -1,4 +1,4 @@
-"""The one exception that users see as a line of text."""
+"""The exceptions that users see as a line of text."""
 
 
 class RosyError(ValueError):
@@ -7,3 +7,11 @@ class RosyError(ValueError):
     The message names the thing (object, attribute, file and line), what was found and what
     was wanted. Operators report it, the command line prints it and exits with status 2.
     """
+
+
+class NothingInViewError(RosyError):
+    """A camera sees none of the RoSy objects."""
+
+
+class DeviceError(RosyError):
+    """There is no graphics card to draw with, or it does not take the shaders."""

@@ -67,8 +67,9 @@ def family_hues(flow: Flow, images: Images, look: Look) -> np.ndarray | None:
     total = np.zeros((len(flow.pixel), 3), dtype=np.float32)
     members = all_members(flow, look.guiding_angle)[: flow.lines]
     for member, weight in zip(members, stands_out, strict=True):
-        # The angle from the stored line, in units of that between neighbouring ones.
-        ahead = member.astype(np.complex128) ** (flow.degree // families) * stored.conj()
+        # The angle from the stored line, in units of that between neighbouring ones. Where no line
+        # is stored it is 0: the sum has no -0, whose angle is pi.
+        ahead = member.astype(np.complex128) ** (flow.degree // families) * stored.conj() + 0
         family = np.rint(np.angle(ahead) * (families / (2 * np.pi))).astype(np.intp) % families
         total += weight[:, None] * PALETTE.take(family, axis=0)
     return total / stands_out.sum(axis=0)[:, None]

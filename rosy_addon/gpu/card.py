@@ -20,6 +20,7 @@ from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
 from ..compositor.noise import image_noise, streak_statistics
 from ..compositor.shading import Light
+from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..progress import Progress, Work, drain, part
@@ -29,7 +30,8 @@ from ..projection.gbuffer import Body
 from ..projection.steps import OBLIQUE_TOLERANCE, STEEPEST, TOLERANCE
 from . import passes
 from .device import Device
-from .shapes import Shape, placement, shape_of, traits_of
+from .passes import GROUP
+from .shapes import Shape, placement, shape_of, shifting, traits_of
 
 #: The noise is made for whole tiles of so many pixels, so that a frame may grow a little.
 TILE = 256
@@ -37,11 +39,15 @@ TILE = 256
 #: Steps of all streamlines that one run of the shader may take: drivers give up on long ones.
 MOST_STEPS = 1 << 29
 
-#: So many times may bodies be placed before an image that nobody draws in is given up.
-LASTING = 8
+#: So many times may bodies be placed, for all views together, before images that nobody draws in are
+#: given up, and shapes that nobody shows: those of an animation are others in every frame.
+IMAGES_LAST, SHAPES_LAST = 32, 2
 
 #: How the magnitude of the field drives a look, for the shader.
 DRIVES = {"none": 0, "colour": 1, "length": 2, "both": 3}
+
+#: How much nearer to the eye than the surface its picture is shown, in normalised depth.
+NEARER = 2e-5
 
 #: Planes that clip nothing.
 NO_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
@@ -73,17 +79,17 @@ class Kind:
 
     degree: int
     layers: tuple[Trait, ...]
+    is_paired: bool
 
     @property
     def deviations(self) -> list[int]:
-        """j of the harmonics, which are the first layers."""
+        """j of the harmonics, which are the first layers; some of them may be 0 all over."""
         return [number for kind, number in self.layers if kind == "deviation"]
 
     @property
     def lines(self) -> int:
         """M, as `Flow.lines`."""
-        paired = self.degree % 2 == 0 and not any(j % 2 for j in self.deviations)
-        return self.degree // 2 if paired else self.degree
+        return self.degree // 2 if self.is_paired else self.degree
 
     @property
     def around(self) -> int:
@@ -99,19 +105,21 @@ class Kind:
 
 def kinds_of(fields: Iterable[RosyField]) -> dict[int, Kind]:
     """The kinds of some fields, by degree."""
-    traits: dict[int, set[Trait]] = {}
+    traits: dict[int, list[Trait]] = {}
     for field in fields:
-        traits.setdefault(field.degree, set()).update(traits_of(field))
-    return {degree: Kind(degree, _layers(found)) for degree, found in sorted(traits.items())}
+        traits.setdefault(field.degree, []).extend(traits_of(field))
+    return {degree: _kind(degree, found) for degree, found in sorted(traits.items())}
 
 
-def _layers(found: set[Trait]) -> tuple[Trait, ...]:
-    """Deviations without a gap, then one trait of families."""
+def _kind(degree: int, found: Sequence[Trait]) -> Kind:
+    """Deviations without a gap, then one trait of families: the first, as in `hues`."""
     orders = [number for kind, number in found if kind == "deviation"]
     layers: list[Trait] = []
     if orders:
         layers = [("deviation", j) for j in range(min(orders), max(orders) + 1)]
-    return (*layers, *sorted(trait for trait in found if trait[0] == "family")[:1])
+    layers += [trait for trait in found if trait[0] == "family"][:1]
+    # Of what is there: odd orders that only fill a gap do not part a direction and its opposite.
+    return Kind(degree, tuple(layers), degree % 2 == 0 and not any(j % 2 for j in orders))
 
 
 class Card:
@@ -120,7 +128,17 @@ class Card:
     Parameters
     ----------
     device : Device
+
+    Attributes
+    ----------
+    coarseness : (int, int)
+        Pixels of a view for one of its picture, each way: while things move, and when they rest.
+    sees_others : bool
+        Whether it has to be given what hides the fields: a view's depth does that.
     """
+
+    coarseness = 2, 1
+    sees_others = False
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -142,7 +160,7 @@ class Card:
             kept.clear()
 
     def place(self, bodies: Sequence[Body], display: str) -> list[Placed]:
-        """Bring bodies to the card, but for shapes that are there; those not among them go.
+        """Bring bodies to the card, but for shapes that are there.
 
         Parameters
         ----------
@@ -153,7 +171,8 @@ class Card:
         self._forget_unused()
         kinds = kinds_of(body.field for body in bodies if body.field is not None)
         placed = [self._placed(body, display, kinds) for body in bodies]
-        for key in [key for key, entry in self._shapes.items() if entry.used != self._drawn]:
+        unused = self._drawn - SHAPES_LAST
+        for key in [key for key, entry in self._shapes.items() if entry.used < unused]:
             del self._shapes[key]
         return placed
 
@@ -165,7 +184,7 @@ class Card:
             self._shapes[key] = self._brought(body.surface, linear, body.field, display, layers)
         entry = self._shapes[key]
         entry.used = self._drawn
-        return Placed(entry, body.field, moving)
+        return Placed(entry, body.field, moving @ shifting(entry.shape.centre))
 
     def _brought(
         self,
@@ -179,8 +198,18 @@ class Card:
         records = None
         if shape.records is not None:
             height, width = shape.records.shape[:2]
+            if height > self.device.largest:
+                raise RosyError(
+                    f"{surface.name}: {len(surface.triangles)} triangles are too many for this "
+                    "graphics card"
+                )
             records = self.device.texture(width, height, "RGBA32F", data=shape.records)
         return _OnCard(shape, self.device.batch(shape.corners), records, (surface, field))
+
+    def covered(self, placed: Sequence[Placed], camera: Camera) -> int:
+        """How many pixels are looked at to draw bodies, at most."""
+        left, bottom, right, top = _around([_window(entry, camera) for entry in placed])
+        return (right - left) * (top - bottom)
 
     def drawing(
         self,
@@ -212,6 +241,11 @@ class Card:
         texture
             (H, W, 4) linear, as `Picture.rgba`. Kept by the card for a while.
         """
+        if max(camera.width, camera.height) > self.device.largest:
+            raise RosyError(
+                f"a picture of {camera.width} x {camera.height} pixels, subpixels counted, is too "
+                f"large for this graphics card, which draws up to {self.device.largest}"
+            )
         yield Progress(0.0, "finding what is seen")
         self._project(placed, camera, NO_PLANES if planes is None else planes)
         whole = look.supersampling == 1
@@ -226,7 +260,10 @@ class Card:
                 for box, entry in zip(boxes, placed, strict=True)
                 if entry.field is not None and entry.field.degree == degree
             ]
-            work = self._composing(kind, _around(own), camera, look, lights, fine)
+            around = _around(own)
+            if _is_empty(around):
+                continue
+            work = self._composing(kind, around, camera, look, lights, fine)
             start, stop = number / len(kinds), (number + 1) / len(kinds)
             yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
         if whole:
@@ -244,6 +281,43 @@ class Card:
     ) -> Any:
         """`drawing`, run to its end."""
         return drain(self.drawing(placed, camera, look, lights, planes, name))
+
+    def show(
+        self,
+        picture: Any,
+        placed: Sequence[Placed],
+        camera: Camera,
+        planes: np.ndarray | None = None,
+        opacity: float = 1.0,
+    ) -> None:
+        """Draw the surfaces with a picture on them into the view that is being drawn.
+
+        Parameters
+        ----------
+        picture : texture
+            From `drawing`, of any size.
+        placed, camera, planes
+            As it was drawn with.
+        opacity : float
+        """
+        left, bottom, width, height = self.device.viewport()
+        planes = NO_PLANES if planes is None else planes
+        constants = {
+            "nearer": NEARER,
+            "origin": (float(left), float(bottom)),
+            "pixels": (picture.width / width, picture.height / height),
+            "opacity": opacity,
+        }
+        batches = [
+            (entry.shape.batch, on_clip(entry, camera, planes))
+            for entry in placed
+            if entry.field is not None
+        ]
+        self.device.draw_over(passes.SHOW, batches, {"picture": picture}, constants)
+
+    def wait(self) -> None:
+        """Until all that was asked for is done."""
+        self.device.read(self._table("palette", None, lambda: PALETTE), len(PALETTE), 1)
 
     def read(self, picture: Any, width: int, height: int) -> np.ndarray:
         """(H, W, 4) float32: what `draw` has drawn."""
@@ -267,7 +341,7 @@ class Card:
         self.device.draw(passes.SEEN, batches, (seen, depth), {})
         values = self._image("values_seen", width, height)
         self.device.clear(values)
-        layers = max((entry.shape.shape.texels - 8) // 2 for entry in placed)
+        layers = max(((entry.shape.shape.texels - 8) // 2 for entry in placed), default=0)
         self._traits = (
             self._image("traits_seen", width, height, layers=layers)
             if layers > 0
@@ -289,7 +363,9 @@ class Card:
         for number, entry in enumerate(placed):
             if entry.field is None:
                 continue
-            left, bottom, right, top = _window(entry, camera)
+            left, bottom, right, top = box = _window(entry, camera)
+            if _is_empty(box):
+                continue
             place = camera.view @ entry.moving
             constants = {
                 **shared,
@@ -373,7 +449,8 @@ class Card:
         }
         constants = {**covering, **_look_constants(kind, look, len(lights))}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
-        rows = max(MOST_STEPS // max(steps, 1), 8)
+        # Whole groups: the last one of any other number would reach past what was prepared here.
+        rows = max(MOST_STEPS // max(steps, 1) // GROUP[1], 1) * GROUP[1]
         for start in range(bottom, top, rows):
             constants["corner"] = (left, start)
             band = size[0], min(rows, top - start)
@@ -424,7 +501,7 @@ class Card:
 
     def _forget_unused(self) -> None:
         """Let go of images of sizes that nobody has drawn in for a while."""
-        for key in [key for key, used in self._used.items() if used < self._drawn - LASTING]:
+        for key in [key for key, used in self._used.items() if used < self._drawn - IMAGES_LAST]:
             del self._images[key], self._used[key]
 
     def _table(self, name: str, key: Any, make: Any) -> Any:
@@ -528,7 +605,10 @@ def _window(entry: Placed, camera: Camera) -> Box:
     """Left, bottom, right and top of the pixels that a body may cover."""
     points = np.concatenate([entry.shape.shape.bounds, np.ones((8, 1))], axis=1)
     clip = points @ (camera.projection @ camera.view @ entry.moving).T
-    if (clip[:, 3] <= 0).any() or (clip[:, 2] < -clip[:, 3]).any():
+    behind = clip[:, 2] < -clip[:, 3]
+    if behind.all():
+        return 0, 0, 0, 0
+    if behind.any() or (clip[:, 3] <= 0).any():
         return 0, 0, camera.width, camera.height
     ends = clip[:, :2] / clip[:, 3:] * 0.5 + 0.5
     size = np.array([camera.width, camera.height])
@@ -537,6 +617,15 @@ def _window(entry: Placed, camera: Camera) -> Box:
     return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _around(boxes: Sequence[Box]) -> Box:
+def _is_empty(box: Box) -> bool:
+    left, bottom, right, top = box
+    return left >= right or bottom >= top
+
+
+def _around(boxes: Iterable[Box]) -> Box:
+    """What holds some boxes; those that are empty have no say."""
+    boxes = [box for box in boxes if not _is_empty(box)]
+    if not boxes:
+        return 0, 0, 0, 0
     left, bottom, right, top = zip(*boxes, strict=True)
     return min(left), min(bottom), max(right), max(top)

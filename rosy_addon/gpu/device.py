@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import DeviceError
 from .passes import GROUP, Compute, Constants, Drawing
 
 Values = Mapping[str, Any]
@@ -23,7 +23,15 @@ SIZES = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
 
 
 class Device(Protocol):
-    """What a picture is drawn with. Textures and batches are handles that only it looks into."""
+    """What a picture is drawn with. Textures and batches are handles that only it looks into.
+
+    Attributes
+    ----------
+    largest : int
+        Texels that a side of a texture may have.
+    """
+
+    largest: int
 
     def texture(
         self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
@@ -61,6 +69,18 @@ class Device(Protocol):
     ) -> None:
         """Draw batches, each with constants of its own, into a colour and a depth texture."""
 
+    def draw_over(
+        self,
+        shader: Drawing,
+        batches: Sequence[tuple[Any, Values]],
+        textures: Values,
+        constants: Values,
+    ) -> None:
+        """Draw batches into the view that is being drawn, where nothing is in front."""
+
+    def viewport(self) -> tuple[int, int, int, int]:
+        """Left, bottom, width and height of that view in what it is drawn into."""
+
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
         """(height, width, 4) float32: what is in a texture."""
 
@@ -72,22 +92,23 @@ class BlenderDevice:
         import gpu
 
         if not _is_usable(gpu):
-            raise RosyError(
+            raise DeviceError(
                 "Blender has no graphics context here: it has one with a window, and from 5.1 on "
                 "without"
             )
         self._gpu = gpu
         self._shaders: dict[str, Any] = {}
+        self.largest: int = gpu.capabilities.max_texture_size_get()
 
     def texture(
         self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
     ) -> Any:
         """As `Device.texture`."""
-        buffer = None
+        more = {}
         if data is not None:
             flat = np.ascontiguousarray(data, dtype=np.float32).reshape(-1)
-            buffer = self._gpu.types.Buffer("FLOAT", len(flat), flat)
-        return self._gpu.types.GPUTexture((width, height), layers=layers, format=kind, data=buffer)
+            more["data"] = self._gpu.types.Buffer("FLOAT", len(flat), flat)
+        return self._gpu.types.GPUTexture((width, height), layers=layers, format=kind, **more)
 
     def depth(self, width: int, height: int) -> Any:
         """As `Device.depth`."""
@@ -138,27 +159,51 @@ class BlenderDevice:
             state.depth_mask_set(True)
             state.blend_set("NONE")
             state.face_culling_set("NONE")
-            self.draw_here(shader, batches, {}, constants)
-            state.depth_test_set(before[0])
-            state.depth_mask_set(before[1])
-            state.blend_set(before[2])
+            try:
+                self._draw(shader, batches, {}, constants)
+            finally:
+                state.depth_test_set(before[0])
+                state.depth_mask_set(before[1])
+                state.blend_set(before[2])
 
-    def draw_here(
+    def draw_over(
         self,
         shader: Drawing,
         batches: Sequence[tuple[Any, Values]],
         textures: Values,
         constants: Values,
     ) -> None:
-        """Draw batches into whatever Blender is drawing into."""
+        """As `Device.draw_over`."""
+        state = self._gpu.state
+        state.depth_test_set("LESS_EQUAL")
+        # Of all that lies behind each other at a pixel the picture is drawn once.
+        state.depth_mask_set(True)
+        state.blend_set("ALPHA")
+        try:
+            self._draw(shader, batches, textures, constants)
+        finally:
+            state.blend_set("NONE")
+            state.depth_mask_set(False)
+            state.depth_test_set("NONE")
+
+    def viewport(self) -> tuple[int, int, int, int]:
+        """As `Device.viewport`."""
+        return tuple(self._gpu.state.viewport_get())
+
+    def _draw(
+        self,
+        shader: Drawing,
+        batches: Sequence[tuple[Any, Values]],
+        textures: Values,
+        constants: Values,
+    ) -> None:
         for batch, own in batches:
             program, _block = self._bound(shader, textures, {**constants, **own})
             batch.draw(program)
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
         """As `Device.read`."""
-        found = np.array(texture.read(), dtype=np.float32, copy=False)
-        return found.reshape(height, width, 4)
+        return np.asarray(texture.read(), dtype=np.float32).reshape(height, width, 4)
 
     def _bound(
         self, shader: Compute | Drawing, textures: Values, constants: Values
@@ -178,14 +223,14 @@ class BlenderDevice:
 
         Raises
         ------
-        RosyError
+        DeviceError
             If the driver does not take it.
         """
         if shader.name not in self._shaders:
             try:
                 self._shaders[shader.name] = self._gpu.shader.create_from_info(self._info(shader))
             except Exception as error:
-                raise RosyError(
+                raise DeviceError(
                     f"the graphics driver does not take the shader '{shader.name}': {error}"
                 ) from error
         return self._shaders[shader.name]

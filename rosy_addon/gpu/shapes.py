@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import RosyError
 from ..field.directions import harmonics
 from ..field.frames import transformed
 from ..field.rosy_field import RosyField
@@ -15,7 +16,10 @@ from ..progress import drain
 from ..projection.carried import SIMILAR, Carried, Trait, carrying, order_of
 
 #: Texels of a row of the texture of records.
-ROW = 4096
+ROW = 8192
+
+#: Triangles of a body: their numbers go through single precision.
+MOST_TRIANGLES = 1 << 24
 
 #: Texels of a record: three places, three normals, two of the representation; a trait has two more.
 PLACES, NORMALS, VALUES = 0, 3, 6
@@ -29,6 +33,8 @@ class Shape:
     ----------
     corners : (3 T, 4) float32 ndarray
         Place of each corner of each triangle, and the triangle's number.
+    centre : (3,) float64 ndarray
+        Relative to which all places are, so that those far from the origin lose no digits.
     records : (rows, ROW, 4) float32 ndarray or None
         What the pixels of a triangle are computed from, `texels` in a row each: see `_records`.
         None without a field.
@@ -39,6 +45,7 @@ class Shape:
     """
 
     corners: np.ndarray
+    centre: np.ndarray
     records: np.ndarray | None
     texels: int
     bounds: np.ndarray
@@ -72,6 +79,13 @@ def placement(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.eye(3), matrix
 
 
+def shifting(vector: np.ndarray) -> np.ndarray:
+    """(4, 4) the matrix that shifts by a vector."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = vector
+    return matrix
+
+
 def traits_of(field: RosyField) -> list[Trait]:
     """What a field has besides the representation."""
     found: list[Trait] = [("deviation", j) for j in harmonics(field)]
@@ -99,8 +113,23 @@ def shape_of(
     display : {"smooth", "flat"}
     layers : sequence of Trait
         What each layer of the image of traits holds: that of all fields of this degree.
+
+    Raises
+    ------
+    RosyError
+        If it has more than `MOST_TRIANGLES`.
     """
+    if field is not None and len(surface.triangles) > MOST_TRIANGLES:
+        raise RosyError(
+            f"{surface.name}: {len(surface.triangles)} triangles are more than the "
+            f"{MOST_TRIANGLES} that are drawn on a graphics card"
+        )
     points = transformed(np.ascontiguousarray(surface.vertices.T), linear)
+    used = np.zeros(points.shape[1], dtype=bool)
+    used[surface.triangle_vertex] = True
+    bounds = _box(points[:, used])
+    centre = bounds.mean(axis=0)
+    points -= centre[:, None]
     places = points.astype(np.float32).take(surface.triangle_vertex, axis=1)
     count = places.shape[1]
     corners = np.empty((count, 3, 4), dtype=np.float32)
@@ -114,7 +143,7 @@ def shape_of(
         records = _records(corners, carried, field.degree, layers)
         texels = records.shape[1]
         records = _in_rows(records)
-    return Shape(corners.reshape(-1, 4), records, texels, _box(points))
+    return Shape(corners.reshape(-1, 4), centre, records, texels, bounds - centre)
 
 
 def _records(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import NothingInViewError, RosyError
 from ..field.frames import carry_components, dot_components, transformed
 from ..field.representation import signed_power
 from ..memory import keep_freed_memory
@@ -144,19 +144,19 @@ def _seen(bodies: Sequence[Body], camera: Camera) -> _Seen:
 
     Raises
     ------
-    RosyError
+    NothingInViewError
         If there are none.
     """
     fragments, first = _rasterised(bodies, camera)
     if len(bodies) == 1:
         if not len(fragments.pixel):
-            _raise_nothing_in_view(bodies, camera)
+            raise_nothing_in_view(bodies, camera)
         return _Seen(fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0])
     with_field = np.array([body.field is not None for body in bodies])
     body = (np.searchsorted(first, fragments.triangle, side="right") - 1).astype(np.int32)
     rosy = with_field[body]
     if not rosy.any():
-        _raise_nothing_in_view(bodies, camera)
+        raise_nothing_in_view(bodies, camera)
     if not rosy.all():
         kept = np.flatnonzero(rosy)
         fragments, body = Fragments(*(values[kept] for values in fragments)), body[kept]
@@ -181,12 +181,20 @@ def _on_clip(body: Body, camera: Camera) -> np.ndarray:
     return transformed(np.ascontiguousarray(body.surface.vertices.T), matrix[:, :3], matrix[:, 3])
 
 
-def _raise_nothing_in_view(bodies: Sequence[Body], camera: Camera) -> None:
+def raise_nothing_in_view(bodies: Sequence[Body], camera: Camera) -> None:
+    """Say of bodies of which a camera sees no field why it does not.
+
+    Raises
+    ------
+    NothingInViewError
+    """
     shown = [body for body in bodies if body.field is not None]
     fragments, _ = _rasterised(shown, camera)
     names = ", ".join(body.surface.name for body in shown)
     why = "hidden behind other objects" if len(fragments.pixel) else "outside the frame"
-    raise RosyError(f"no RoSy object is in view of camera '{camera.name}': {names} is {why}")
+    raise NothingInViewError(
+        f"no RoSy object is in view of camera '{camera.name}': {names} is {why}"
+    )
 
 
 def _empty_buffer(bodies: Sequence[Body], camera: Camera, seen: _Seen) -> GBuffer:

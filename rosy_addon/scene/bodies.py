@@ -73,7 +73,7 @@ def rosy_objects(
     found = {
         thing.name: thing
         for thing in _shown_objects(view_layer)
-        if has_field(thing) and _is_included(thing)
+        if has_field(thing) and is_included(thing)
     }
     if names is None:
         return [found[name] for name in sorted(found)]
@@ -296,7 +296,8 @@ def _is_seen(instance: bpy.types.DepsgraphObjectInstance, shown: set[bpy.types.O
     return thing.original in shown
 
 
-def _is_included(thing: bpy.types.Object) -> bool:
+def is_included(thing: bpy.types.Object) -> bool:
+    """Whether an object's field is to be drawn."""
     return thing.rosy.include if has_properties() else True
 
 

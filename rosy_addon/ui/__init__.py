@@ -15,10 +15,12 @@ def register() -> None:
     for module in MODULES:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
+    bpy.types.VIEW3D_PT_overlay.append(panels.draw_in_overlays)
 
 
 def unregister() -> None:
     """Take them away again."""
+    bpy.types.VIEW3D_PT_overlay.remove(panels.draw_in_overlays)
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

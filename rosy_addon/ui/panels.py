@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from .. import live
 from ..compositor.look import Look
 from ..compositor.presets import load_preset, preset_names
 from ..scene.apply import FAITHFUL, Bake, bakes
@@ -150,6 +151,7 @@ def _draw_picture(
 ) -> None:
     """What is baked, and the button that bakes."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
+    _draw_live(layout, context)
     if status.now is not None:
         _draw_progress(layout)
         return
@@ -173,6 +175,19 @@ def _draw_picture(
         _draw_how_to_see(layout, context, made)
     if drawn:
         _draw_view_transform(layout, context.scene)
+
+
+def _draw_live(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    on = live.is_live(context.space_data)
+    button = layout.operator(
+        "rosy.viewport", text="Live in This View", icon="HIDE_OFF" if on else "HIDE_ON", depress=on
+    )
+    button.show = "OFF" if on else "ON"
+
+
+def draw_in_overlays(popover: bpy.types.Menu, context: bpy.types.Context) -> None:
+    """The same switch among Blender's own, in the popover of overlays."""
+    _draw_live(popover.layout, context)
 
 
 def _draw_bake(layout: bpy.types.UILayout, bake: Bake, several: bool) -> None:

@@ -27,6 +27,12 @@ vec2 signed_power(vec2 number, int order)
   return result;
 }
 
+// That of 0 is 0; GLSL leaves it open.
+float angle_of(vec2 a)
+{
+  return a == vec2(0.0) ? 0.0 : atan(a.y, a.x);
+}
+
 vec2 unit_or_zero(vec2 a)
 {
   float size = length(a);
@@ -58,19 +64,12 @@ vec3 direction_to_eye(vec2 ray, bool from_a_point)
   return from_a_point ? normalize(vec3(-ray, 1.0)) : vec3(0.0, 0.0, 1.0);
 }
 
-// sRGB display values to linear light and back (IEC 61966-2-1).
+// sRGB display values to linear light (IEC 61966-2-1).
 vec3 to_linear(vec3 display)
 {
   display = clamp(display, 0.0, 1.0);
   vec3 curve = pow((display + 0.055) / 1.055, vec3(2.4));
   return mix(curve, display / 12.92, lessThanEqual(display, vec3(0.04045)));
-}
-
-vec3 to_display(vec3 linear)
-{
-  linear = clamp(linear, 0.0, 1.0);
-  vec3 curve = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
-  return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
 // The bits of a float, and which of its 3 x 3 neighbours a pixel is joined to in the last nine.

@@ -20,10 +20,11 @@ vec3 rotated(vec3 vector)
   return vec3(dot(place_x.xyz, vector), dot(place_y.xyz, vector), dot(place_z.xyz, vector)) / scale;
 }
 
-// The first axis of the frame of a normal (Duff et al. 2017), as `field.frames.tangent_frame`.
+// The first axis of the frame of a normal (Duff et al. 2017), as `field.frames.tangent_frame`: there
+// are two frames where z is 0, and the sign of that 0 tells which.
 vec3 first_axis(vec3 n)
 {
-  float way = n.z < 0.0 ? -1.0 : 1.0;
+  float way = (floatBitsToUint(n.z) >> 31) == 1u ? -1.0 : 1.0;
   float a = -1.0 / (way + n.z);
   return vec3(1.0 + way * n.x * n.x * a, way * n.x * n.y * a, -way * n.x);
 }

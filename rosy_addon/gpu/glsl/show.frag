@@ -24,5 +24,6 @@ void main()
   if (colour.w == 0.0) {
     discard;
   }
-  shown = blender_srgb_to_framebuffer_space(vec4(to_display(colour.xyz), colour.w * opacity));
+  // Linear light: what Blender draws its views into encodes it.
+  shown = vec4(clamp(colour.xyz, 0.0, 1.0), colour.w * opacity);
 }

@@ -60,11 +60,11 @@ vec3 hue_of_line(int line, vec2 z, vec2 stored)
 {
   // Of odd degree every other line is a member's opposite half.
   float opposite = (around > degree && degree % 2 == 1 && line % 2 == 1) ? 0.5 * TAU : 0.0;
-  float at = atan(z.y, z.x) / float(degree) + guiding_angle + opposite;
+  float at = angle_of(z) / float(degree) + guiding_angle + opposite;
   at += TAU * float(line) / float(around);
   int order = degree / families;
   vec2 ahead = times(vec2(cos(at * float(order)), sin(at * float(order))), conjugate(stored));
-  int family = int(round(atan(ahead.y, ahead.x) * float(families) / TAU));
+  int family = int(round(angle_of(ahead) * float(families) / TAU));
   family -= families * int(floor(float(family) / float(families)));
   return texelFetch(palette, ivec2(family % textureSize(palette, 0).x, 0), 0).xyz;
 }

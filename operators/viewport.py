@@ -1,0 +1,57 @@
+"""Show fields in the 3D view as it moves, without a bake."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon import live
+from ..rosy_addon.errors import RosyError
+
+
+class ROSY_OT_viewport(bpy.types.Operator):
+    """Draw the fields of all meshes in this 3D view, however it is turned, without baking anything"""
+
+    bl_idname = "rosy.viewport"
+    bl_label = "Live Fields"
+    bl_options = {"REGISTER"}
+
+    show: bpy.props.EnumProperty(
+        name="Show",
+        items=[
+            ("TOGGLE", "Toggle", "On if off, off if on"),
+            ("ON", "On", "Draw the fields in this view"),
+            ("OFF", "Off", "Leave the view as it was"),
+        ],
+    )
+
+    device: bpy.props.EnumProperty(
+        name="Device",
+        description="What the fields are drawn with",
+        items=[
+            ("AUTO", "Graphics Card", "The graphics card, or the processor if it cannot"),
+            ("CPU", "Processor", "The processor, at reduced size"),
+        ],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.space_data is None or context.space_data.type != "VIEW_3D":
+            cls.poll_message_set("Only in a 3D view")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        space = context.space_data
+        on = not live.is_live(space) if self.show == "TOGGLE" else self.show == "ON"
+        if not on:
+            live.stop(space)
+            return {"FINISHED"}
+        try:
+            live.start(space, self.device.lower())
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_viewport,)

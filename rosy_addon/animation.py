@@ -17,14 +17,13 @@ from dataclasses import dataclass
 import bpy
 
 from .bake import Source, camera_view, scaled_camera, scene_depsgraph, undefined_of
-from .compositor.compose import composing
 from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import RosyError
 from .files import read_bytes, write_bytes
+from .gpu.painter import find_card, painting
 from .progress import Progress, Work, drain, part
 from .projection.camera import Camera
-from .projection.project import projecting
 from .reuse import Kept, digest
 from .scene.apply import Settings, Strip, apply_strip, check_appliable, settings_of
 from .scene.bodies import Reading, prepared, read_scene, rosy_objects
@@ -165,6 +164,9 @@ def _frame(
     """Draw one frame from all cameras; by the names of the sequences their views, and whether the
     picture was there."""
     look = look_of(scene.rosy) if look is None else look
+    card = kept.find_or_make(
+        ("card", settings.device), lambda: (find_card(settings.device, look),)
+    )[0]
     depsgraph = scene_depsgraph(scene)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     reading = read_scene(depsgraph, objects, undefined_of(scene), kept)
@@ -176,14 +178,13 @@ def _frame(
         lights = read_lights(depsgraph, view.view)
         path = frame_path(settings.folder, name, frame, settings.as_float)
         note = path.with_name(path.name + NOTE)
-        inputs = f"{FORMAT}\n{_inputs(reading, look, view, lights, settings).hex()}\n".encode()
+        drawn_from = _inputs(reading, look, view, lights, settings, by_card=card is not None)
+        inputs = f"{FORMAT}\n{drawn_from.hex()}\n".encode()
         was_there = path.is_file() and note.is_file() and read_bytes(note) == inputs
         if not was_there:
             fine = scaled_camera(view, look.supersampling)
-            seeing = projecting(reading.bodies, fine, look.display)
-            gbuffer = yield from part(seeing, start, (start + stop) / 2)
-            drawing = composing(gbuffer, look, lights)
-            picture = yield from part(drawing, (start + stop) / 2, stop)
+            work = painting(card, reading.bodies, fine, look, lights)
+            picture = yield from part(work, start, stop)
             note.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
             write_bytes(note, inputs)
@@ -193,10 +194,18 @@ def _frame(
 
 
 def _inputs(
-    reading: Reading, look: Look, view: Camera, lights: Sequence[Light], settings: Settings
+    reading: Reading,
+    look: Look,
+    view: Camera,
+    lights: Sequence[Light],
+    settings: Settings,
+    *,
+    by_card: bool,
 ) -> bytes:
     """A digest of all that a picture is drawn from."""
     parts: list = [look, view.view, view.projection, view.width, view.height, settings.as_float]
+    if by_card:
+        parts.append("by the graphics card")
     if look.light == "scene":
         for light in lights:
             parts += vars(light).values()

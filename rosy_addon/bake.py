@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from .compositor.compose import composing
 from .compositor.look import Look
+from .gpu.painter import find_card, painting
 from .progress import Progress, Work, drain, part
 from .projection.camera import Camera, check_size
 from .projection.gbuffer import Body, GBuffer
@@ -71,7 +71,7 @@ def baking(
     ------
     RosyError
         If there is nothing to draw or it cannot be drawn; see `read_scene`, `camera_of_object`,
-        `projecting` and `check_appliable`.
+        `painting` and `check_appliable`.
     """
     look = look_of(scene.rosy) if look is None else look
     settings = settings_of(scene) if settings is None else settings
@@ -83,14 +83,12 @@ def baking(
     reading = read_scene(depsgraph, objects, undefined_of(scene), KEPT)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
+    card = find_card(settings.device, look)
     shots = []
     for number, source in enumerate(sources):
         start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
-        middle = start + 0.4 * (stop - start)
-        gbuffer = yield from part(
-            _projecting(reading.bodies, fine[number], look.display), start, middle
-        )
-        picture = yield from part(composing(gbuffer, look, lights[number]), middle, stop)
+        work = painting(card, reading.bodies, fine[number], look, lights[number], _projecting)
+        picture = yield from part(work, start, stop)
         shots.append(Shot(picture, views[number], _camera_object(scene, source)))
     KEPT.trim()
     yield Progress(0.97, "putting the picture on")
@@ -121,7 +119,7 @@ def bake(
     )
 
 
-def _projecting(bodies: list[Body], camera: Camera, display: str) -> Work[GBuffer]:
+def _projecting(bodies: Sequence[Body], camera: Camera, display: str) -> Work[GBuffer]:
     """`projecting`, or what an earlier bake has found if nothing has moved since."""
     view = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     key = "gbuffer", tuple(map(id, bodies)), view, camera.name, display

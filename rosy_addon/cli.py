@@ -33,6 +33,7 @@ from .field.rosy_field import RosyField, check_degree
 from .field.singularities import euler_characteristic, singularities
 from .field.surface import Surface, cut_note
 from .files import check_writable
+from .gpu.painter import DEVICES
 from .jobs import frame_range, own_command, run_here, run_on_cluster
 from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
@@ -216,6 +217,8 @@ def bake(options: argparse.Namespace) -> None:
         open_file(options.scene)
     scene = bpy.context.scene
     settings = settings_of(scene)
+    if options.device is not None:
+        settings = replace(settings, device=options.device)
     if options.out is not None:
         settings = replace(settings, folder=options.out.resolve())
     if options.frames is not None:
@@ -334,6 +337,8 @@ def _same_for_others(options: argparse.Namespace) -> list[str]:
     if options.preset is not None:
         preset = Path(options.preset)
         words += ["--preset", str(preset.resolve()) if preset.suffix else options.preset]
+    if options.device is not None:
+        words += ["--device", options.device]
     for text in options.set:
         words += ["--set", text]
     return words
@@ -496,6 +501,12 @@ def _add_bake(verbs: Any) -> None:
     verb.add_argument("--size", type=_size, metavar="WxH", help="the scene's own if not given")
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="write the pictures there as .png files"
+    )
+    verb.add_argument(
+        "--device",
+        choices=list(DEVICES),
+        help="what draws the pictures: the processor, the graphics card, or that if there is one; "
+        "as the scene says if not given",
     )
     verb.add_argument("--save", action="store_true", help="save the Blender file")
     verb.add_argument(

@@ -31,7 +31,7 @@ from ..projection.steps import OBLIQUE_TOLERANCE, STEEPEST, TOLERANCE
 from . import passes
 from .device import Device
 from .passes import GROUP
-from .shapes import Shape, placement, shape_of, shifting, traits_of
+from .shapes import ROW_BITS, Shape, placement, shape_of, shifting, traits_of
 
 #: The noise is made for whole tiles of so many pixels, so that a frame may grow a little.
 TILE = 256
@@ -372,6 +372,7 @@ class Card:
                 "corner": (left, bottom),
                 "body": float(number),
                 "texels": entry.shape.shape.texels,
+                "row_bits": ROW_BITS,
                 "traits": (entry.shape.shape.texels - 8) // 2,
                 "place_x": tuple(place[0]),
                 "place_y": tuple(place[1]),

@@ -118,6 +118,7 @@ RESOLVE = Compute(
         ("scale", "float"),
         ("body", "float"),
         ("texels", "int"),
+        ("row_bits", "int"),
         ("traits", "int"),
         ("STEEPEST", "float"),
         ("TOLERANCE", "float"),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compositor.colour import to_display
 from ..compositor.compose import composing
 from ..compositor.look import Look
 from ..compositor.shading import Light
@@ -92,12 +93,13 @@ class Processor:
 
 
 def _texture(rgba: np.ndarray) -> Any:
-    """Premultiplied, as borders are to be interpolated."""
+    """Display values, as Blender's own shader wants, premultiplied, as borders are interpolated."""
     import gpu
 
     height, width = rgba.shape[:2]
-    flat = np.clip(rgba, 0.0, 1.0)
-    flat[..., :3] *= flat[..., 3:]
-    flat = np.ascontiguousarray(flat, dtype=np.float32).reshape(-1)
+    colours = np.empty_like(rgba)
+    colours[..., :3] = to_display(rgba[..., :3]) * rgba[..., 3:]
+    colours[..., 3] = rgba[..., 3]
+    flat = np.ascontiguousarray(colours, dtype=np.float32).reshape(-1)
     buffer = gpu.types.Buffer("FLOAT", len(flat), flat)
     return gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)

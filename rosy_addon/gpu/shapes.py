@@ -15,8 +15,9 @@ from ..field.surface import Surface
 from ..progress import drain
 from ..projection.carried import SIMILAR, Carried, Trait, carrying, order_of
 
-#: Texels of a row of the texture of records.
-ROW = 8192
+#: Texels of a row of the texture of records, and their number's bits.
+ROW_BITS = 13
+ROW = 1 << ROW_BITS
 
 #: Triangles of a body: their numbers go through single precision.
 MOST_TRIANGLES = 1 << 24

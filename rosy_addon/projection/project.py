@@ -66,7 +66,7 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
         If no body has a field, a field does not fit its surface, a matrix is not finite, or no
         RoSy surface is in view.
     """
-    _check(bodies, camera, display)
+    check_bodies(bodies, camera, display)
     keep_freed_memory()
     yield Progress(0.0, "finding what is seen")
     seen = _seen(bodies, camera)
@@ -94,7 +94,14 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
     return buffer
 
 
-def _check(bodies: Sequence[Body], camera: Camera, display: str) -> None:
+def check_bodies(bodies: Sequence[Body], camera: Camera, display: str) -> None:
+    """Refuse what cannot be drawn.
+
+    Raises
+    ------
+    RosyError
+        If no body has a field, a field does not fit its surface, or a matrix is not finite.
+    """
     if display not in DISPLAYS:
         raise RosyError(f"display is {display!r}, not one of {', '.join(DISPLAYS)}")
     if all(body.field is None for body in bodies):

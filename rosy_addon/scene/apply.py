@@ -55,6 +55,8 @@ class Settings:
         Float values rather than 8 bit sRGB.
     folder : Path or None
         Where to save images; None packs them.
+    device : {"cpu", "gpu", "auto"}
+        What draws the pictures.
     """
 
     window: bool = False
@@ -62,6 +64,7 @@ class Settings:
     diffuse: float = 0.0
     as_float: bool = False
     folder: Path | None = None
+    device: str = "cpu"
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +167,7 @@ def settings_of(scene: bpy.types.Scene) -> Settings:
         diffuse=chosen.diffuse,
         as_float=chosen.image_format == "FLOAT",
         folder=folder,
+        device=chosen.device.lower(),
     )
 
 

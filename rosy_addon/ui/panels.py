@@ -42,7 +42,16 @@ OTHERS = tuple(
 )
 
 #: Settings of where the picture goes and how it shines there.
-OUTPUT = ("percentage", "placement", "emission", "diffuse", "store", "directory", "image_format")
+OUTPUT = (
+    "percentage",
+    "device",
+    "placement",
+    "emission",
+    "diffuse",
+    "store",
+    "directory",
+    "image_format",
+)
 
 
 #: Where a property's own name does not fit beside its value in a sidebar of usual width.

@@ -9,6 +9,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
+from ..gpu.painter import DEVICES
 from ..scene.attributes import DEFAULT_DEGREE, DEFAULT_NAME
 from ..scene.capabilities import folder_options, has_properties
 from ..scene.looks import apply_look, look_of
@@ -28,6 +29,7 @@ PLACEMENTS = [
     ),
     ("WINDOW", "Window", "The picture fills the frame of whatever camera looks"),
 ]
+DEVICE_ITEMS = [(name.upper(), *words) for name, words in DEVICES.items()]
 STORES = [
     ("PACKED", "In the Blend File", "Packed into the .blend file"),
     ("SAVED", "In a Folder", "Saved to a folder as .png or .exr"),
@@ -130,6 +132,9 @@ class RosyScene(bpy.types.PropertyGroup):
     )
     image_format: bpy.props.EnumProperty(
         name="Format", description="Depth of the picture's values", items=FORMATS
+    )
+    device: bpy.props.EnumProperty(
+        name="Device", description="What draws the picture", items=DEVICE_ITEMS
     )
     undefined: bpy.props.BoolProperty(
         name="Leave Out Bad Vectors",

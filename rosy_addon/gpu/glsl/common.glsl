@@ -8,6 +8,13 @@ vec2 times(vec2 a, vec2 b)
   return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x);
 }
 
+// Modulo a positive number. Halves make sure of the quotient: cards divide inexactly, and whole
+// numbers slowly.
+int modulo(int number, int divisor)
+{
+  return number - divisor * int(floor((float(number) + 0.5) / float(divisor)));
+}
+
 vec2 conjugate(vec2 a)
 {
   return vec2(a.x, -a.y);

@@ -1,12 +1,11 @@
 // From the triangle that a pixel sees to its entry in the G-buffer, for one body: `project._fill`
 // and `steps._slopes`, on the same data in the same order.
 
-// The part of a triangle's record that a texel holds.
+// The part of a triangle's record that a texel holds. Rows are powers of two, as division is slow.
 vec4 record(int number, int part)
 {
   int at = number * texels + part;
-  int width = textureSize(triangles, 0).x;
-  return texelFetch(triangles, ivec2(at % width, at / width), 0);
+  return texelFetch(triangles, ivec2(at & ((1 << row_bits) - 1), at >> row_bits), 0);
 }
 
 vec3 placed(vec3 point)

@@ -36,8 +36,7 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
       float turn = cell.x;
       cell = texelFetch(cells, pixel, 0);
       // k' = k + round((t(p) - t(q)) S / 2 pi) mod S
-      sheet += int(round(turn - cell.x));
-      sheet -= around * int(floor(float(sheet) / float(around)));
+      sheet = modulo(sheet + int(round(turn - cell.x)), around);
     }
     found.total += cell.yzw;
     found.count += 1.0;
@@ -55,18 +54,16 @@ vec3 mapped_colour(float value)
   return mix(low, high, place - float(below));
 }
 
-// The hue of a line: that of the family it belongs to (`hues.family_hues`).
-vec3 hue_of_line(int line, vec2 z, vec2 stored)
+// The hue of a line: that of the family it belongs to (`hues.family_hues`), from the angle of line 0
+// and of what the field stores.
+vec3 hue_of_line(int line, float first, float stored)
 {
   // Of odd degree every other line is a member's opposite half.
-  float opposite = (around > degree && degree % 2 == 1 && line % 2 == 1) ? 0.5 * TAU : 0.0;
-  float at = angle_of(z) / float(degree) + guiding_angle + opposite;
-  at += TAU * float(line) / float(around);
-  int order = degree / families;
-  vec2 ahead = times(vec2(cos(at * float(order)), sin(at * float(order))), conjugate(stored));
-  int family = int(round(angle_of(ahead) * float(families) / TAU));
-  family -= families * int(floor(float(family) / float(families)));
-  return texelFetch(palette, ivec2(family % textureSize(palette, 0).x, 0), 0).xyz;
+  float opposite = (around > degree && (degree & line & 1) == 1) ? 0.5 * TAU : 0.0;
+  float at = first + opposite + TAU * float(line) / float(around);
+  float ahead = (at * float(degree) - stored * float(families)) / TAU;
+  int family = modulo(int(round(ahead)), families);
+  return texelFetch(palette, ivec2(modulo(family, textureSize(palette, 0).x), 0), 0).xyz;
 }
 
 // What Lambert's law leaves (`shading.diffuse`). A light is two texels: where it is or, for a sun
@@ -109,9 +106,13 @@ void main()
   int steps = magnitude_drives >= 2 ? int(round(float(walk_length) * relative)) : walk_length;
   float full = float(2 * walk_length + 1);
 
-  vec2 stored = families > 1 ? texelFetch(traits_seen, ivec3(pixel, family_layer), 0).xy : vec2(0.0);
   float toward = float(degree) * guiding_angle;
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
+  float first = 0.0, stored = 0.0;
+  if (families > 1) {
+    first = angle_of(z) / float(degree) + guiding_angle;
+    stored = angle_of(texelFetch(traits_seen, ivec3(pixel, family_layer), 0).xy);
+  }
   vec3 blend = vec3(0.0), hue = vec3(0.0);
   float samples = 0.0, weights = 0.0;
   for (int line = 0; line < lines; ++line) {
@@ -126,7 +127,7 @@ void main()
     samples += count;
     if (families > 1) {
       float weight = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
-      hue += weight * hue_of_line(line, z, stored);
+      hue += weight * hue_of_line(line, first, stored);
       weights += weight;
     }
   }

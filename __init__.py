@@ -23,9 +23,11 @@ def unregister() -> None:
 
     from . import operators
     from .rosy_addon import reuse, ui
+    from .rosy_addon.gpu import device
 
     bpy.utils.unregister_cli_command(_cli)
     _cli = None
     operators.unregister()
     ui.unregister()
     reuse.KEPT.clear()
+    device.release()

@@ -26,6 +26,7 @@ class EglDevice:
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
         self._programs: dict[str, Any] = {}
+        self.largest: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
 
     @property
     def name(self) -> str:

@@ -27,6 +27,7 @@ SCRIPTS = (
     "stages",
     "planar_rlic",
     "surface_vtk",
+    "gpu_vtk",
     "again",
     "animation",
     "memory",

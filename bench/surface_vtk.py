@@ -37,23 +37,33 @@ def measure(runs: int) -> Iterator[Case]:
         print("surfaces of VTK: left out, there is no vtk here", file=sys.stderr)
         return
     for triangles in (12_000, 200_000):
-        draw, renderer = _renderer(vtk, triangles)
-        theirs = float((draw().min(axis=1) < 255).mean())
+        turn, read, name = renderer(vtk, triangles)
+        theirs = float((read().min(axis=1) < 255).mean())
         ours = float((cases.frame(triangles, DEGREE, LOOK)[..., 3] > 0).mean())
-        print(f"{renderer}; covered: {theirs:.1%} by VTK, {ours:.1%} by RoSy", flush=True)
-        turn = iter(np.arange(1, 10_000) * ON)
+        print(f"{name}; covered: {theirs:.1%} by VTK, {ours:.1%} by RoSy", flush=True)
+        azimuths = iter(np.arange(1, 10_000) * ON)
         yield compare(
             f"N = 4 / VTK's one vector field, frame, {triangles // 1000}K triangles",
-            lambda t=triangles, turn=turn: cases.frame(t, DEGREE, LOOK, azimuth=next(turn)),
-            draw,
+            lambda t=triangles, on=azimuths: cases.frame(t, DEGREE, LOOK, azimuth=next(on)),
+            lambda turn=turn, read=read: (turn(), read()),
             target=0.5,
             higher_is_better=False,
             runs=runs,
         )
 
 
-def _renderer(vtk: Any, triangles: int) -> tuple[Callable[[], np.ndarray], str]:
-    """A function that turns the camera and draws, (P, 3) uint8, and what it is done by."""
+def renderer(vtk: Any, triangles: int) -> tuple[Callable[[], None], Callable[[], np.ndarray], str]:
+    """VTK's surface LIC of the ball.
+
+    Returns
+    -------
+    turn : function
+        Turns the camera, draws, and waits till that is done.
+    read : function
+        The picture as (P, 3) uint8.
+    name : str
+        What it is drawn by.
+    """
     from vtk.util.numpy_support import vtk_to_numpy
 
     mapper = vtk.vtkSurfaceLICMapper()
@@ -65,35 +75,38 @@ def _renderer(vtk: Any, triangles: int) -> tuple[Callable[[], np.ndarray], str]:
     settings.EnhancedLICOff()  # a second pass, which would double its samples
     actor = vtk.vtkActor()
     actor.SetMapper(mapper)
-    renderer = vtk.vtkRenderer()
-    renderer.SetBackground(1, 1, 1)
-    renderer.AddActor(actor)
+    scene = vtk.vtkRenderer()
+    scene.SetBackground(1, 1, 1)
+    scene.AddActor(actor)
     window = vtk.vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetMultiSamples(0)
     window.SetSize(cases.SIZE, cases.SIZE)
-    window.AddRenderer(renderer)
+    window.AddRenderer(scene)
     ours = cases.camera()
     eye = -ours.view[:3, :3].T @ ours.view[:3, 3]
-    camera = renderer.GetActiveCamera()
+    camera = scene.GetActiveCamera()
     camera.SetPosition(*eye)
     camera.SetFocalPoint(0, 0, 0)
     camera.SetViewUp(0, 0, 1)
     camera.SetViewAngle(np.degrees(2 * np.arctan(1 / ours.projection[1, 1])))
-    renderer.ResetCameraClippingRange()
+    scene.ResetCameraClippingRange()
     pixels = vtk.vtkUnsignedCharArray()
 
-    def draw() -> np.ndarray:
+    def turn() -> None:
         camera.Azimuth(np.degrees(ON))
         window.Render()
+        window.WaitForCompletion()
+
+    def read() -> np.ndarray:
         last = cases.SIZE - 1
         window.GetPixelData(0, 0, last, last, 0, pixels, 0)
         return vtk_to_numpy(pixels)
 
-    draw()
+    turn()
     lines = window.ReportCapabilities().splitlines()
     names = [line.split(":", 1)[1].strip() for line in lines if "renderer string" in line]
-    return draw, names[0] if names else window.GetClassName()
+    return turn, read, names[0] if names else window.GetClassName()
 
 
 def _poly_data(vtk: Any, triangles: int) -> Any:

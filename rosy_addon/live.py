@@ -22,7 +22,7 @@ from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import DeviceError, RosyError
 from .gpu.card import NO_PLANES, Card
-from .gpu.device import BlenderDevice
+from .gpu.device import blender_device
 from .gpu.processor import Processor
 from .progress import Work
 from .projection.camera import Camera
@@ -119,7 +119,9 @@ class Live:
         ):
             where.append(handler)
             self._handlers.append((where, handler))
-        bpy.app.timers.register(self._watch, first_interval=1.0)
+        # Blender knows timers by the object; a method is another one each time it is looked up.
+        self._timers = {name: getattr(self, name) for name in ("_watch", "_wake", "_learn")}
+        self._after(1.0, "_watch")
 
     # --- switching -------------------------------------------------------------------------------
 
@@ -141,7 +143,7 @@ class Live:
             bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
         for where, handler in self._handlers:
             where.remove(handler)
-        for timer in (self._watch, self._wake, self._learn):
+        for timer in self._timers.values():
             if bpy.app.timers.is_registered(timer):
                 bpy.app.timers.unregister(timer)
         self._drawing, self._handlers = [], []
@@ -189,19 +191,21 @@ class Live:
         there = {space.as_pointer() for space in _all_spaces()}
         for space in self.spaces - there:
             self.remove(space)
-        if not self.spaces:
-            stop()
-            return None
-        return 1.0
+        if self.spaces:
+            return 1.0
+        stop()
+        return None
 
     def _wake(self) -> float | None:
         """Have Blender redraw while pictures are to be made."""
         redraw(self.spaces)
         return None
 
-    def _wake_in(self, seconds: float) -> None:
-        if not bpy.app.timers.is_registered(self._wake):
-            bpy.app.timers.register(self._wake, first_interval=seconds)
+    def _after(self, seconds: float, name: str) -> None:
+        """Have a method called, unless it will be anyway."""
+        timer = self._timers[name]
+        if not bpy.app.timers.is_registered(timer):
+            bpy.app.timers.register(timer, first_interval=seconds)
 
     def _learn(self) -> None:
         """Find out what cannot be found while Blender draws."""
@@ -242,7 +246,7 @@ class Live:
         self._refining, self._cost = None, 0.0
         for layer in self._layers.values():
             layer.stale = True
-        self._wake_in(0.0)
+        self._after(0.0, "_wake")
 
     def _draw_view(
         self,
@@ -288,8 +292,8 @@ class Live:
                 depsgraph, undefined_of(context.scene), others=self.maker.sees_others
             )
             layer.stale = False
-            if layer.follower.is_behind and not bpy.app.timers.is_registered(self._learn):
-                bpy.app.timers.register(self._learn, first_interval=0.0)
+            if layer.follower.is_behind:
+                self._after(0.0, "_learn")
         return layer
 
     def _make(
@@ -319,9 +323,9 @@ class Live:
             self._finish(view, wanted, drawing(fine), fine, amount)
         elif view.shows != wanted:
             self._finish(view, wanted, drawing(coarse), coarse, amount * COARSE_COST)
-            self._wake_in(REST)
+            self._after(REST, "_wake")
         elif now - view.since < REST:
-            self._wake_in(REST)
+            self._after(REST, "_wake")
         else:
             self._refine(view, wanted, lambda: drawing(fine))
 
@@ -381,7 +385,7 @@ class Live:
             view.coarseness = self.maker.coarseness[1]
             view.work = self._refining = None
             return
-        self._wake_in(0.0)
+        self._after(0.0, "_wake")
 
     def _draw_text(self) -> None:
         """Say why a field is not drawn, in a corner of the view."""
@@ -398,7 +402,7 @@ class Live:
         blf.size(0, 12 * scale)
         blf.color(0, 1.0, 0.6, 0.2, 1.0)
         for number, line in enumerate(lines):
-            blf.position(0, 16 * scale, (16 + 18 * number) * scale, 0)
+            blf.position(0, 16 * scale, (64 + 18 * number) * scale, 0)
             blf.draw(0, f"RoSy: {line}")
 
 
@@ -448,7 +452,7 @@ def _maker(device: str) -> Card | Processor:
     DeviceError
         If there is no graphics context: nothing can be shown then.
     """
-    card = Card(BlenderDevice())
+    card = Card(blender_device())
     return Processor() if device == "cpu" else card
 
 

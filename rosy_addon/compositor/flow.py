@@ -193,8 +193,21 @@ def surface_flow(gbuffer: GBuffer, degree: int, crease_angle: float, cross_creas
         representation=z,
         axes=axes[chosen],
         joined=joined,
-        traits={trait: values[chosen] for trait, values in gbuffer.traits.items()},
+        traits=_own({trait: values[chosen] for trait, values in gbuffer.traits.items()}),
     )
+
+
+def _own(traits: dict[Trait, np.ndarray]) -> dict[Trait, np.ndarray]:
+    """The traits that fields of one degree have; the others are those of fields of other degrees.
+
+    What they have not is as a RoSy has it: 1 for C_0, which goes with other harmonics, else 0.
+    """
+    first = ("deviation", 0)
+    found = {trait for trait, values in traits.items() if trait != first and values.any()}
+    free = any(kind == "deviation" for kind, _ in found)
+    if first in traits and (free or (traits[first] != 1).any()):
+        found.add(first)
+    return {trait: values for trait, values in traits.items() if trait in found}
 
 
 def planar_flow(

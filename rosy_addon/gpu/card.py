@@ -338,7 +338,8 @@ class Card:
             (entry.shape.batch, {"body": float(number), **on_clip(entry, camera, planes)})
             for number, entry in enumerate(placed)
         ]
-        self.device.draw(passes.SEEN, batches, (seen, depth), {})
+        shader = passes.SEEN if np.array_equal(planes, NO_PLANES) else passes.SEEN_CUT
+        self.device.draw(shader, batches, (seen, depth), {})
         values = self._image("values_seen", width, height)
         self.device.clear(values)
         layers = max(((entry.shape.shape.texels - 8) // 2 for entry in placed), default=0)

@@ -263,6 +263,29 @@ class BlenderDevice:
         return info
 
 
+_device: BlenderDevice | None = None
+
+
+def blender_device() -> BlenderDevice:
+    """The one device, whose shaders are compiled once.
+
+    Raises
+    ------
+    DeviceError
+        If Blender has no graphics context.
+    """
+    global _device
+    if _device is None:
+        _device = BlenderDevice()
+    return _device
+
+
+def release() -> None:
+    """Let go of the compiled shaders."""
+    global _device
+    _device = None
+
+
 def _aligned(constants: Constants) -> Constants:
     """In an order in which each lies where the layout std140 wants it, without a gap."""
     return tuple(sorted(constants, key=lambda constant: -SIZES[constant[1]]))

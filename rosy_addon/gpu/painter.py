@@ -14,7 +14,7 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import Body, GBuffer
 from ..projection.project import check_bodies, projecting, raise_nothing_in_view
 from .card import Card
-from .device import BlenderDevice
+from .device import blender_device
 
 #: What draws pictures: the names, and what a user reads of them.
 DEVICES = {
@@ -48,7 +48,7 @@ def find_card(device: str, look: Look) -> Card | None:
                 "the graphics card follows each streamline from member to member; it does not draw "
                 "the method 'members'"
             )
-        return Card(BlenderDevice())
+        return Card(blender_device())
     except DeviceError:
         if device == "gpu":
             raise

@@ -214,9 +214,7 @@ class Follower:
                 return _Read(surface, self._edited(mesh, original, surface, undefined, label))
             given = mesh_surface(original, label, kept=self._kept)
             if _same_faces(surface, given):
-                field = read_mesh_field(
-                    original, undefined=undefined, owner=label, surface=given, kept=self._kept
-                )
+                field = self._given(original, given, undefined, label)
                 deformed = bool(own_modifiers(owner) or original.shape_keys)
                 return _Read(_at_rest(surface, given.vertices) if deformed else surface, field)
         finally:
@@ -226,6 +224,17 @@ class Follower:
             self._unknown.add(owner.name)
             return None
         return _Read(_at_rest(surface, learned.rest), learned.field)
+
+    def _given(
+        self, mesh: bpy.types.Mesh, surface: Surface, undefined: str, label: str
+    ) -> RosyField:
+        """The field of a mesh without modifiers; one that was shaped after the field was made, too."""
+        if is_native(mesh):
+            stored = Stored(attribute_name(mesh), field_degree(mesh))
+            return read_carried_field(mesh, stored, surface, undefined, label, self._kept)
+        return read_mesh_field(
+            mesh, undefined=undefined, owner=label, surface=surface, kept=self._kept
+        )
 
     def _edited(
         self,

@@ -100,18 +100,21 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     if not options.no_window:
         shots = folder / "shots"
         shots.mkdir()
-        said = folder / "window.json"
-        environment["ROSY_SHOTS"], environment["ROSY_RESULTS"] = str(shots), str(said)
-        done = blender(
-            "gui", "-s", "150", "--enable-event-simulate", "--python-exit-code", "1",
-            "-P", str(HERE / "window.py"),
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
-        add_window(counts, said)
-        # A panel that cannot be drawn says so on the terminal and nowhere else.
-        if "Traceback" in done.stdout:
-            print("in the window:\n" + done.stdout[done.stdout.index("Traceback") :][:3000])
-            counts["failed"] += 1
+        environment["ROSY_SHOTS"] = str(shots)
+        for script in ("window.py", "window_live.py"):
+            said = folder / f"{script}.json"
+            environment["ROSY_RESULTS"] = str(said)
+            patience = 900 if "ROSY_LIVE_MANY" in environment else 300
+            done = blender(
+                "gui", "-s", str(patience), "--enable-event-simulate", "--python-exit-code", "1",
+                "-P", str(HERE / script),
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience + 60.0,
+            )  # fmt: skip
+            add_window(counts, said)
+            # A panel that cannot be drawn says so on the terminal and nowhere else.
+            if "Traceback" in done.stdout:
+                print("in the window:\n" + done.stdout[done.stdout.index("Traceback") :][:3000])
+                counts["failed"] += 1
         if options.shots is not None:
             shutil.copytree(shots, options.shots, dirs_exist_ok=True)
     return counts

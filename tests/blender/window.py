@@ -1,19 +1,15 @@
 """RoSy in a window: the panel in its three states, a bake that is watched, and bakes that are broken off.
 
 Run by run.py as ``blender --enable-event-simulate -P window.py``. Every step is a generator that
-yields while Blender is to go on with its own affairs; a timer resumes it. What each step found is
-written to the file ROSY_RESULTS names, as {step: "" or what went wrong}.
+yields while Blender is to go on with its own affairs (`watching`).
 """
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import subprocess
 import sys
 import time
-import traceback
 from pathlib import Path
 
 import bpy
@@ -21,77 +17,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
-
-SHOTS = Path(os.environ["ROSY_SHOTS"])
-RESULTS = Path(os.environ["ROSY_RESULTS"])
-PATIENCE = 40.0
-
-bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.view.show_statusbar_stats = False
-
-
-def main():
-    bpy.app.timers.register(resume(all_steps()), first_interval=1.0, persistent=True)
-
-
-def resume(work):
-    def tick():
-        try:
-            pause = next(work)
-        except StopIteration:
-            failed = any(json.loads(RESULTS.read_text()).values())
-            sys.stdout.flush()
-            os._exit(1 if failed else 0)
-        return 0.05 if pause is None else pause
-
-    return tick
-
-
-def all_steps():
-    results = {}
-    for step in (
-        panel_without_field,
-        panel_with_field,
-        singularities_as_dots,
-        bake_with_progress,
-        panel_with_picture,
-        panel_out_of_date,
-        eevee_shows_the_picture,
-        undo_after_bake,
-        stop_with_escape,
-        stop_when_an_object_is_deleted,
-        stop_on_undo,
-        stop_on_a_change_of_scene,
-        stop_when_switched_off,
-        stop_when_a_file_is_opened,
-        bake_the_current_view,
-    ):
-        name = step.__name__.replace("_", " ")
-        try:
-            yield from step()
-            results[name] = ""
-        except Exception:
-            results[name] = traceback.format_exc()
-        RESULTS.write_text(json.dumps(results))
-    results["the end"] = ""
-    RESULTS.write_text(json.dumps(results))
-
+from watching import SHOTS, in_view, rosy, until, view, watch
 
 # What the steps are made of
-
-
-def view():
-    """The window, the 3D view in it and its main region and sidebar."""
-    window = bpy.context.window_manager.windows[0]
-    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
-    regions = {region.type: region for region in area.regions}
-    return window, area, regions["WINDOW"], regions["UI"]
-
-
-def in_view():
-    """A context in which operators find the 3D view."""
-    window, area, region, _ = view()
-    return bpy.context.temp_override(window=window, area=area, region=region)
 
 
 def fresh_scene(size=(320, 240)):
@@ -131,11 +59,11 @@ def make_field():
 
 
 def status():
-    return sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.status"]
+    return rosy("rosy_addon.ui.status")
 
 
 def panels():
-    return sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.panels"]
+    return rosy("rosy_addon.ui.panels")
 
 
 def pixels(image):
@@ -150,14 +78,6 @@ def start_bake(**settings):
         assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
     yield from until(lambda: status().now is None or status().now.fraction > 0.1)
     assert status().now is not None, "the bake was over before it could be broken off"
-
-
-def until(condition):
-    late = time.monotonic() + PATIENCE
-    while not condition():
-        if time.monotonic() > late:
-            raise AssertionError("waited in vain")
-        yield
 
 
 def all_is_quiet():
@@ -221,7 +141,7 @@ def panel_with_field():
 
 def singularities_as_dots():
     """Dots of both signs while they are shown, and no handler when they are not."""
-    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    overlay = rosy("rosy_addon.ui.overlay")
     yield from fresh_scene()
     with in_view():
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
@@ -401,4 +321,20 @@ def bake_the_current_view():
     assert tuple(image.size) == (view()[2].width, view()[2].height)
 
 
-main()
+watch(
+    panel_without_field,
+    panel_with_field,
+    singularities_as_dots,
+    bake_with_progress,
+    panel_with_picture,
+    panel_out_of_date,
+    eevee_shows_the_picture,
+    undo_after_bake,
+    stop_with_escape,
+    stop_when_an_object_is_deleted,
+    stop_on_undo,
+    stop_on_a_change_of_scene,
+    stop_when_switched_off,
+    stop_when_a_file_is_opened,
+    bake_the_current_view,
+)

@@ -15,9 +15,9 @@ SLOW = {"test_compositor", "test_pictures"}
 
 
 def pytest_collection_modifyitems(items):
-    """Mark the tests of slow modules."""
+    """Mark the tests of slow modules, and those that draw on a graphics card and in numpy."""
     for item in items:
-        if item.path.stem in SLOW:
+        if item.path.stem in SLOW or "card" in item.fixturenames:
             item.add_marker(pytest.mark.slow)
 
 

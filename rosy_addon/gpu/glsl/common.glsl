@@ -15,6 +15,12 @@ int modulo(int number, int divisor)
   return number - divisor * int(floor((float(number) + 0.5) / float(divisor)));
 }
 
+// Modulo a positive number, of one that is less than that number out of range.
+int wrapped(int number, int divisor)
+{
+  return number < 0 ? number + divisor : (number >= divisor ? number - divisor : number);
+}
+
 vec2 conjugate(vec2 a)
 {
   return vec2(a.x, -a.y);

@@ -43,7 +43,11 @@ vec4 barycentrics(vec3 a, vec3 b, vec3 c, vec2 ray)
   vec3 edges = vec3(q.x * r.y - r.x * q.y, r.x * p.y - p.x * r.y, p.x * q.y - q.x * p.y);
   float total = edges.x + edges.y + edges.z;
   float front = total >= 0.0 ? 1.0 : 0.0;
-  return total == 0.0 ? vec4(vec3(1.0 / 3.0), front) : vec4(max(edges / total, 0.0), front);
+  // The rasteriser rounds corners, so that the pixel may be a little beside the triangle: what is
+  // taken then is of its border, not a sum of more than 1, which lies nearer or farther away.
+  vec3 weights = max(edges / total, 0.0);
+  weights /= weights.x + weights.y + weights.z;
+  return total == 0.0 ? vec4(vec3(1.0 / 3.0), front) : vec4(weights, front);
 }
 
 void main()

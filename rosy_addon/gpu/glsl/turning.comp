@@ -9,7 +9,7 @@ float sine_of_turn(ivec2 pixel, int line, ivec2 step_, vec2 here, float turn)
   }
   ivec2 there = pixel + step_;
   float other = texelFetch(cells, there, 0).x;
-  int sheet = modulo(line + int(round(turn - other)), around);
+  int sheet = wrapped(line + int(round(turn - other)), around);
   bool opposite = around == 2 * lines && sheet >= lines;
   vec2 way = unit_or_zero(texelFetch(ways, ivec3(there, opposite ? sheet - lines : sheet), 0).xy);
   vec2 turned = times(opposite ? -way : way, conjugate(here));

@@ -36,7 +36,7 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
       float turn = cell.x;
       cell = texelFetch(cells, pixel, 0);
       // k' = k + round((t(p) - t(q)) S / 2 pi) mod S
-      sheet = modulo(sheet + int(round(turn - cell.x)), around);
+      sheet = wrapped(sheet + int(round(turn - cell.x)), around);
     }
     found.total += cell.yzw;
     found.count += 1.0;
@@ -55,14 +55,15 @@ vec3 mapped_colour(float value)
 }
 
 // The hue of a line: that of the family it belongs to (`hues.family_hues`), from the angle of line 0
-// and of what the field stores.
-vec3 hue_of_line(int line, float first, float stored)
+// and of what the field stores. Of `told` families: 1 where nothing is stored, as of fields beside
+// this one of which no lines are told apart.
+vec3 hue_of_line(int line, float first, float stored, int told)
 {
   // Of odd degree every other line is a member's opposite half.
   float opposite = (around > degree && (degree & line & 1) == 1) ? 0.5 * TAU : 0.0;
   float at = first + opposite + TAU * float(line) / float(around);
   float ahead = (at * float(degree) - stored * float(families)) / TAU;
-  int family = modulo(int(round(ahead)), families);
+  int family = modulo(int(round(ahead)), told);
   return texelFetch(palette, ivec2(modulo(family, textureSize(palette, 0).x), 0), 0).xyz;
 }
 
@@ -109,9 +110,12 @@ void main()
   float toward = float(degree) * guiding_angle;
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
   float first = 0.0, stored = 0.0;
+  int told = 1;
   if (families > 1) {
     first = angle_of(z) / float(degree) + guiding_angle;
-    stored = angle_of(texelFetch(traits_seen, ivec3(pixel, family_layer), 0).xy);
+    vec2 known = texelFetch(traits_seen, ivec3(pixel, family_layer), 0).xy;
+    stored = angle_of(known);
+    told = known == vec2(0.0) ? 1 : families;
   }
   vec3 blend = vec3(0.0), hue = vec3(0.0);
   float samples = 0.0, weights = 0.0;
@@ -127,7 +131,7 @@ void main()
     samples += count;
     if (families > 1) {
       float weight = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
-      hue += weight * hue_of_line(line, first, stored);
+      hue += weight * hue_of_line(line, first, stored, told);
       weights += weight;
     }
   }

@@ -1,0 +1,215 @@
+"""Milliseconds of the shaders alone on the graphics card that is here, beside the paper's.
+
+A frame is what a moved camera costs: from triangles and their field on the card to the picture on the
+card. Nothing is sent there or read back, and a frame ends when the card is done. It takes numpy,
+moderngl and a driver with EGL, and neither Blender nor a display.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rosy_addon.gpu.card import Card, Placed
+
+from . import cases
+
+SIZES = ("512x512", "1920x1080", "3840x2160")
+
+DEGREES = (2, 3, 4, 6)
+
+#: Table 1 of the paper: its decomposition, 512 x 512 pixels and 12K triangles, on this card. Its
+#: objects are not ours, and it does not say how much of the frame they cover: ours do so to 85 %.
+PAPER = {2: 17, 3: 46, 4: 32, 6: 46}
+PAPERS_CARD = "NVIDIA GeForce 8600 GTS"
+PAPERS_SIZE = (512, 512)
+
+TRIANGLES = 12_000
+
+#: Where the time goes is looked at for this.
+STAGES_SIZE, STAGES_DEGREE = (1920, 1080), 4
+STAGES = {
+    "what is seen (seen, resolve)": ("seen", "resolve"),
+    "where lines go (flow, turning)": ("flow", "turning"),
+    "streamlines and light (walk)": ("walk",),
+}
+
+#: Frames that a time is the median of; fewer where they take longer than this together.
+FRAMES = 21
+SECONDS = 6.0
+
+#: Seconds of drawing before times count, one frame at least: shaders are compiled, clocks rise.
+WARM_UP = 0.3
+
+#: Radians by which the camera goes on from frame to frame.
+ON = 0.01
+
+
+def device() -> Any:
+    """What there is to draw with, or None, with a line that says why."""
+    try:
+        from .egl import EglDevice
+    except ImportError:
+        print("shaders: left out, there is no moderngl here", file=sys.stderr)
+        return None
+    try:
+        return EglDevice()
+    except Exception as error:
+        # moderngl raises bare exceptions.
+        reason = " ".join(str(error).split())
+        print(f"shaders: left out, there is no OpenGL 4.3 by EGL here ({reason})", file=sys.stderr)
+        return None
+
+
+class Frames:
+    """One object in a frame of one size, again and again."""
+
+    def __init__(self, drawn_by: Any, size: tuple[int, int], degree: int) -> None:
+        self.device = drawn_by
+        self.size = size
+        self.card = Card(drawn_by)
+        self.placed: list[Placed] = self.card.place([cases.body(TRIANGLES, degree)], "smooth")
+        self.drawn = 0
+
+    def draw(self) -> float:
+        """The next frame; how many seconds it took."""
+        camera = cases.camera(*self.size, azimuth=self.drawn * ON)
+        self.drawn += 1
+        start = time.perf_counter()
+        self.card.draw(self.placed, camera, cases.LOOK)
+        self.device.finish()
+        return time.perf_counter() - start
+
+    def warm_up(self) -> None:
+        """Draw for a while."""
+        start = time.perf_counter()
+        self.draw()
+        while time.perf_counter() - start < WARM_UP:
+            self.draw()
+
+    def times(self, frames: int) -> np.ndarray:
+        """Milliseconds of so many frames, or of fewer if they take long."""
+        self.warm_up()
+        found: list[float] = []
+        while len(found) < frames and sum(found) < SECONDS:
+            found.append(self.draw())
+        return np.array(found) * 1e3
+
+
+class Staged:
+    """A device that is waited for after each pass, and knows how long each took."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+        self.seconds: dict[str, float] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._device, name)
+
+    def compute(self, shader: Any, *rest: Any) -> None:
+        """As `Device.compute`."""
+        self._timed(self._device.compute, shader, *rest)
+
+    def draw(self, shader: Any, *rest: Any) -> None:
+        """As `Device.draw`."""
+        self._timed(self._device.draw, shader, *rest)
+
+    def _timed(self, work: Any, shader: Any, *rest: Any) -> None:
+        self._device.finish()
+        start = time.perf_counter()
+        work(shader, *rest)
+        self._device.finish()
+        took = time.perf_counter() - start
+        self.seconds[shader.name] = self.seconds.get(shader.name, 0.0) + took
+
+
+def rows(drawn_by: Any, sizes: Sequence[tuple[int, int]], frames: int) -> Iterator[dict[str, Any]]:
+    """A time for each size and degree."""
+    for size in sizes:
+        for degree in DEGREES:
+            times = Frames(drawn_by, size, degree).times(frames)
+            yield {
+                "width": size[0],
+                "height": size[1],
+                "degree": degree,
+                "milliseconds": float(np.median(times)),
+                "least": float(times.min()),
+                "largest": float(times.max()),
+                "frames": len(times),
+                "paper": PAPER[degree] if size == PAPERS_SIZE else None,
+            }
+
+
+def stages(drawn_by: Any, frames: int) -> dict[str, float]:
+    """Milliseconds a stage: medians, each with a wait of its own."""
+    staged = Staged(drawn_by)
+    again = Frames(staged, STAGES_SIZE, STAGES_DEGREE)
+    again.warm_up()
+    found = []
+    start = time.perf_counter()
+    while len(found) < frames and (not found or time.perf_counter() - start < SECONDS):
+        staged.seconds.clear()
+        again.draw()
+        found.append([sum(staged.seconds[name] for name in names) for names in STAGES.values()])
+    return dict(zip(STAGES, (np.median(found, axis=0) * 1e3).tolist(), strict=True))
+
+
+def line(row: dict[str, Any]) -> str:
+    """A row as it is printed."""
+    size = f"{row['width']} x {row['height']}"
+    spread = f"({row['least']:.2f} to {row['largest']:.2f})"
+    paper = "" if row["paper"] is None else f"{row['paper']}"
+    text = f"{size:>11}  {row['degree']:>2}  {row['milliseconds']:9.2f}  {spread:22} {paper:>5}"
+    return text.rstrip()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """What the command line asks for."""
+    about, _, more = (__doc__ or "").partition("\n")
+    parser = argparse.ArgumentParser(description=about, epilog=more.strip())
+    parser.add_argument("--sizes", nargs="+", type=_size, default=[_size(name) for name in SIZES])
+    parser.add_argument("--frames", type=int, default=FRAMES, help="of each (%(default)s)")
+    parser.add_argument("--no-stages", action="store_true", help="only whole frames")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
+    chosen = parser.parse_args(arguments)
+    drawn_by = device()
+    if drawn_by is None:
+        return 1
+    found: dict[str, Any] = {"renderer": drawn_by.name, "triangles": TRIANGLES, "rows": []}
+    print(drawn_by.name)
+    print(
+        f"{TRIANGLES // 1000}K triangles, {2 * cases.LOOK.length + 1} samples; milliseconds a frame,"
+    )
+    print(f"the least and the largest, and the paper's on an {PAPERS_CARD}", flush=True)
+    for row in rows(drawn_by, chosen.sizes, chosen.frames):
+        found["rows"].append(row)
+        print(line(row), flush=True)
+    if not chosen.no_stages:
+        found["stages"] = stages(drawn_by, chosen.frames)
+        width, height = STAGES_SIZE
+        print(f"of {width} x {height}, N = {STAGES_DEGREE}, waiting after each pass")
+        for name, amount in found["stages"].items():
+            print(f"  {name:34} {amount:9.2f}", flush=True)
+    if chosen.json:
+        chosen.json.parent.mkdir(parents=True, exist_ok=True)
+        chosen.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(side) for side in text.split("x"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT") from None
+    return width, height
+
+
+if __name__ == "__main__":
+    sys.exit(main())

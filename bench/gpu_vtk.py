@@ -1,0 +1,72 @@
+"""A frame of a cross field by the shaders over one of one vector field by VTK's surface LIC.
+
+Both on the same driver, Mesa's llvmpipe if there is no graphics card, with all cores; the same mesh,
+camera and coverage, 41 samples of a streamline. A frame is what a moved camera costs, until the
+driver is done; neither is read back.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from rosy_addon.gpu.card import Card
+
+from . import cases
+from .gpu import device
+from .surface_vtk import DEGREE, LOOK, ON, renderer
+from .timing import Case, compare, main
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """Few and many triangles."""
+    if device() is None:
+        return
+    try:
+        import vtk
+    except ImportError:
+        print("shaders beside VTK: left out, there is no vtk here", file=sys.stderr)
+        return
+    for triangles in (12_000, 200_000):
+        case = _compared(vtk, triangles, runs)
+        if case is not None:
+            yield case
+
+
+def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
+    """One mesh. Contexts of its own: with its window, VTK takes the display from all others."""
+    turn, read, theirs = renderer(vtk, triangles)
+    drawn_by = device()
+    print(f"shaders: {drawn_by.name}; VTK: {theirs}", flush=True)
+    if drawn_by.name != theirs:
+        print("shaders beside VTK: left out, they are not drawn by the same", file=sys.stderr)
+        return None
+    card = Card(drawn_by)
+    placed = card.place([cases.body(triangles, DEGREE)], LOOK.display)
+    picture = card.read(card.draw(placed, cases.camera(), LOOK), cases.SIZE, cases.SIZE)
+    turn()
+    ours, covered = (picture[..., 3] > 0).mean(), (read().min(axis=1) < 255).mean()
+    print(f"covered: {covered:.1%} by VTK, {ours:.1%} by the shaders", flush=True)
+    azimuths = iter(np.arange(1, 10_000) * ON)
+
+    def frame() -> None:
+        # VTK makes its own context the current one at each of its frames.
+        with drawn_by.context:
+            card.draw(placed, cases.camera(azimuth=next(azimuths)), LOOK)
+            drawn_by.finish()
+
+    return compare(
+        f"shaders, N = 4 / VTK's one vector field, {triangles // 1000}K triangles",
+        frame,
+        turn,
+        target=1.0,
+        higher_is_better=False,
+        runs=runs,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

@@ -1,0 +1,262 @@
+"""The graphics card beside numpy: how far their G-buffers and their pictures agree.
+
+    blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
+
+Draws sphere, torus, Suzanne, bunny and vase for N = 1 to 6, on whatever Blender draws with, and
+prints a row for each. The last two are meshes in ../shared/data, and left out where that is not.
+The tests measure with what is here, too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+MESHES = ROOT.parent / "shared" / "data" / "meshes"
+
+#: How far apart, in pixels, two points may be to be one. OpenGL rounds the corners of triangles to
+#: 1/256 of a pixel, and on steep parts depth changes by many pixels for each across.
+NEAR = 0.1
+
+#: How far unit normals may be apart, and the representation, relative to the greater of the two.
+ALIKE = 1e-3
+
+DEGREES = (1, 2, 3, 4, 5, 6)
+
+#: Azimuth, elevation and whether in perspective.
+VIEWS = {
+    "sphere": (30.0, 20.0, True),
+    "torus": (20.0, 40.0, False),
+    "Suzanne": (25.0, 10.0, True),
+    "bunny": (0.0, 85.0, True),
+    "vase": (10.0, 15.0, False),
+}
+
+
+def module_of(package: str, module: str) -> Any:
+    """A module of RoSy, from the repository or from an extension that is installed."""
+    return importlib.import_module(f"{package}.{module}")
+
+
+def rooms(package: str = "rosy_addon") -> SimpleNamespace:
+    """What is used here of RoSy."""
+
+    def of(module: str) -> Any:
+        return module_of(package, module)
+
+    return SimpleNamespace(
+        package=package,
+        Body=of("projection.gbuffer").Body,
+        Camera=of("projection.camera").Camera,
+        Card=of("gpu.card").Card,
+        Look=of("compositor.look").Look,
+        compose=of("compositor.compose").compose,
+        generate=of("field.generate").generate,
+        orbit_camera=of("projection.camera").orbit_camera,
+        project=of("projection.project").project,
+        read_mesh=of("field.meshfile").read_mesh,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """The same picture from both.
+
+    Attributes
+    ----------
+    gbuffer : GBuffer
+        Of numpy.
+    images : dict of str to (H, W, 4) float32 ndarray
+        The card's G-buffer.
+    card, numpy : (H, W, 4) float32 ndarray
+        The pictures, linear.
+    """
+
+    gbuffer: Any
+    images: dict[str, np.ndarray]
+    card: np.ndarray
+    numpy: np.ndarray
+
+    @property
+    def agreement(self) -> float:
+        """See `agreement`."""
+        return agreement(self.gbuffer, self.images)
+
+    @property
+    def likeness(self) -> float:
+        """See `likeness`."""
+        return likeness(self.card, self.numpy)
+
+
+def drawn_twice(
+    rosy: SimpleNamespace,
+    card: Any,
+    bodies: Sequence[Any],
+    camera: Any,
+    look: Any,
+    lights: Sequence[Any] = (),
+) -> Pair:
+    """Draw a picture on the card and with numpy, by brute force: with no averages shared.
+
+    Parameters
+    ----------
+    rosy : SimpleNamespace
+        Of `rooms`.
+    card : Card
+    bodies : sequence of Body
+    camera : Camera
+        Of `look.supersampling` times the size of the picture each way.
+    look : Look
+    lights : sequence of Light
+    """
+    side = look.supersampling
+    picture = card.draw(card.place(bodies, look.display), camera, look, lights)
+    found = card.read(picture, camera.width // side, camera.height // side)
+    images = card.gbuffer(camera)
+    gbuffer = rosy.project(bodies, camera, look.display)
+    expected = rosy.compose(gbuffer, replace(look, method="brute"), lights).rgba
+    return Pair(gbuffer, {name: np.array(image) for name, image in images.items()}, found, expected)
+
+
+def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
+    """The share of pixels at which both G-buffers say the same.
+
+    Of all pixels that at least one of them covers with a field, those count that
+
+    - both cover, with the same body,
+    - at the same point of it, within `NEAR` of a pixel: two points on the ray through the pixel, so
+      their distance is that in depth, and compared with what a pixel measures across there. Which
+      triangle is seen may differ where two meet, as OpenGL rounds their corners, but not the point;
+    - with the same normal, within `ALIKE` (its sign says which side is seen),
+    - and the same representation, z, within `ALIKE` of the greater modulus; 0 only with 0.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        Of numpy.
+    images : dict of str to (H, W, 4) ndarray
+        Of `Card.gbuffer`.
+    """
+    camera, pixel = gbuffer.camera, gbuffer.pixel
+    normals, values = (images[name].reshape(-1, 4) for name in ("normals", "values_seen"))
+    covered = np.zeros(camera.width * camera.height, dtype=bool)
+    covered[pixel] = True
+    either = np.count_nonzero(covered | (values[:, 3] > 0))
+    normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
+    same = values[:, 3] == gbuffer.body + 1
+    depth = -gbuffer.position[:, 2].astype(np.float64)
+    apart = np.abs(np.abs(normals[:, 3]) - depth)
+    if camera.is_perspective:
+        # Along the ray, and in units of a pixel at that depth.
+        apart = apart / gbuffer.toward_eye[:, 2] / depth
+    same &= apart * camera.pixels_per_unit < NEAR
+    same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < ALIKE
+    same &= (normals[:, 3] > 0) == gbuffer.front
+    z = values[:, 0] + 1j * values[:, 1]
+    expected = gbuffer.representation.astype(np.complex128)
+    same &= np.abs(z - expected) <= ALIKE * np.maximum(np.abs(z), np.abs(expected))
+    return np.count_nonzero(same) / either
+
+
+def likeness(one: np.ndarray, other: np.ndarray) -> float:
+    """The correlation of two (H, W, 4) linear pictures where both cover a pixel wholly.
+
+    Of grey pictures it is that of their grey values; of coloured ones the least of the channels.
+    """
+    both = (one[..., 3] == 1) & (other[..., 3] == 1)
+    one, other = one[both].astype(np.float64), other[both].astype(np.float64)
+    return min(float(np.corrcoef(one[:, c], other[:, c])[0, 1]) for c in range(3))
+
+
+def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
+    """A surface that Blender itself makes: sphere, torus or Suzanne."""
+    import bpy
+
+    if name == "sphere":
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48)
+    elif name == "torus":
+        bpy.ops.mesh.primitive_torus_add(
+            major_segments=128, minor_segments=48, major_radius=1.0, minor_radius=0.4
+        )
+    else:
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = 2
+    bpy.ops.object.shade_smooth()
+    thing = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    meshes = module_of(rosy.package, "scene.meshes")
+    try:
+        return meshes.mesh_surface(thing.to_mesh(), name)
+    finally:
+        thing.to_mesh_clear()
+        bpy.ops.object.delete()
+
+
+def surface_named(rosy: SimpleNamespace, name: str) -> Any:
+    """One of `VIEWS`, None if its file is not there."""
+    files = {"bunny": MESHES / "stanford-bunny.obj", "vase": MESHES / "vase.off"}
+    if name not in files:
+        return blender_surface(rosy, name)
+    return rosy.read_mesh(files[name]) if files[name].is_file() else None
+
+
+def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
+    """What `VIEWS` says of it, in a square frame."""
+    azimuth, elevation, perspective = VIEWS[name]
+    return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
+
+
+def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
+    """A line of the table for each shape and degree."""
+    yield "| shape | triangles | N | pixels | agree % | correlation | shaded | card s | numpy s |"
+    yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
+    for name in VIEWS:
+        surface = surface_named(rosy, name)
+        if surface is None:
+            continue
+        camera = camera_for(rosy, name, surface, size)
+        for degree in DEGREES:
+            body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
+            plain = rosy.Look(shading=0.0)
+            start = time.perf_counter()
+            card.read(card.draw(card.place([body], "smooth"), camera, plain), size, size)
+            middle = time.perf_counter()
+            pair = drawn_twice(rosy, card, [body], camera, plain)
+            end = time.perf_counter()
+            shaded = drawn_twice(rosy, card, [body], camera, rosy.Look())
+            yield (
+                f"| {name} | {len(surface.triangles)} | {degree} | {len(pair.gbuffer.pixel)} "
+                f"| {100 * pair.agreement:.3f} | {pair.likeness:.4f} | {shaded.likeness:.4f} "
+                f"| {middle - start:.1f} | {end - middle:.1f} |"
+            )
+
+
+def main() -> None:
+    """What the command line asks for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--out", type=Path, help="write the table here, too")
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
+    rosy = rooms()
+    device = module_of(rosy.package, "gpu.device").BlenderDevice()
+    lines = []
+    for line in sweep(rosy, rosy.Card(device), options.size):
+        print(line, flush=True)
+        lines.append(line)
+    if options.out:
+        options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    main()

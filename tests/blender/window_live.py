@@ -567,8 +567,7 @@ def nothing_leaks():
         switch("ON")
         cards[:] = [*cards[-9:], live()._live.maker]
         view()[1].tag_redraw()
-        yield 0.1
-        assert cards[-1].textures > 8
+        yield from until(lambda: cards[-1].textures > 8)
         switch("OFF")
         yield 0.02
 

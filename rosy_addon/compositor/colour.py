@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 # Seventeen even samples of each map, sRGB. Viridis and magma are Nathaniel Smith's and Stefan van
@@ -37,6 +39,16 @@ def map_colours(values: np.ndarray, name: str) -> np.ndarray:
 def colour_stops(name: str) -> np.ndarray:
     """(n, 3) float64 display values of a map at even places from 0 to 1, linear in between."""
     return np.array([list(bytes.fromhex(code)) for code in _MAPS[name].split()]) / 255
+
+
+def from_hex(code: str) -> np.ndarray:
+    """(3,) float32 display values of a colour ``#rrggbb``."""
+    return np.array(list(bytes.fromhex(code[1:])), dtype=np.float32) / 255
+
+
+def to_hex(display: Sequence[float]) -> str:
+    """``#rrggbb`` of three display values from 0 to 1."""
+    return "#" + bytes(round(255 * min(max(value, 0), 1)) for value in display).hex()
 
 
 def to_linear(display: np.ndarray) -> np.ndarray:

@@ -10,10 +10,12 @@ import numpy as np
 from ..memory import keep_freed_memory
 from ..progress import Work, drain, part
 from ..projection.gbuffer import GBuffer
+from .anchored import surface_noise
 from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
+from .hatching import ink_coverage, inked
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
@@ -31,7 +33,20 @@ METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
 }
 
 #: Settings of a look that LIC images do not depend on.
-AFTERWARDS = ("gain", "shading", "light", "colour_map", "hue")
+AFTERWARDS = (
+    "gain",
+    "shading",
+    "light",
+    "colour_map",
+    "hue",
+    "ink",
+    "ink_colour",
+    "paper_colour",
+    "clear_paper",
+    "crispness",
+    "layers",
+    "layering",
+)
 
 
 def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
@@ -52,6 +67,8 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     camera = gbuffer.camera
     finer = scaled_look(look)
     colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
+    alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
+    light = diffuse(gbuffer, look, lights)
     degree_of = np.asarray(gbuffer.degrees)[gbuffer.body]
     layers = []
     degrees = np.unique(degree_of).tolist()
@@ -60,10 +77,21 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
         start, stop = count / len(degrees), (count + 1) / len(degrees)
         images = yield from part(_images_of(gbuffer, flow, finer), start, stop)
         layer = _layers(flow, finer, images)
-        colour[degree_of == degree] = _ink(flow, layer, finer)
+        own = degree_of == degree
+        if look.ink == "hatch":
+            coverage = ink_coverage(flow, images, finer, light[own].mean(axis=1))
+            colour[own], alpha[own] = inked(coverage, finer), coverage
+        else:
+            colour[own] = _ink(flow, layer, finer)
         layers.append(layer)
-    colour *= diffuse(gbuffer, look, lights)
-    rgba = _frame(gbuffer.pixel, colour, camera.width, camera.height, look.supersampling)
+    if look.ink == "soft":
+        colour *= light
+    elif look.clear_paper:
+        # There is nothing but ink, more or less of it.
+        colour[:] = inked(np.ones(1, dtype=np.float32), look)
+    if look.ink == "soft" or not look.clear_paper:
+        alpha[:] = 1
+    rgba = _frame(gbuffer.pixel, colour, alpha, camera.width, camera.height, look.supersampling)
     return Picture(rgba, tuple(layers))
 
 
@@ -104,7 +132,8 @@ def compose_planar(
     look = replace(look, supersampling=1)
     layers = _layers(flow, look, drain(_images(flow, look, noise)))
     colour = _ink(flow, layers, look)
-    return Picture(_frame(flow.pixel, colour, flow.width, flow.height, 1), (layers,))
+    opaque = np.ones(len(flow.pixel), dtype=np.float32)
+    return Picture(_frame(flow.pixel, colour, opaque, flow.width, flow.height, 1), (layers,))
 
 
 def scaled_look(look: Look) -> Look:
@@ -133,9 +162,32 @@ def _images_of(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Images]:
     key = replace(look, **{name: getattr(Look, name) for name in AFTERWARDS})
     made = gbuffer.made.get(("images", flow.degree))
     if made is None or made[0] != key:
-        made = key, (yield from _images(flow, look))
+        made = key, (yield from _images(flow, look, _noise(gbuffer, flow, look)))
         gbuffer.made["images", flow.degree] = made
     return made[1]
+
+
+def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:
+    """(P, K) noise on the surfaces at the pixels of a flow; None for that of the picture."""
+    if look.anchor == "picture":
+        return None
+    key = look.grain, look.seed, look.noise, look.density, look.high_pass
+    made = gbuffer.made.get("noise")
+    if made is None or made[0] != key:
+        channels = 3 if look.noise == "colour" else 1
+        noise = surface_noise(
+            gbuffer,
+            look.grain,
+            look.seed,
+            channels,
+            density=look.density,
+            high_pass=look.high_pass,
+        )
+        made = gbuffer.made["noise"] = key, noise
+    noise = made[1]
+    if len(flow.pixel) == len(gbuffer.pixel):
+        return noise
+    return noise[np.searchsorted(gbuffer.pixel, flow.pixel)]
 
 
 def _images(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Images]:
@@ -181,12 +233,18 @@ def _ink(flow: Flow, layers: Layers, look: Look) -> np.ndarray:
 
 
 def _frame(
-    pixel: np.ndarray, colour: np.ndarray, width: int, height: int, supersampling: int
+    pixel: np.ndarray,
+    colour: np.ndarray,
+    alpha: np.ndarray,
+    width: int,
+    height: int,
+    supersampling: int,
 ) -> np.ndarray:
     """(H, W, 4) float32: colours put in their places, blocks of subpixels averaged."""
     rows = np.empty((len(pixel), 4), dtype=np.float32)
-    rows[:, :3] = colour
-    rows[:, 3] = 1
+    # Subpixels are premultiplied for their sums; those that see nothing are black and of alpha 0.
+    rows[:, :3] = colour if supersampling == 1 else colour * alpha[:, None]
+    rows[:, 3] = alpha
     if len(pixel) == height * width:
         rgba = rows
     else:
@@ -196,7 +254,6 @@ def _frame(
     s = supersampling
     if s == 1:
         return rgba.reshape(height, width, 4)
-    # Uncovered subpixels are black and of alpha 0: the sums are premultiplied.
     rgba = rgba.reshape(height // s, s, width // s, s, 4).mean(axis=(1, 3))
     alpha = rgba[..., 3:]
     np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)

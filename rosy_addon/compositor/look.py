@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -25,6 +26,11 @@ def _choice(default: str, text: str, **options: str) -> Any:
 
 def _switch(default: bool, text: str) -> Any:
     return field(default=default, metadata={"text": text})
+
+
+def _colour(default: str, text: str) -> Any:
+    """Display values (sRGB) as ``#rrggbb``."""
+    return field(default=default, metadata={"colour": True, "text": text})
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,13 @@ class Look:
         grey="One channel",
         colour="Three channels, drawn separately: a plaid",
     )
+    anchor: str = _choice(
+        "picture",
+        "What the noise, and so the streaks, stay with when something moves",
+        picture="The picture: still pictures, as the paper's",
+        surface="The surface: streaks move with it, bend with it and keep their width, for "
+        "hatching and animations",
+    )
     hue: str = _choice(
         "one",
         "Whether families of directions differ in hue",
@@ -131,6 +144,20 @@ class Look:
         headlight="The eye",
         scene="The lights of the scene",
     )
+    ink: str = _choice(
+        "soft",
+        "What streaks are made of",
+        soft="Brighter and darker light around the mean, the surface shaded",
+        hatch="Lines of ink on paper, as many and as wide as the light asks for",
+    )
+    ink_colour: str = _colour("#08080d", "Colour of the ink")
+    paper_colour: str = _colour("#ffffff", "Colour of the paper")
+    clear_paper: bool = _switch(False, "Leave the paper transparent, so that there is only ink")
+    crispness: float = _number(0.7, 0.0, 1.0, "From soft grey streaks to lines with sharp borders")
+    layers: int = _number(3, 1, 12, "Families of lines that may cross in the darkest tones")
+    layering: float = _number(
+        0.3, 0.0, 1.0, "Darkness between the tone at which one family begins and the next"
+    )
     supersampling: int = _number(1, 1, 4, "Samples of a pixel along each side")
 
     def __post_init__(self) -> None:
@@ -153,7 +180,10 @@ class Look:
 
 
 def _check_setting(name: str, value: Any, default: Any, rules: Any) -> None:
-    if "options" in rules:
+    if "colour" in rules:
+        if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
+            raise RosyError(f"setting '{name}' is {value!r}, not a colour like #08080d")
+    elif "options" in rules:
         if value not in rules["options"]:
             wanted = ", ".join(rules["options"])
             raise RosyError(f"setting '{name}' is {value!r}, not one of {wanted}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -45,9 +46,19 @@ def hash_bits(x: np.ndarray, y: np.ndarray, seed: int, channel: int, density: fl
     The finaliser is `lowbias32` of Chris Wellons, "Prospecting for Hash Functions", 2018 (public
     domain).
     """
+    return random_bits((x, y), seed, channel, density)
+
+
+#: Odd numbers by which the indices of a cell are multiplied, one each.
+FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
+
+
+def random_bits(index: Sequence[np.ndarray], seed: int, channel: int, density: float) -> np.ndarray:
+    """`hash_bits` of cells with any number of indices, up to five."""
     start = (seed * 0x9E3779B9 + channel * 0x85EBCA6B) & 0xFFFFFFFF
-    h = x.astype(np.uint32) * np.uint32(0x8DA6B343)
-    h ^= y.astype(np.uint32) * np.uint32(0xD8163841)
+    h = index[0].astype(np.uint32) * np.uint32(FACTORS[0])
+    for number, factor in zip(index[1:], FACTORS[1:], strict=False):
+        h = h ^ number.astype(np.uint32) * np.uint32(factor)
     h += np.uint32(start)
     h ^= h >> np.uint32(16)
     h *= np.uint32(0x7FEB352D)
@@ -125,7 +136,7 @@ def _tiles(
     around = (left - margin, right + margin, bottom - margin, top + margin)
     cells = _cells(*around, grain, seed, channel, density)
     if high_pass:
-        cells += MEAN - _blurred(cells, BLUR * high_pass)
+        cells += MEAN - blurred(cells, BLUR * high_pass)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
@@ -156,7 +167,7 @@ def _cells(
     return np.float32(MEAN - density * scale) + np.float32(scale / (TAPS * TAPS)) * total
 
 
-def _blurred(image: np.ndarray, deviation: float) -> np.ndarray:
+def blurred(image: np.ndarray, deviation: float) -> np.ndarray:
     """Nearly a Gaussian blur, of the given deviation in pixels: three means over squares."""
     # A mean over w pixels has the variance (w^2 - 1) / 12.
     reach = max(int(np.rint((np.sqrt(4 * deviation**2 + 1) - 1) / 2)), 1)

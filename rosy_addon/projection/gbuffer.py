@@ -77,6 +77,8 @@ class GBuffer:
     traits : dict of Trait to (P,) complex64 ndarray
         What some fields have besides (`carried.Trait`), in the same frame; elsewhere what a RoSy
         would have.
+    bodies : tuple of Body
+        What it was made of; empty if that is not known.
     made : dict
         What has been made of it for a look, for the next one.
     """
@@ -96,6 +98,7 @@ class GBuffer:
     plane_normal: np.ndarray | None = None
     front: np.ndarray | None = None
     traits: dict[Trait, np.ndarray] = dataclass_field(default_factory=dict)
+    bodies: tuple[Body, ...] = ()
     made: dict[Any, Any] = dataclass_field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

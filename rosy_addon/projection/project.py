@@ -241,6 +241,7 @@ def _empty_buffer(bodies: Sequence[Body], camera: Camera, seen: _Seen) -> GBuffe
         representation=np.empty(count, dtype=np.complex64),
         plane_normal=_vectors(count),
         front=fragments.front,
+        bodies=tuple(bodies),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+from ..compositor.colour import from_hex, to_hex
 from ..compositor.look import Look
 
 
@@ -24,11 +25,14 @@ def apply_look(settings: Any, look: Look) -> None:
     """Give the properties of ``scene.rosy``, or its ``look``, the values of a look."""
     group = getattr(settings, "look", settings)
     for entry in fields(Look):
-        setattr(group, entry.name, getattr(look, entry.name))
+        value = getattr(look, entry.name)
+        setattr(group, entry.name, from_hex(value) if "colour" in entry.metadata else value)
 
 
 def _exact(value: Any, entry: Any) -> Any:
-    """The decimal number that was meant by one that Blender keeps in single precision."""
+    """What was meant by what Blender keeps: the decimal number by one in single precision."""
+    if "colour" in entry.metadata:
+        return to_hex(value)
     if not isinstance(value, float):
         return value
     value = float(f"{value:.7g}")

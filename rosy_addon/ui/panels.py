@@ -31,7 +31,16 @@ GROUPS = {
     ),
     "Colour": ("noise", "hue", "magnitude", "magnitude_range", "colour_map"),
     "Light": ("shading", "light"),
-    "Quality": ("supersampling", "display", "method", "seed"),
+    "Ink": (
+        "ink",
+        "ink_colour",
+        "paper_colour",
+        "clear_paper",
+        "crispness",
+        "layers",
+        "layering",
+    ),
+    "Quality": ("supersampling", "display", "method", "anchor", "seed"),
 }
 
 #: The rest, which few will need: also whatever a look is given later and no group has taken up.
@@ -304,6 +313,8 @@ def _matters(settings: Any, name: str) -> bool:
         return look.shading > 0
     if name == "directory":
         return settings.store == "SAVED"
+    if name in {"ink_colour", "paper_colour", "clear_paper", "crispness", "layers", "layering"}:
+        return look.ink == "hatch"
     if name == "crease_angle":
         return not look.cross_creases
     return True

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ..compositor.colour import from_hex
 from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.painter import DEVICES
@@ -54,6 +55,9 @@ def _look_property(entry: Any) -> Any:
             for option, text in rules["options"].items()
         ]
         return bpy.props.EnumProperty(items=items, **what)
+    if "colour" in rules:
+        what["default"] = from_hex(entry.default).tolist()
+        return bpy.props.FloatVectorProperty(subtype="COLOR_GAMMA", size=3, min=0, max=1, **what)
     if isinstance(entry.default, bool):
         return bpy.props.BoolProperty(**what)
     what |= {"min": rules["low"], "max": rules["high"]}

@@ -1,0 +1,104 @@
+"""Noise that stays where it is on a surface, however the surface, the camera or the lens move.
+
+A cell of the noise is a cube of the space in which the body is at rest. Its size follows that of a
+pixel there in octaves: at each pixel two of them are mixed, and as one comes nearer to the surface
+the finer takes over from the coarser, so that streaks neither swim nor change their width. That is
+a solid texture made dynamic (Benard, Bousseau, Thollot, "Dynamic Solid Textures for Real-Time
+Coherent Stylization", I3D 2009), of white noise, and mixed so that its variance stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..projection.gbuffer import GBuffer
+from ..projection.rest import rest_places
+from .noise import BLUR, DEVIATION, MEAN, blurred, random_bits
+
+#: Parts of a pixel at which the cells are looked up: no two in a row or a column.
+TAPS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
+
+#: A plane cuts a lattice of cubes into pieces of two thirds of their side's area, on average.
+SIDE = 1.5**0.5
+
+#: The lattice stands askew to the axes, along which people build: three rotations by odd angles.
+ANGLES = (0.61, 1.13, 0.37)
+
+#: Octaves are counted from here, for hashes of whole numbers above 0.
+LOWEST = 64
+
+
+def surface_noise(
+    gbuffer: GBuffer, grain: float, seed: int, channels: int, *, density: float, high_pass: float
+) -> np.ndarray:
+    """Noise anchored to the surfaces of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its bodies.
+    grain : float
+        Side of a cell as it is seen, about, pixels.
+    seed : int
+    channels : int
+        1 or 3, independent of each other.
+    density : float
+        Share of cells that are bright.
+    high_pass : float
+        Pixels; variations broader than about this are taken out. 0 leaves the noise white.
+
+    Returns
+    -------
+    (P, channels) float32 ndarray
+        With mean `MEAN`, as `image_noise`.
+    """
+    places = rest_places(gbuffer)
+    level = np.log2(np.maximum(places.size, 1e-30) * np.float32(grain * SIDE))
+    octave = np.floor(level)
+    share = (level - octave).astype(np.float32) * np.float32(np.pi / 2)
+    # The squares of both sum to 1, so that the variance is that of one.
+    mixed = np.cos(share), np.sin(share)
+    taps = [places.at(*tap) for tap in TAPS]
+    lattice = _askew(taps)
+    total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
+    for number, weight in enumerate(mixed):
+        scale = np.exp2(-(octave + number)).astype(np.float32)
+        turn = (octave + number + LOWEST).astype(np.int32)
+        for place in lattice:
+            cell = np.floor(place * scale).astype(np.int32)
+            for channel, out in enumerate(total):
+                bits = random_bits((*cell, turn, gbuffer.body), seed, channel, density)
+                out += weight * (bits - np.float32(density))
+    total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
+    if high_pass:
+        for values in total:
+            values -= _broad(gbuffer, values, BLUR * high_pass)
+    return np.ascontiguousarray(total.T) + np.float32(MEAN)
+
+
+def _askew(places: list[np.ndarray]) -> list[np.ndarray]:
+    """Places turned out of the axes."""
+    turn = np.eye(3)
+    for axis, angle in enumerate(ANGLES):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        step = np.eye(3)
+        step[one, one] = step[other, other] = np.cos(angle)
+        step[one, other], step[other, one] = -np.sin(angle), np.sin(angle)
+        turn = step @ turn
+    turn = turn.astype(np.float32)
+    return [
+        np.stack([row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in turn]) for p in places
+    ]
+
+
+def _broad(gbuffer: GBuffer, values: np.ndarray, deviation: float) -> np.ndarray:
+    """(P,) what is left of values after a blur over the pixels that are seen."""
+    camera = gbuffer.camera
+    row, column = np.divmod(gbuffer.pixel, np.int32(camera.width))
+    low, left = int(row[0]), int(column.min())
+    shape = int(row[-1]) - low + 1, int(column.max()) - left + 1
+    place = (row - low) * np.int32(shape[1]) + (column - left)
+    sums, seen = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    sums.reshape(-1)[place], seen.reshape(-1)[place] = values, 1
+    sums, seen = blurred(sums, deviation), blurred(seen, deviation)
+    return sums.reshape(-1).take(place) / np.maximum(seen.reshape(-1).take(place), 1e-3)

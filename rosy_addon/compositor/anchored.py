@@ -9,11 +9,15 @@ Coherent Stylization", I3D 2009), of white noise, and mixed so that its variance
 
 from __future__ import annotations
 
+import zlib
+from collections import Counter
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..projection.gbuffer import GBuffer
 from ..projection.rest import rest_places
-from .noise import BLUR, DEVIATION, MEAN, blurred, random_bits
+from .noise import BLUR, DEVIATION, MEAN, blur_reach, blurred, random_bits
 
 #: Parts of a pixel at which the cells are looked up: no two in a row or a column.
 TAPS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
@@ -58,8 +62,8 @@ def surface_noise(
     share = (level - octave).astype(np.float32) * np.float32(np.pi / 2)
     # The squares of both sum to 1, so that the variance is that of one.
     mixed = np.cos(share), np.sin(share)
-    taps = [places.at(*tap) for tap in TAPS]
-    lattice = _askew(taps)
+    lattice = [_turned(places.at(*tap)) for tap in TAPS]
+    identity = identities(gbuffer.names)[gbuffer.body]
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for number, weight in enumerate(mixed):
         scale = np.exp2(-(octave + number)).astype(np.float32)
@@ -67,7 +71,7 @@ def surface_noise(
         for place in lattice:
             cell = np.floor(place * scale).astype(np.int32)
             for channel, out in enumerate(total):
-                bits = random_bits((*cell, turn, gbuffer.body), seed, channel, density)
+                bits = random_bits((*cell, turn, identity), seed, channel, density)
                 out += weight * (bits - np.float32(density))
     total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
     if high_pass:
@@ -76,8 +80,21 @@ def surface_noise(
     return np.ascontiguousarray(total.T) + np.float32(MEAN)
 
 
-def _askew(places: list[np.ndarray]) -> list[np.ndarray]:
-    """Places turned out of the axes."""
+def identities(names: Sequence[str]) -> np.ndarray:
+    """(B,) uint32: numbers for bodies, the same from picture to picture.
+
+    By their names; instances of one have numbers of their own, in their order.
+    """
+    seen: Counter[str] = Counter()
+    found = []
+    for name in names:
+        found.append(zlib.crc32(f"{name} {seen[name]}".encode()))
+        seen[name] += 1
+    return np.array(found, dtype=np.uint32)
+
+
+def lattice_axes() -> np.ndarray:
+    """(3, 3) float32 rows: the axes of the lattice in the space of a body at rest."""
     turn = np.eye(3)
     for axis, angle in enumerate(ANGLES):
         one, other = (axis + 1) % 3, (axis + 2) % 3
@@ -85,18 +102,22 @@ def _askew(places: list[np.ndarray]) -> list[np.ndarray]:
         step[one, one] = step[other, other] = np.cos(angle)
         step[one, other], step[other, one] = -np.sin(angle), np.sin(angle)
         turn = step @ turn
-    turn = turn.astype(np.float32)
-    return [
-        np.stack([row[0] * p[0] + row[1] * p[1] + row[2] * p[2] for row in turn]) for p in places
-    ]
+    return turn.astype(np.float32)
+
+
+def _turned(place: np.ndarray) -> np.ndarray:
+    """(3, P) places along the axes of the lattice."""
+    x, y, z = place
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
 
 
 def _broad(gbuffer: GBuffer, values: np.ndarray, deviation: float) -> np.ndarray:
     """(P,) what is left of values after a blur over the pixels that are seen."""
-    camera = gbuffer.camera
-    row, column = np.divmod(gbuffer.pixel, np.int32(camera.width))
-    low, left = int(row[0]), int(column.min())
-    shape = int(row[-1]) - low + 1, int(column.max()) - left + 1
+    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    # With as much of nothing around as the blur reaches.
+    margin = 3 * blur_reach(deviation)
+    low, left = int(row[0]) - margin, int(column.min()) - margin
+    shape = int(row[-1]) - low + 1 + margin, int(column.max()) - left + 1 + margin
     place = (row - low) * np.int32(shape[1]) + (column - left)
     sums, seen = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
     sums.reshape(-1)[place], seen.reshape(-1)[place] = values, 1

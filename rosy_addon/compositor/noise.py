@@ -167,10 +167,15 @@ def _cells(
     return np.float32(MEAN - density * scale) + np.float32(scale / (TAPS * TAPS)) * total
 
 
+def blur_reach(deviation: float) -> int:
+    """How far on either side each of the three means of `blurred` reaches, pixels."""
+    # A mean over w pixels has the variance (w^2 - 1) / 12.
+    return max(int(np.rint((np.sqrt(4 * deviation**2 + 1) - 1) / 2)), 1)
+
+
 def blurred(image: np.ndarray, deviation: float) -> np.ndarray:
     """Nearly a Gaussian blur, of the given deviation in pixels: three means over squares."""
-    # A mean over w pixels has the variance (w^2 - 1) / 12.
-    reach = max(int(np.rint((np.sqrt(4 * deviation**2 + 1) - 1) / 2)), 1)
+    reach = blur_reach(deviation)
     for axis in (0, 1, 0, 1, 0, 1):
         image = _mean_along(image, reach, axis)
     return image

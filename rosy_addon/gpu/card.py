@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.colour import colour_stops
+from ..compositor.anchored import LOWEST, SIDE, TAPS, identities, lattice_axes
+from ..compositor.colour import colour_stops, from_hex, to_linear
 from ..compositor.compose import scaled_look
 from ..compositor.contrast import averaging_gain, expected_deviation
+from ..compositor.hatching import JOINING, TRACE, ink_thresholds, softness
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
-from ..compositor.noise import image_noise, streak_statistics
+from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
 from ..compositor.shading import Light
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
@@ -27,6 +29,7 @@ from ..progress import Progress, Work, drain, part
 from ..projection.camera import Camera
 from ..projection.carried import Trait
 from ..projection.gbuffer import Body
+from ..projection.rest import growth
 from ..projection.steps import OBLIQUE_TOLERANCE, STEEPEST, TOLERANCE
 from . import passes
 from .device import Device
@@ -60,6 +63,7 @@ class Placed:
     shape: _OnCard
     field: RosyField | None
     moving: np.ndarray
+    grown: float
 
 
 @dataclass(eq=False)
@@ -184,7 +188,7 @@ class Card:
             self._shapes[key] = self._brought(body.surface, linear, body.field, display, layers)
         entry = self._shapes[key]
         entry.used = self._drawn
-        return Placed(entry, body.field, moving @ shifting(entry.shape.centre))
+        return Placed(entry, body.field, moving @ shifting(entry.shape.centre), growth(body.matrix))
 
     def _brought(
         self,
@@ -254,6 +258,10 @@ class Card:
         boxes = [_window(entry, camera) for entry in placed]
         fields = [entry.field for entry in placed if entry.field is not None]
         kinds = kinds_of(fields)
+        if look.anchor == "surface":
+            noise = self._anchored(placed, camera, scaled_look(look))
+        else:
+            noise = self._noise(camera.width, camera.height, look)
         for number, (degree, kind) in enumerate(kinds.items()):
             own = [
                 box
@@ -263,7 +271,7 @@ class Card:
             around = _around(own)
             if _is_empty(around):
                 continue
-            work = self._composing(kind, around, camera, look, lights, fine)
+            work = self._composing(kind, around, camera, look, lights, noise, fine)
             start, stop = number / len(kinds), (number + 1) / len(kinds)
             yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
         if whole:
@@ -342,7 +350,7 @@ class Card:
         self.device.draw(shader, batches, (seen, depth), {})
         values = self._image("values_seen", width, height)
         self.device.clear(values)
-        layers = max(((entry.shape.shape.texels - 8) // 2 for entry in placed), default=0)
+        layers = max((entry.shape.shape.traits for entry in placed), default=0)
         self._traits = (
             self._image("traits_seen", width, height, layers=layers)
             if layers > 0
@@ -367,18 +375,12 @@ class Card:
             left, bottom, right, top = box = _window(entry, camera)
             if _is_empty(box):
                 continue
-            place = camera.view @ entry.moving
             constants = {
                 **shared,
+                **_body_constants(number, entry, camera),
                 "corner": (left, bottom),
-                "body": float(number),
-                "texels": entry.shape.shape.texels,
-                "row_bits": ROW_BITS,
-                "traits": (entry.shape.shape.texels - 8) // 2,
-                "place_x": tuple(place[0]),
-                "place_y": tuple(place[1]),
-                "place_z": tuple(place[2]),
-                "scale": float(np.linalg.norm(place[:3, 0])),
+                "traits": entry.shape.shape.traits,
+                "scale": _scale(entry.moving),
             }
             self.device.compute(
                 passes.RESOLVE,
@@ -388,6 +390,70 @@ class Card:
                 constants,
             )
 
+    def _anchored(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
+        """Noise that stays with the surfaces, as `anchored.surface_noise`."""
+        width, height = camera.width, camera.height
+        raw = self._image("raw_noise", width, height)
+        self.device.clear(raw)
+        lattice = lattice_axes()
+        spread = DEVIATION / np.sqrt(look.density * (1 - look.density)) / len(TAPS)
+        shared = {
+            **_camera_constants(camera),
+            **{f"lattice_{axis}": (*row, 0.0) for axis, row in zip("xyz", lattice, strict=True)},
+            "amplitude": spread,
+            "density": look.density,
+            "bright_below": round(look.density * 2**24),
+            "channels": 3 if look.noise == "colour" else 1,
+            "seed": look.seed,
+            "LOWEST": LOWEST,
+        }
+        names = identities([entry.shape.owners[0].name for entry in placed]).view(np.int32)
+        for number, entry in enumerate(placed):
+            left, bottom, right, top = box = _window(entry, camera)
+            if entry.field is None or _is_empty(box):
+                continue
+            constants = {
+                **shared,
+                **_body_constants(number, entry, camera),
+                "corner": (left, bottom),
+                "unit_of_pixel": look.grain * SIDE / (camera.pixels_per_unit * entry.grown),
+                "identity": int(names[number]),
+            }
+            self.device.compute(
+                passes.ANCHORED,
+                (right - left, top - bottom),
+                {"seen": self._image("seen", width, height), "triangles": entry.shape.records},
+                {"raw_noise": raw},
+                constants,
+            )
+        return self._without_clouds(raw, camera, look.high_pass)
+
+    def _without_clouds(self, raw: Any, camera: Camera, high_pass: float) -> Any:
+        """Noise around its mean, and nothing broad in it: `anchored._broad`."""
+        size = camera.width, camera.height
+        smooth = raw
+        if high_pass:
+            reach = blur_reach(BLUR * high_pass)
+            for number, along in enumerate(((1, 0), (0, 1)) * 3):
+                smoother = self._image(f"smooth {number % 2}", *size)
+                self.device.compute(
+                    passes.SMOOTH,
+                    size,
+                    {"rough": smooth},
+                    {"smoother": smoother},
+                    {"along": along, "reach": reach},
+                )
+                smooth = smoother
+        noise = self._image("noise", *size)
+        self.device.compute(
+            passes.SETTLE,
+            size,
+            {"raw_noise": raw, "smooth_noise": smooth},
+            {"noise": noise},
+            {"high_passed": int(high_pass > 0)},
+        )
+        return noise
+
     def _composing(
         self,
         kind: Kind,
@@ -395,6 +461,7 @@ class Card:
         camera: Camera,
         look: Look,
         lights: Sequence[Light],
+        noise: Any,
         picture: Any,
     ) -> Work[None]:
         """Draw the fields of one kind into the picture."""
@@ -420,7 +487,7 @@ class Card:
         self.device.compute(
             passes.FLOW,
             size,
-            {**gbuffer, "noise": self._noise(width, height, look)},
+            {**gbuffer, "noise": noise},
             {"cells": cells, "ways": ways},
             {
                 **covering,
@@ -448,6 +515,7 @@ class Card:
             ),
             "palette": self._table("palette", None, lambda: PALETTE),
             "lights": self._light_table(lights if look.light == "scene" else ()),
+            "thresholds": self._thresholds(scaled_look(look)),
         }
         constants = {**covering, **_look_constants(kind, look, len(lights))}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
@@ -514,6 +582,15 @@ class Card:
             data[0, :, :3] = rgb
             self._tables[name] = key, self.device.texture(len(rgb), 1, "RGBA32F", data=data)
         return self._tables[name][1]
+
+    def _thresholds(self, look: Look) -> Any:
+        """`hatching.ink_thresholds` in the first channel."""
+        if look.ink == "soft":
+            return self._table("palette", None, lambda: PALETTE)
+        key = _of_streaks(look)
+        return self._table(
+            "thresholds", key, lambda: np.repeat(ink_thresholds(*key)[0][:, None], 3, axis=1)
+        )
 
     def _light_table(self, lights: Sequence[Light]) -> Any:
         data = np.zeros((max(len(lights), 1), 2, 4), dtype=np.float32)
@@ -597,7 +674,39 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "shading": look.shading,
         "headlight": int(look.light == "headlight"),
         "light_count": lights,
+        "paper_light": (*to_linear(from_hex(look.paper_colour)), 1.0),
+        "ink_light": (*to_linear(from_hex(look.ink_colour)), 1.0),
+        "hatch": int(look.ink == "hatch"),
+        "clear_paper": int(look.clear_paper),
+        "layers": look.layers,
+        "layering": look.layering,
+        "softness": softness(look),
+        "deviation": ink_thresholds(*_of_streaks(finer))[1] if look.ink == "hatch" else 1.0,
+        "JOINING": JOINING,
+        "TRACE": TRACE,
     }
+
+
+def _of_streaks(look: Look) -> tuple[float, ...]:
+    """What `ink_thresholds` depends on."""
+    length = (2 * look.length + 1) * look.step
+    return length, look.grain, look.density, look.high_pass, look.crispness
+
+
+def _body_constants(number: int, entry: Placed, camera: Camera) -> dict[str, Any]:
+    """What passes over the pixels of one body are told."""
+    place = camera.view @ entry.moving
+    return {
+        "body": float(number),
+        "texels": entry.shape.shape.texels,
+        "row_bits": ROW_BITS,
+        **{f"place_{axis}": tuple(row) for axis, row in zip("xyz", place[:3], strict=True)},
+    }
+
+
+def _scale(moving: np.ndarray) -> float:
+    """By how much a matrix that turns, scales and shifts scales."""
+    return float(np.linalg.norm(moving[:3, 0]))
 
 
 Box = tuple[int, int, int, int]

@@ -49,7 +49,10 @@ class Compute:
     @property
     def source(self) -> str:
         """GLSL without declarations."""
-        return _read("common.glsl") + _read(f"{self.name}.comp")
+        parts = ["common.glsl", f"{self.name}.comp"]
+        if "triangles" in self.textures:
+            parts.insert(1, "triangle.glsl")
+        return "".join(map(_read, parts))
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,44 @@ RESOLVE = Compute(
     ),
 )
 
+ANCHORED = Compute(
+    "anchored",
+    ("seen", "triangles"),
+    (("raw_noise", "RGBA32F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("place_x", "vec4"),
+        ("place_y", "vec4"),
+        ("place_z", "vec4"),
+        ("body", "float"),
+        ("texels", "int"),
+        ("row_bits", "int"),
+        ("lattice_x", "vec4"),
+        ("lattice_y", "vec4"),
+        ("lattice_z", "vec4"),
+        ("unit_of_pixel", "float"),
+        ("amplitude", "float"),
+        ("density", "float"),
+        ("bright_below", "int"),
+        ("channels", "int"),
+        ("seed", "int"),
+        ("identity", "int"),
+        ("LOWEST", "int"),
+    ),
+)
+
+SMOOTH = Compute(
+    "smooth", ("rough",), (("smoother", "RGBA32F"),), (("along", "ivec2"), ("reach", "int"))
+)
+
+SETTLE = Compute(
+    "settle",
+    ("raw_noise", "smooth_noise"),
+    (("noise", "RGBA32F"),),
+    (("high_passed", "int"),),
+)
+
 FLOW = Compute(
     "flow",
     ("normals", "values_seen", "slopes", "traits_seen[]", "noise"),
@@ -165,6 +206,7 @@ WALK = Compute(
         "colours",
         "palette",
         "lights",
+        "thresholds",
     ),
     (("picture", "RGBA32F"),),
     (
@@ -186,6 +228,16 @@ WALK = Compute(
         ("shading", "float"),
         ("headlight", "int"),
         ("light_count", "int"),
+        ("paper_light", "vec4"),
+        ("ink_light", "vec4"),
+        ("hatch", "int"),
+        ("clear_paper", "int"),
+        ("layers", "int"),
+        ("layering", "float"),
+        ("softness", "float"),
+        ("deviation", "float"),
+        ("JOINING", "float"),
+        ("TRACE", "float"),
     ),
 )
 
@@ -213,4 +265,17 @@ SHOW = Drawing(
     ),
 )
 
-ALL = (SEEN, SEEN_CUT, RESOLVE, FLOW, TURNING, WALK, LARGEST, AVERAGE, SHOW)
+ALL = (
+    SEEN,
+    SEEN_CUT,
+    RESOLVE,
+    ANCHORED,
+    SMOOTH,
+    SETTLE,
+    FLOW,
+    TURNING,
+    WALK,
+    LARGEST,
+    AVERAGE,
+    SHOW,
+)

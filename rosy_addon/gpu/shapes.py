@@ -22,7 +22,8 @@ ROW = 1 << ROW_BITS
 #: Triangles of a body: their numbers go through single precision.
 MOST_TRIANGLES = 1 << 24
 
-#: Texels of a record: three places, three normals, two of the representation; a trait has two more.
+#: Texels of a record: three places, three normals, two of the representation; a trait has two more,
+#: and the last one belongs to the places at rest.
 PLACES, NORMALS, VALUES = 0, 3, 6
 
 
@@ -50,6 +51,11 @@ class Shape:
     records: np.ndarray | None
     texels: int
     bounds: np.ndarray
+
+    @property
+    def traits(self) -> int:
+        """How many its field has."""
+        return max(self.texels - texels_of(0), 0) // 2
 
 
 def placement(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,22 +147,31 @@ def shape_of(
         matrix = np.eye(4)
         matrix[:3, :3] = linear
         carried = drain(carrying(surface, matrix, field, display))
-        records = _records(corners, carried, field.degree, layers)
+        rest = surface.vertices if surface.rest is None else surface.rest
+        rest = rest.take(surface.triangle_vertex, axis=0)
+        records = _records(corners, rest, carried, field.degree, layers)
         texels = records.shape[1]
         records = _in_rows(records)
     return Shape(corners.reshape(-1, 4), centre, records, texels, bounds - centre)
 
 
 def _records(
-    corners: np.ndarray, carried: Carried, degree: int, layers: Sequence[Trait]
+    corners: np.ndarray,
+    rest: np.ndarray,
+    carried: Carried,
+    degree: int,
+    layers: Sequence[Trait],
 ) -> np.ndarray:
     """(T, texels, 4) float32.
 
     Texels 0 to 2 are the places of the corners, 3 to 5 the normals there, 6 and 7 the values of the
     representation there as `Carried.z` has them, with the power of the frame that they turn with;
-    then two texels a trait, with its power and its layer.
+    then two texels a trait, with its power and its layer. The (T, 3, 3) places of the corners at
+    rest have the fourth numbers of places (x) and normals (y), and the last texel (z).
     """
-    records = np.zeros((len(corners), VALUES + 2 * (1 + len(layers)), 4), dtype=np.float32)
+    records = np.zeros((len(corners), texels_of(len(layers)), 4), dtype=np.float32)
+    records[:, PLACES:NORMALS, 3], records[:, NORMALS:VALUES, 3] = rest[..., 0], rest[..., 1]
+    records[:, -1, :3] = rest[..., 2]
     records[:, PLACES:NORMALS, :3] = corners[:, :, :3]
     records[:, NORMALS:VALUES, :3] = carried.normal.transpose(2, 0, 1)
     _put_values(records, VALUES, carried.z, degree, 0)
@@ -166,6 +181,11 @@ def _records(
         values = carried.traits.get(trait, usual)
         _put_values(records, VALUES + 2 + 2 * layer, values, order_of(trait, degree), layer)
     return records
+
+
+def texels_of(traits: int) -> int:
+    """Of a record with so many traits."""
+    return VALUES + 2 * (1 + traits) + 1
 
 
 def _put_values(records: np.ndarray, at: int, values: np.ndarray, order: int, layer: int) -> None:

@@ -91,10 +91,14 @@ def _fill(found: RestPlaces, gbuffer: GBuffer, body: Body, pixels: np.ndarray) -
         found.across[edge, pixels] = cw * by - bw * cy
         found.upward[edge, pixels] = bw * cx - cw * bx
     _scale(found, pixels)
-    linear = np.asarray(body.matrix, dtype=np.float64)[:3, :3]
-    grown = np.cbrt(abs(np.cross(linear[0], linear[1]) @ linear[2])) or 1.0
     depth = -gbuffer.position[pixels, 2] if camera.is_perspective else 1.0
-    found.size[pixels] = depth / (camera.pixels_per_unit * grown)
+    found.size[pixels] = depth / (camera.pixels_per_unit * growth(body.matrix))
+
+
+def growth(matrix: np.ndarray) -> float:
+    """By how much a (4, 4) matrix makes things larger, as the side of a cube; 1 if it flattens."""
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    return float(np.cbrt(abs(np.cross(linear[0], linear[1]) @ linear[2]))) or 1.0
 
 
 def _scale(found: RestPlaces, pixels: np.ndarray) -> None:

@@ -9,7 +9,8 @@ void main()
   vec4 total = vec4(0.0);
   for (int y = 0; y < side; ++y) {
     for (int x = 0; x < side; ++x) {
-      total += texelFetch(fine, pixel * side + ivec2(x, y), 0);
+      vec4 colour = texelFetch(fine, pixel * side + ivec2(x, y), 0);
+      total += vec4(colour.xyz * colour.w, colour.w);
     }
   }
   total.xyz = total.w > 0.0 ? total.xyz / total.w : vec3(0.0);

@@ -1,19 +1,6 @@
 // From the triangle that a pixel sees to its entry in the G-buffer, for one body: `project._fill`
 // and `steps._slopes`, on the same data in the same order.
 
-// The part of a triangle's record that a texel holds. Rows are powers of two, as division is slow.
-vec4 record(int number, int part)
-{
-  int at = number * texels + part;
-  return texelFetch(triangles, ivec2(at & ((1 << row_bits) - 1), at >> row_bits), 0);
-}
-
-vec3 placed(vec3 point)
-{
-  vec4 p = vec4(point, 1.0);
-  return vec3(dot(place_x, p), dot(place_y, p), dot(place_z, p));
-}
-
 vec3 rotated(vec3 vector)
 {
   return vec3(dot(place_x.xyz, vector), dot(place_y.xyz, vector), dot(place_z.xyz, vector)) / scale;
@@ -33,14 +20,10 @@ vec2 squared_phase(vec2 a)
   return times(a, a) / max(dot(a, a), 1e-30);
 }
 
-// Barycentrics by homogeneous edge functions relative to the pixel (Olano and Greer 1997); w is 1 if
-// the triangle is seen from its front.
+// Barycentrics; w is 1 if the triangle is seen from its front.
 vec4 barycentrics(vec3 a, vec3 b, vec3 c, vec2 ray)
 {
-  vec2 p = perspective != 0 ? a.xy + ray * a.z : a.xy - ray;
-  vec2 q = perspective != 0 ? b.xy + ray * b.z : b.xy - ray;
-  vec2 r = perspective != 0 ? c.xy + ray * c.z : c.xy - ray;
-  vec3 edges = vec3(q.x * r.y - r.x * q.y, r.x * p.y - p.x * r.y, p.x * q.y - q.x * p.y);
+  vec3 edges = edges_at(a, b, c, ray);
   float total = edges.x + edges.y + edges.z;
   float front = total >= 0.0 ? 1.0 : 0.0;
   // The rasteriser rounds corners, so that the pixel may be a little beside the triangle: what is

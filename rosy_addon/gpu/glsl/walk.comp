@@ -87,6 +87,34 @@ vec3 diffuse(vec3 normal, vec3 position, vec3 toward_eye)
   return 1.0 - shading + shading * light;
 }
 
+float smooth_step(float x)
+{
+  x = clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// The darkness at which a line joins in (`hatching._onset`), by how many others are nearer to the
+// guiding angle; `first` is the angle from there of the nearest.
+float onset_of(int line, float first)
+{
+  float at = first + TAU * float(line) / float(around);
+  float rank = atan(abs(sin(at)), abs(cos(at))) * 4.0 * float(lines) / TAU;
+  float onset = 0.0;
+  for (int layer = 1; layer < layers; ++layer) {
+    onset += smooth_step((rank - float(layer) + 0.4) / 0.8);
+  }
+  return onset * layering + 2.0 * smooth_step((rank - float(layers) + 0.4) / 0.8);
+}
+
+float threshold_of(float covered)
+{
+  int last = textureSize(thresholds, 0).x - 1;
+  float place = clamp(covered, 0.0, 1.0) * float(last);
+  int below = min(int(place), last - 1);
+  float low = texelFetch(thresholds, ivec2(below, 0), 0).x;
+  return mix(low, texelFetch(thresholds, ivec2(below + 1, 0), 0).x, place - float(below));
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + corner;
@@ -117,6 +145,24 @@ void main()
     stored = angle_of(known);
     told = known == vec2(0.0) ? 1 : families;
   }
+  vec4 normal = texelFetch(normals, pixel, 0);
+  vec2 ray = pixel_ray(pixel, vec2(frame), across, shift);
+  float depth = abs(normal.w);
+  vec3 position = vec3(ray * (perspective != 0 ? depth : 1.0), -depth);
+  vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
+  // What light the ink is to leave, and between how many lines that is shared.
+  float left = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
+  float nearest = angle_of(z) / float(degree), soonest = 10.0, sharers = 0.0, paper = 1.0;
+  if (hatch != 0) {
+    for (int line = 0; line < lines; ++line) {
+      soonest = min(soonest, onset_of(line, nearest));
+    }
+    for (int line = 0; line < lines; ++line) {
+      float onset = onset_of(line, nearest);
+      sharers += smooth_step((1.0 - left - onset + soonest) / JOINING);
+      sharers += onset == soonest ? TRACE : 0.0;
+    }
+  }
   vec3 blend = vec3(0.0), hue = vec3(0.0);
   float samples = 0.0, weights = 0.0;
   for (int line = 0; line < lines; ++line) {
@@ -127,6 +173,14 @@ void main()
     vec3 mean = (cell.yzw + ahead.total + behind.total) / count;
     // Streamlines that ended early get the spread of whole ones (`contrast.even_out`).
     mean = (mean - MEAN) * sqrt(count / full) * min(0.5 * count * step_length / grain, 1.0);
+    if (hatch != 0) {
+      float onset = onset_of(line, nearest);
+      float own = smooth_step((1.0 - left - onset + soonest) / JOINING);
+      own = (own + (onset == soonest ? TRACE : 0.0)) / sharers;
+      float streak = channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
+      float above = streak / deviation - threshold_of(1.0 - pow(left, own));
+      paper *= 1.0 - smooth_step(above / (2.0 * softness) + 0.5);
+    }
     blend += mean;
     samples += count;
     if (families > 1) {
@@ -148,10 +202,10 @@ void main()
   else if (families > 1) {
     ink = hue / weights * (1.0 + 1.5 * tone);
   }
-  vec4 normal = texelFetch(normals, pixel, 0);
-  vec2 ray = pixel_ray(pixel, vec2(frame), across, shift);
-  float depth = abs(normal.w);
-  vec3 position = vec3(ray * (perspective != 0 ? depth : 1.0), -depth);
-  vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
-  imageStore(picture, pixel, vec4(to_linear(ink) * light, 1.0));
+  vec4 colour = vec4(to_linear(ink) * light, 1.0);
+  if (hatch != 0) {
+    colour = clear_paper != 0 ? vec4(ink_light.xyz, 1.0 - paper) :
+                                vec4(mix(ink_light.xyz, paper_light.xyz, paper), 1.0);
+  }
+  imageStore(picture, pixel, colour);
 }

@@ -151,7 +151,7 @@ def test_records_are_what_numpy_has_at_the_corners(surface, degree, display):
     count = len(surface.triangles)
     assert shape.corners.shape == (3 * count, 4)
     assert shape.records.shape[1:] == (ROW, 4)
-    assert shape.texels == 8
+    assert shape.texels == 9 and shape.traits == 0
     corners = shape.corners.reshape(count, 3, 4)
     np.testing.assert_array_equal(corners[..., 3], np.arange(count)[:, None] + np.zeros(3))
     where = surface.vertices[surface.triangle_vertex]
@@ -162,8 +162,10 @@ def test_records_are_what_numpy_has_at_the_corners(surface, degree, display):
         shape.bounds.max(axis=0), -shape.bounds.min(axis=0), atol=1e-9 * size
     )
     assert np.abs(shape.bounds).max() <= size
-    records = shape.records.reshape(-1, 4)[: 8 * count].reshape(count, 8, 4)
-    assert not shape.records.reshape(-1, 4)[8 * count :].any()
+    records = shape.records.reshape(-1, 4)[: 9 * count].reshape(count, 9, 4)
+    assert not shape.records.reshape(-1, 4)[9 * count :].any()
+    at_rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 8, :3]]
+    np.testing.assert_allclose(np.stack(at_rest, axis=2), where, rtol=1e-6)
     np.testing.assert_array_equal(records[:, :3, :3], corners[..., :3])
     np.testing.assert_allclose(np.linalg.norm(records[:, 3:6, :3], axis=2), 1, atol=1e-5)
     z = records[:, 6:8].reshape(count, 4, 2)[:, :3]
@@ -180,14 +182,14 @@ def test_records_of_traits_are_in_their_layers():
     kind = kinds_of([field])[3]
     assert kind.layers == (("deviation", -1), ("deviation", 0), ("deviation", 1), ("family", 3))
     shape = shape_of(surface, np.eye(3), field, "smooth", kind.layers)
-    assert shape.texels == 8 + 2 * 4
+    assert shape.texels == 9 + 2 * 4 and shape.traits == 4
     count = len(surface.triangles)
-    records = shape.records.reshape(-1, 4)[: 16 * count].reshape(count, 16, 4)
-    np.testing.assert_array_equal(records[0, 7::2, 2], [3, 1, 0, -1, 1])
-    np.testing.assert_array_equal(records[0, 7::2, 3], [0, 0, 1, 2, 3])
+    records = shape.records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
+    np.testing.assert_array_equal(records[0, 7:16:2, 2], [3, 1, 0, -1, 1])
+    np.testing.assert_array_equal(records[0, 7:16:2, 3], [0, 0, 1, 2, 3])
     # Beside such a field a RoSy deviates from itself by the factor 1, and knows no families.
     plain = shape_of(surface, np.eye(3), axis_field(surface, 3), "smooth", kind.layers)
-    records = plain.records.reshape(-1, 4)[: 16 * count].reshape(count, 16, 4)
+    records = plain.records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
     np.testing.assert_array_equal(records[:, 8], np.tile([0, 0, 0, 0], (count, 1)))
     np.testing.assert_array_equal(records[:, 10], np.tile([1, 0, 1, 0], (count, 1)))
     np.testing.assert_array_equal(records[:, 14], np.tile([0, 0, 0, 0], (count, 1)))
@@ -286,7 +288,8 @@ def words_of(source):
 def own_source(shader):
     """Without what is common to several."""
     if isinstance(shader, passes.Compute):
-        return passes._read(f"{shader.name}.comp")
+        shared = passes._read("triangle.glsl") if "triangles" in shader.textures else ""
+        return shared + passes._read(f"{shader.name}.comp")
     return passes._read(f"{shader.name}.vert") + passes._read(f"{shader.name}.frag")
 
 
@@ -357,7 +360,7 @@ def entry_of(surface, matrix=None):
     matrix = np.eye(4) if matrix is None else matrix
     shape = shape_of(surface, np.eye(3), None, "smooth")
     on_card = card_module._OnCard(shape, None, None, ())
-    return card_module.Placed(on_card, None, matrix @ shapes.shifting(shape.centre))
+    return card_module.Placed(on_card, None, matrix @ shapes.shifting(shape.centre), 1.0)
 
 
 def camera_at(eye=(0, -5, 0), size=(64, 48), perspective=True, clip=(0.1, 100.0)):
@@ -489,6 +492,20 @@ LOOKS = {
     "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
     "coarse noise": {"grain": 5.0, "seed": 7},
     "long": {"length": 200},
+    "on the surface": {"anchor": "surface"},
+    "on the surface, colours": {"anchor": "surface", "noise": "colour", "high_pass": 0.0},
+    "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
+    "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
+    "hatched, three directions": {"ink": "hatch", "shading": 0.8, "degree": 3, "layers": 2},
+    "hatched in colour, guided": {
+        "ink": "hatch",
+        "ink_colour": "#203080",
+        "paper_colour": "#f0e8d0",
+        "guiding_angle": 0.4,
+        "crispness": 0.2,
+        "shading": 1.0,
+    },
+    "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
     "the method brute": {"method": "brute"},
 }

@@ -49,7 +49,7 @@ class Compute:
     @property
     def source(self) -> str:
         """GLSL without declarations."""
-        parts = ["common.glsl", f"{self.name}.comp"]
+        parts = ["common.glsl", f"{self.name}.comp.glsl"]
         if "triangles" in self.textures:
             parts.insert(1, "triangle.glsl")
         return "".join(map(_read, parts))
@@ -80,12 +80,12 @@ class Drawing:
     @property
     def vertex_source(self) -> str:
         """GLSL without declarations."""
-        return _read(f"{self.name}.vert")
+        return _read(f"{self.name}.vert.glsl")
 
     @property
     def fragment_source(self) -> str:
         """GLSL without declarations."""
-        return _read("common.glsl") + _read(f"{self.name}.frag")
+        return _read("common.glsl") + _read(f"{self.name}.frag.glsl")
 
 
 def _read(name: str) -> str:

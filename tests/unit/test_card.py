@@ -289,8 +289,8 @@ def own_source(shader):
     """Without what is common to several."""
     if isinstance(shader, passes.Compute):
         shared = passes._read("triangle.glsl") if "triangles" in shader.textures else ""
-        return shared + passes._read(f"{shader.name}.comp")
-    return passes._read(f"{shader.name}.vert") + passes._read(f"{shader.name}.frag")
+        return shared + passes._read(f"{shader.name}.comp.glsl")
+    return passes._read(f"{shader.name}.vert.glsl") + passes._read(f"{shader.name}.frag.glsl")
 
 
 def plain(names):

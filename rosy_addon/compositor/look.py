@@ -142,6 +142,7 @@ class Look:
         "headlight",
         "Where the light of that shading comes from",
         headlight="The eye",
+        lamp="A lamp over the left shoulder, as draughtsmen like it",
         scene="The lights of the scene",
     )
     ink: str = _choice(

@@ -34,6 +34,15 @@ class Light:
     strength: float
 
 
+#: Over the left shoulder of whoever looks.
+LAMP = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
+
+
+def lights_of(look: Look, lights: Sequence[Light]) -> Sequence[Light]:
+    """The lights that a look is lit by, given those of the scene; none of them is the headlight."""
+    return {"headlight": (), "lamp": (LAMP,), "scene": lights}[look.light]
+
+
 def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.ndarray:
     """What Lambert's law leaves of each pixel's colour.
 
@@ -57,7 +66,7 @@ def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.nd
         light = np.repeat(facing[:, None], 3, axis=1)
     else:
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
-        for source in lights:
+        for source in lights_of(look, lights):
             light += _lambert(gbuffer, source)[:, None] * source.colour
     return (1 - look.shading + look.shading * light).astype(np.float32)
 

@@ -21,7 +21,7 @@ from ..compositor.hatching import JOINING, TRACE, ink_thresholds, softness
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
-from ..compositor.shading import Light
+from ..compositor.shading import Light, lights_of
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -503,6 +503,7 @@ class Card:
             passes.TURNING, (*size, kind.lines), read, {"turning": turning}, covering
         )
         drives = DRIVES[look.magnitude]
+        lit_by = lights_of(look, lights)
         textures = {
             **gbuffer,
             "cells": cells,
@@ -514,10 +515,10 @@ class Card:
                 "colours", look.colour_map, lambda: colour_stops(look.colour_map)
             ),
             "palette": self._table("palette", None, lambda: PALETTE),
-            "lights": self._light_table(lights if look.light == "scene" else ()),
+            "lights": self._light_table(lit_by),
             "thresholds": self._thresholds(scaled_look(look)),
         }
-        constants = {**covering, **_look_constants(kind, look, len(lights))}
+        constants = {**covering, **_look_constants(kind, look, len(lit_by))}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
         # Whole groups: the last one of any other number would reach past what was prepared here.
         rows = max(MOST_STEPS // max(steps, 1) // GROUP[1], 1) * GROUP[1]

@@ -104,7 +104,7 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         for script in ("window.py", "window_live.py"):
             said = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(said)
-            patience = 900 if "ROSY_LIVE_MANY" in environment else 300
+            patience = 900 if "ROSY_LIVE_MANY" in environment else 420
             done = blender(
                 "gui", "-s", str(patience), "--enable-event-simulate", "--python-exit-code", "1",
                 "-P", str(HERE / script),

@@ -1,7 +1,7 @@
 """The live view in a window: what is on the screen, compared with a bake of the same view.
 
-Run by run.py as window.py is. ROSY_LIVE_MANY makes it toggle, open files and undo as often as it
-takes to see a leak.
+Run by run.py as window.py is. With ROSY_LIVE_MANY it compares more views and frames, and switches,
+opens files and undoes as often as it takes to see a leak: ten minutes.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from watching import SHOTS, captured, in_view, rosy, until, view, watch
 
 MANY = bool(os.environ.get("ROSY_LIVE_MANY"))
 
-#: Views that are compared, all around.
-VIEWS = 24
+#: Views that are compared, all around, and frames of an animation.
+VIEWS, FRAMES = (24, 24) if MANY else (8, 6)
 
 
 def live():
@@ -151,7 +151,7 @@ def every_view_is_a_bake():
         yield from at_rest()
         name = f"live-view-{number:02d}"
         found.append(agrees(name, captured(name, view()[2]), by_hand()))
-    print(f"24 views: correlation {min(found):.4f} to {max(found):.4f}")
+    print(f"{VIEWS} views: correlation {min(found):.4f} to {max(found):.4f}")
     switch("OFF")
     nothing_is_left()
 
@@ -395,7 +395,7 @@ def animation_is_in_step():
         bpy.ops.object.mode_set(mode="OBJECT")
         bpy.ops.object.delete()
     tube = _tube(250, 100)
-    frames = 24
+    frames = FRAMES
     _bend(tube, frames)
     space = bare_view()
     space.region_3d.view_distance, space.region_3d.view_perspective = 8.0, "PERSP"
@@ -433,7 +433,7 @@ def animation_is_in_step():
         bpy.ops.screen.animation_cancel(restore_frame=False)
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
     played = {frame for frame, _, _ in steps}
-    assert len(played) >= 4, f"{len(played)} frames were drawn"
+    assert len(played) >= 3, f"{len(played)} frames were drawn"
     assert all(shows for _, shows, _ in steps)
     print(f"played: {len(steps)} redraws of {len(played)} frames in 4 s")
     switch("OFF")

@@ -28,6 +28,9 @@ SIDE = 1.5**0.5
 #: The lattice stands askew to the axes, along which people build: three rotations by odd angles.
 ANGLES = (0.61, 1.13, 0.37)
 
+#: Half way between two octaves the coarser has a little more to say, as lines would be thinner there.
+LEAN = 0.035
+
 #: Octaves are counted from here, for hashes of whole numbers above 0.
 LOWEST = 64
 
@@ -59,8 +62,9 @@ def surface_noise(
     places = rest_places(gbuffer)
     level = np.log2(np.maximum(places.size, 1e-30) * np.float32(grain * SIDE))
     octave = np.floor(level)
-    share = (level - octave).astype(np.float32) * np.float32(np.pi / 2)
     # The squares of both sum to 1, so that the variance is that of one.
+    share = (level - octave).astype(np.float32)
+    share = (share + np.float32(LEAN) * np.sin(np.pi * share)) * np.float32(np.pi / 2)
     mixed = np.cos(share), np.sin(share)
     lattice = [_turned(places.at(*tap)) for tap in TAPS]
     identity = identities(gbuffer.names)[gbuffer.body]

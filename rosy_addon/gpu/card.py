@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.anchored import LOWEST, SIDE, TAPS, identities, lattice_axes
+from ..compositor.anchored import LEAN, LOWEST, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops, from_hex, to_linear
 from ..compositor.compose import scaled_look
 from ..compositor.contrast import averaging_gain, expected_deviation
-from ..compositor.hatching import JOINING, TRACE, ink_thresholds, softness
+from ..compositor.hatching import EARLY, JOINING, ink_thresholds, softness
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
@@ -406,6 +406,7 @@ class Card:
             "channels": 3 if look.noise == "colour" else 1,
             "seed": look.seed,
             "LOWEST": LOWEST,
+            "LEAN": LEAN,
         }
         names = identities([entry.shape.owners[0].name for entry in placed]).view(np.int32)
         for number, entry in enumerate(placed):
@@ -684,7 +685,7 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "softness": softness(look),
         "deviation": ink_thresholds(*_of_streaks(finer))[1] if look.ink == "hatch" else 1.0,
         "JOINING": JOINING,
-        "TRACE": TRACE,
+        "EARLY": EARLY,
     }
 
 

@@ -156,6 +156,7 @@ ANCHORED = Compute(
         ("seed", "int"),
         ("identity", "int"),
         ("LOWEST", "int"),
+        ("LEAN", "float"),
     ),
 )
 
@@ -237,7 +238,7 @@ WALK = Compute(
         ("softness", "float"),
         ("deviation", "float"),
         ("JOINING", "float"),
-        ("TRACE", "float"),
+        ("EARLY", "float"),
     ),
 )
 

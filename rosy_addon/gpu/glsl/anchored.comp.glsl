@@ -41,7 +41,8 @@ void main()
   float size = (perspective != 0 ? depth : 1.0) * unit_of_pixel;
   float level = log2(max(size, 1e-30));
   float octave = floor(level);
-  float share = (level - octave) * 0.25 * TAU;
+  float share = level - octave;
+  share = (share + LEAN * sin(0.5 * TAU * share)) * 0.25 * TAU;
   vec2 mixed = vec2(cos(share), sin(share));
   vec3 total = vec3(0.0);
   for (int tap = 0; tap < 4; ++tap) {

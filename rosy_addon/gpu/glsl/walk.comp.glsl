@@ -158,9 +158,8 @@ void main()
       soonest = min(soonest, onset_of(line, nearest));
     }
     for (int line = 0; line < lines; ++line) {
-      float onset = onset_of(line, nearest);
-      sharers += smooth_step((1.0 - left - onset + soonest) / JOINING);
-      sharers += onset == soonest ? TRACE : 0.0;
+      float later = onset_of(line, nearest) - soonest;
+      sharers += smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY));
     }
   }
   vec3 blend = vec3(0.0), hue = vec3(0.0);
@@ -174,9 +173,8 @@ void main()
     // Streamlines that ended early get the spread of whole ones (`contrast.even_out`).
     mean = (mean - MEAN) * sqrt(count / full) * min(0.5 * count * step_length / grain, 1.0);
     if (hatch != 0) {
-      float onset = onset_of(line, nearest);
-      float own = smooth_step((1.0 - left - onset + soonest) / JOINING);
-      own = (own + (onset == soonest ? TRACE : 0.0)) / sharers;
+      float later = onset_of(line, nearest) - soonest;
+      float own = smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY)) / sharers;
       float streak = channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
       float above = streak / deviation - threshold_of(1.0 - pow(left, own));
       paper *= 1.0 - smooth_step(above / (2.0 * softness) + 0.5);

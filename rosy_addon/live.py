@@ -240,7 +240,7 @@ class Live:
 
     def _do_without(self, error: DeviceError) -> None:
         """Go on without a card that does not take the shaders."""
-        self.maker, self.why_slow = Processor(), str(error)
+        self.maker, self.why_slow = Processor(blender_device()), str(error)
         self._told_at = time.monotonic()
         self._views.clear()
         self._refining, self._cost = None, 0.0
@@ -257,7 +257,8 @@ class Live:
         layer = self._read(context)
         look = look_of(context.scene.rosy)
         camera = camera_of_view(region, context.region_data)
-        seen = [entry for entry in layer.found if _is_visible(entry.shown_by, space)]
+        depsgraph = context.evaluated_depsgraph_get()
+        seen = [entry for entry in layer.found if _is_visible(entry.shown_by, depsgraph, space)]
         if all(entry.body.field is None for entry in seen):
             return
         placed = self.maker.place([entry.body for entry in seen], look.display)
@@ -410,11 +411,15 @@ def _shows_surfaces(space: bpy.types.SpaceView3D) -> bool:
     return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}
 
 
-def _is_visible(thing: bpy.types.Object, space: bpy.types.SpaceView3D) -> bool:
+def _is_visible(
+    thing: bpy.types.Object, depsgraph: bpy.types.Depsgraph, space: bpy.types.SpaceView3D
+) -> bool:
     """Whether a view shows an object as a surface."""
     try:
+        # In some versions only the evaluated object knows which local views it is in.
+        evaluated = thing.evaluated_get(depsgraph)
         solid = thing.display_type not in {"BOUNDS", "WIRE"}
-        return solid and thing.visible_in_viewport_get(space)
+        return solid and evaluated.visible_in_viewport_get(space)
     except ReferenceError:
         return False
 
@@ -444,7 +449,7 @@ def _key_of(lights: list[Light]) -> Hashable:
     )
 
 
-def _maker(device: str) -> Card | Processor:
+def _maker(name: str) -> Card | Processor:
     """What makes the pictures.
 
     Raises
@@ -452,8 +457,8 @@ def _maker(device: str) -> Card | Processor:
     DeviceError
         If there is no graphics context: nothing can be shown then.
     """
-    card = Card(blender_device())
-    return Processor() if device == "cpu" else card
+    device = blender_device()
+    return Processor(device) if name == "cpu" else Card(device)
 
 
 # --- the one that runs ---------------------------------------------------------------------------

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.colour import to_display
 from ..compositor.compose import composing
 from ..compositor.look import Look
 from ..compositor.shading import Light
@@ -16,10 +15,16 @@ from ..progress import Work, part
 from ..projection.camera import Camera
 from ..projection.gbuffer import Body
 from ..projection.project import projecting
+from .device import Device
+from .passes import SHOW
 
 
 class Processor:
-    """Draws what a `Card` draws, in numpy, and shows it with a shader of Blender's own.
+    """Draws what a `Card` draws, in numpy; all that the card has to do is to show it.
+
+    Parameters
+    ----------
+    device : Device
 
     Attributes
     ----------
@@ -31,6 +36,14 @@ class Processor:
 
     coarseness = 4, 2
     sees_others = True
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        # Two triangles that fill the view, in front of all that is in it.
+        corners = np.zeros((6, 4), dtype=np.float32)
+        corners[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
+        corners[:, 2] = -0.9999
+        self._frame = device.batch(corners)
 
     def place(self, bodies: Sequence[Body], display: str) -> list[Body]:
         """As `Card.place`."""
@@ -55,7 +68,8 @@ class Processor:
         except NothingInViewError:
             return None
         picture = yield from part(composing(gbuffer, look, lights), 0.4, 1.0)
-        return _texture(picture.rgba)
+        height, width = picture.rgba.shape[:2]
+        return self._device.texture(width, height, "RGBA16F", data=picture.rgba)
 
     def show(
         self,
@@ -66,40 +80,21 @@ class Processor:
         opacity: float = 1.0,
     ) -> None:
         """Draw a picture over a view."""
-        import gpu
-        from gpu_extras.batch import batch_for_shader
-        from mathutils import Matrix
-
         if picture is None:
             return
-        shader = gpu.shader.from_builtin("IMAGE_COLOR")
-        corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-        texture_corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
-        quad = batch_for_shader(shader, "TRI_FAN", {"pos": corners, "texCoord": texture_corners})
-        gpu.state.blend_set("ALPHA_PREMULT")
-        with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
-            gpu.matrix.load_identity()
-            gpu.matrix.load_projection_matrix(Matrix.Identity(4))
-            shader.uniform_sampler("image", picture)
-            shader.uniform_float("color", (opacity, opacity, opacity, opacity))
-            quad.draw(shader)
-        gpu.state.blend_set("NONE")
+        left, bottom, width, height = self._device.viewport()
+        constants = {
+            **{f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", np.eye(4), strict=True)},
+            **{f"plane{number}": (0.0, 0.0, 0.0, 1.0) for number in range(6)},
+            "nearer": 0.0,
+            "origin": (float(left), float(bottom)),
+            "pixels": (picture.width / width, picture.height / height),
+            "opacity": opacity,
+        }
+        self._device.draw_over(SHOW, [(self._frame, {})], {"picture": picture}, constants)
 
     def wait(self) -> None:
         """As `Card.wait`."""
 
     def release(self) -> None:
         """As `Card.release`."""
-
-
-def _texture(rgba: np.ndarray) -> Any:
-    """Display values, as Blender's own shader wants, premultiplied, as borders are interpolated."""
-    import gpu
-
-    height, width = rgba.shape[:2]
-    colours = np.empty_like(rgba)
-    colours[..., :3] = to_display(rgba[..., :3]) * rgba[..., 3:]
-    colours[..., 3] = rgba[..., 3]
-    flat = np.ascontiguousarray(colours, dtype=np.float32).reshape(-1)
-    buffer = gpu.types.Buffer("FLOAT", len(flat), flat)
-    return gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)

@@ -241,12 +241,12 @@ def views_choose_what_they_show():
     bpy.context.view_layer.objects.active = monkey
     with in_view():
         bpy.ops.view3d.localview(frame_selected=False)
-    monkey.select_set(False)
     yield from at_rest()
     torus = bpy.data.objects["Torus"]
     assert [entry.owner for entry in shown()] == [monkey]
     with in_view():
         bpy.ops.view3d.localview(frame_selected=False)
+    monkey.select_set(False)
     torus.hide_set(True)
     yield from at_rest()
     assert [entry.owner for entry in shown()] == [monkey]
@@ -272,7 +272,8 @@ def shown():
     running = live()._live
     (layer,) = running._layers.values()
     space = view()[1].spaces.active
-    return [entry for entry in layer.found if live()._is_visible(entry.shown_by, space)]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return [entry for entry in layer.found if live()._is_visible(entry.shown_by, depsgraph, space)]
 
 
 def clipped_region():
@@ -367,11 +368,12 @@ def edits_are_followed():
         bpy.ops.object.mode_set(mode="OBJECT")
     yield from is_the_bake("live-after-edit")
     assert np.corrcoef(edited.ravel(), captured("live-x", view()[2]).ravel())[0, 1] > 0.5
-    with in_view():
-        bpy.ops.object.mode_set(mode="SCULPT")
-        bpy.ops.sculpt.mesh_filter(type="SCALE", strength=0.1)
-        bpy.ops.object.mode_set(mode="OBJECT")
-    yield from is_the_bake("live-sculpted")
+    if bpy.app.version >= (5, 0):  # before, Blender crashes on this operator in a script
+        with in_view():
+            bpy.ops.object.mode_set(mode="SCULPT")
+            bpy.ops.sculpt.mesh_filter(type="SCALE", strength=0.1)
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield from is_the_bake("live-sculpted")
     with in_view():
         bpy.ops.ed.undo_push(message="sculpted")
         bpy.ops.ed.undo()

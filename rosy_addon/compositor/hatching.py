@@ -20,6 +20,9 @@ from .images import Images
 from .look import Look
 from .noise import MEAN, image_noise
 
+#: Of linear light (Rec. 709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
 #: Darkness over which a family that joins in comes to its full share.
 JOINING = 0.35
 
@@ -44,7 +47,7 @@ def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np
     look : Look
         With its lengths in the pixels of the frame.
     tone : (P,) float32 ndarray
-        The light that is to be left, 0 to 1, linear.
+        The light that there is to be, 0 to 1, linear.
 
     Returns
     -------
@@ -55,7 +58,7 @@ def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np
         (2 * look.length + 1) * look.step, look.grain, look.density, look.high_pass, look.crispness
     )
     soft = softness(look)
-    left = np.clip(tone, 0, 1)
+    left = np.clip(1 - tone if is_light(look) else tone, 0, 1)
     paper = np.ones(len(left), dtype=np.float32)
     for share, member in zip(family_shares(flow, look, left), images.members, strict=True):
         covered = 1 - left**share
@@ -63,6 +66,14 @@ def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np
         above = (member.mean(axis=1) - MEAN) / deviation - limit
         paper *= 1 - _smooth_step(above / (2 * soft) + 0.5)
     return 1 - paper
+
+
+def is_light(look: Look) -> bool:
+    """Whether the ink is lighter than the paper, so that there is the more of it the more light."""
+    ink, paper = (
+        to_linear(from_hex(code)) @ LUMINANCE for code in (look.ink_colour, look.paper_colour)
+    )
+    return bool(ink > paper)
 
 
 def inked(coverage: np.ndarray, look: Look) -> np.ndarray:

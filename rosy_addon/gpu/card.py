@@ -17,7 +17,7 @@ from ..compositor.anchored import LEAN, LOWEST, SIDE, TAPS, identities, lattice_
 from ..compositor.colour import colour_stops, from_hex, to_linear
 from ..compositor.compose import scaled_look
 from ..compositor.contrast import averaging_gain, expected_deviation
-from ..compositor.hatching import EARLY, JOINING, ink_thresholds, softness
+from ..compositor.hatching import EARLY, JOINING, ink_thresholds, is_light, softness
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
@@ -679,6 +679,7 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "paper_light": (*to_linear(from_hex(look.paper_colour)), 1.0),
         "ink_light": (*to_linear(from_hex(look.ink_colour)), 1.0),
         "hatch": int(look.ink == "hatch"),
+        "light_ink": int(is_light(look)),
         "clear_paper": int(look.clear_paper),
         "layers": look.layers,
         "layering": look.layering,

@@ -232,6 +232,7 @@ WALK = Compute(
         ("paper_light", "vec4"),
         ("ink_light", "vec4"),
         ("hatch", "int"),
+        ("light_ink", "int"),
         ("clear_paper", "int"),
         ("layers", "int"),
         ("layering", "float"),

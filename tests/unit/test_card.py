@@ -505,6 +505,12 @@ LOOKS = {
         "crispness": 0.2,
         "shading": 1.0,
     },
+    "hatched, light on dark": {
+        "ink": "hatch",
+        "ink_colour": "#fff0d0",
+        "paper_colour": "#101020",
+        "shading": 0.9,
+    },
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
     "the method brute": {"method": "brute"},

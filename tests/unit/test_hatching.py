@@ -118,9 +118,10 @@ def test_presets_reproduce_a_ramp(name):
     asked = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     assert asked.min() < 1 - look.shading + 0.05 and asked.max() > 0.97
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
-    # How much of the paper is left, by the channel in which ink and paper differ most.
+    # From the darker of ink and paper to the lighter, by the channel in which they differ most.
     channel = int(np.argmax(np.abs(paper - ink)))
-    left = (rgba[..., channel] - ink[channel]) / (paper - ink)[channel]
+    darker, lighter = sorted((paper[channel], ink[channel]))
+    left = (rgba[..., channel] - darker) / (lighter - darker)
     seen = np.zeros(SIZE * SIZE)
     seen[gbuffer.pixel] = 1
     wanted = np.zeros(SIZE * SIZE)

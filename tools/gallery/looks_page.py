@@ -77,7 +77,7 @@ def _presets() -> str:
         shown = display(compose_view(monkey, field, look, camera).rgba)
         panels.append(Panel(shown, preset.name))
     path = IMAGES / "looks-presets.png"
-    save(sheet([panels[:3], panels[3:]]), path)
+    save(sheet([panels[start : start + 3] for start in range(0, len(panels), 3)]), path)
     lines = [f"![Suzanne in every preset](images/{path.name})", ""]
     lines += [f"- **{preset.name}**: {preset.description}." for preset in presets]
     return "\n".join(lines)
@@ -109,6 +109,8 @@ def _table() -> str:
             values = "<br>".join(
                 f"`{option}`: {about}" for option, about in rules["options"].items()
             )
+        elif "colour" in rules:
+            values = "a colour, `#rrggbb`"
         elif isinstance(default, bool):
             values = "`true`, `false`"
         else:

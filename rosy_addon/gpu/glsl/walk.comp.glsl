@@ -152,6 +152,7 @@ void main()
   vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
   // What light the ink is to leave, and between how many lines that is shared.
   float left = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
+  left = light_ink != 0 ? 1.0 - left : left;
   float nearest = angle_of(z) / float(degree), soonest = 10.0, sharers = 0.0, paper = 1.0;
   if (hatch != 0) {
     for (int line = 0; line < lines; ++line) {

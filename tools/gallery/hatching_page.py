@@ -1,0 +1,63 @@
+"""The pictures of docs/hatching.md; its text is written by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rosy_addon.compositor.presets import load_preset
+from rosy_addon.field.generate import curvature_field
+from rosy_addon.field.smoothest import smoothest_field
+
+from .figure_11 import smoothed_a_little
+from .looks_page import IMAGES
+from .shapes import suzanne
+from .sheet import Panel, display, save, sheet
+from .solid import compose_view, view
+
+#: Of a picture, pixels: two and three in a row.
+SIDE, THIRD = 384, 256
+
+#: In the order of the page.
+PRESETS = (
+    "pen-and-ink",
+    "cross-hatch",
+    "engraving",
+    "pencil",
+    "charcoal",
+    "woodcut",
+    "white-on-black",
+    "print-300-dpi",
+)
+
+
+def write() -> None:
+    """Draw them."""
+    monkey = suzanne()
+    field = smoothed_a_little(monkey, curvature_field(monkey, 4))
+    panels = []
+    for name in PRESETS:
+        preset = load_preset(name)
+        camera = view(monkey, (-26, 8), (SIDE, SIDE), preset.look.supersampling)
+        shown = display(compose_view(monkey, field, preset.look, camera).rgba)
+        panels.append(Panel(shown, preset.name))
+    save(
+        sheet([panels[start : start + 2] for start in range(0, len(panels), 2)]),
+        IMAGES / "hatching-presets.png",
+    )
+    look = load_preset("cross-hatch").look
+    camera = view(monkey, (-26, 8), (THIRD, THIRD), look.supersampling)
+    layered = []
+    for layers in (1, 2, 3):
+        shown = compose_view(
+            monkey, smoothest_field(monkey, 6), replace(look, layers=layers), camera
+        )
+        layered.append(Panel(display(shown.rgba), f"layers {layers}, N = 6"))
+    save(sheet([layered]), IMAGES / "hatching-layers.png")
+    guided = []
+    for degrees in (0, 45, 90):
+        turned = replace(look, guiding_angle=float(np.radians(degrees)), layers=1)
+        shown = compose_view(monkey, field, turned, camera)
+        guided.append(Panel(display(shown.rgba), f"guiding angle {degrees} degrees"))
+    save(sheet([guided]), IMAGES / "hatching-guide.png")

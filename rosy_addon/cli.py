@@ -1,6 +1,6 @@
 """The command line, the same in Blender and in plain Python.
 
-``render``, ``field`` and ``info`` need numpy alone; ``bake`` needs a Blender, or its Python module.
+``render``, ``strokes``, ``field`` and ``info`` need numpy alone; ``bake`` needs a Blender, or its Python module.
 """
 
 from __future__ import annotations
@@ -39,6 +39,15 @@ from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
 from .projection.project import project
+from .strokes.crossings import with_gaps
+from .strokes.density import by_curvature, by_tone, headlight, pixel_spacing
+from .strokes.families import label_families
+from .strokes.ground import lay_ground
+from .strokes.outline import outline
+from .strokes.seen import seen
+from .strokes.strokes import Strokes
+from .strokes.svg import Pen, write_svg
+from .strokes.trace import trace
 from .turntable import Encoder, check_film, has_ffmpeg, pictures, write_film
 
 #: Exit statuses: done, something the user can put right, stopped by Ctrl-C.
@@ -113,6 +122,39 @@ def turntable(options: argparse.Namespace) -> None:
     size = check_size(*options.size)
     frames = pictures(body, look, options.pictures, size, options.view, not options.ortho)
     write_film(options.output, _counted(frames, options.pictures), options.rate, encode)
+
+
+def strokes(options: argparse.Namespace) -> None:
+    """Cover a mesh file with evenly spaced strokes along its field, as lines in an .svg file."""
+    if options.output.suffix.lower() != ".svg":
+        raise RosyError(f"{options.output}: strokes are written to .svg files")
+    check_writable(options.output)
+    pen = Pen(
+        width=options.width,
+        colours=options.colours.split(","),
+        paper=None if options.no_paper or options.plotter else "#ffffff",
+        millimetres=options.mm,
+        plotter=options.plotter,
+    )
+    surface, field = _mesh_and_field(options)
+    matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
+    camera = _camera(options, surface.vertices @ matrix[:3, :3].T, 1)
+    body = Body(surface, matrix, field)
+    spacing = pixel_spacing(body, camera, options.spacing)
+    if options.tone:
+        spacing = by_tone(spacing, headlight(body, camera))
+    if options.curvature:
+        spacing = by_curvature(surface, spacing, options.curvature)
+    drawn = trace(body, spacing, cross_creases=options.cross_creases)
+    drawn = label_families(drawn, lay_ground(body), camera.view[0, :3])
+    if options.gaps:
+        drawn = with_gaps(drawn, options.gaps, weave=True)
+    if options.taper:
+        drawn = drawn.tapered(options.taper, 0.15)
+    if options.outline:
+        drawn = Strokes.joined(drawn, outline(body, camera))
+    drawn = seen(drawn, [body], camera, hide=not options.hidden)
+    write_svg(options.output, drawn, camera, pen)
 
 
 def _encoder(path: Path) -> Encoder | None:
@@ -481,7 +523,7 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         prog=prog, description="Draw N-way rotational symmetry fields on meshes."
     )
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    for add in (_add_bake, _add_render, _add_turntable, _add_field, _add_info):
+    for add in (_add_bake, _add_render, _add_strokes, _add_turntable, _add_field, _add_info):
         add(verbs)
     return parser
 
@@ -530,6 +572,70 @@ def _add_render(verbs: Any) -> None:
     verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
     _add_view(verb, DEFAULT_SIZE)
     _add_look(verb)
+
+
+def _add_strokes(verbs: Any) -> None:
+    verb = _verb(verbs, "strokes", strokes)
+    _add_mesh(verb)
+    verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
+    _add_view(verb, DEFAULT_SIZE)
+    verb.add_argument(
+        "--spacing",
+        type=_number(0.5, 1e4),
+        default=8.0,
+        metavar="PX",
+        help="pixels between strokes of a family, where the surface faces the camera (%(default)g)",
+    )
+    verb.add_argument(
+        "--tone", action="store_true", help="nearer where a light at the camera leaves it darker"
+    )
+    verb.add_argument(
+        "--curvature",
+        type=_number(0.0, 1.0),
+        default=0.0,
+        metavar="AMOUNT",
+        help="nearer where the surface bends more: 0 to 1",
+    )
+    verb.add_argument(
+        "--width",
+        type=_number(0.01, 1e3),
+        default=1.0,
+        metavar="PX",
+        help="of strokes (%(default)g)",
+    )
+    verb.add_argument(
+        "--taper",
+        type=_number(0.0, 1e3),
+        default=0.8,
+        metavar="SPACINGS",
+        help="over which strokes get thinner toward their ends (%(default)g)",
+    )
+    verb.add_argument(
+        "--gaps",
+        type=_number(0.0, 1.0),
+        default=0.0,
+        metavar="SPACINGS",
+        help="that the lower of two strokes leaves where they cross",
+    )
+    verb.add_argument(
+        "--outline", action="store_true", help="silhouettes, creases and borders, as layers"
+    )
+    verb.add_argument("--hidden", action="store_true", help="draw what is hidden as well")
+    verb.add_argument(
+        "--cross-creases", action="store_true", help="let strokes go on over sharp edges"
+    )
+    verb.add_argument(
+        "--plotter",
+        action="store_true",
+        help="lines of one width, in an order in which a pen travels little, without paper",
+    )
+    verb.add_argument(
+        "--mm", type=_number(1.0, 1e5), metavar="WIDTH", help="width of the page in millimetres"
+    )
+    verb.add_argument(
+        "--colours", default="#000000", metavar="C,C,...", help="of the layers, as SVG names them"
+    )
+    verb.add_argument("--no-paper", action="store_true", help="nothing behind the strokes")
 
 
 def _add_view(verb: argparse.ArgumentParser, size: tuple[int, int]) -> None:

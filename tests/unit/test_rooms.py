@@ -24,6 +24,7 @@ MAY_IMPORT = {
     "field": BASE,
     "projection": BASE | {"field"},
     "compositor": BASE | {"field", "projection"},
+    "strokes": BASE | {"field", "projection"},
     "gpu": BASE | {"field", "projection", "compositor"},
     "scene": BASE | {"field", "projection", "compositor", "reuse"},
     "bake": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse"},
@@ -44,11 +45,12 @@ MAY_IMPORT = {
         "animation",
         "jobs",
         "turntable",
+        "strokes",
     },
     "__main__": {"cli"},
     "__init__": set(),
 }
-NUMPY_ROOMS = ("field", "projection", "compositor")
+NUMPY_ROOMS = ("field", "projection", "compositor", "strokes")
 
 #: What of the room `gpu` draws with Blender, and imports that when it does.
 DRAWN_WITH = ("device.py", "processor.py")

@@ -1,0 +1,136 @@
+"""How near strokes are to be: by what a camera sees, by tone, and by curvature."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import RosyError
+from ..field.frames import dot, unit
+from ..field.generate import curvature_magnitude
+from ..field.surface import Surface, mix_over_fans
+from ..projection.camera import Camera
+from ..projection.gbuffer import Body
+from .seen import pixel_size
+from .strokes import Strokes
+
+#: Spacings are at most and at least so many times what was asked for.
+LIGHTEST, DARKEST = 3.0, 0.5
+
+
+def pixel_spacing(body: Body, camera: Camera, pixels: float) -> np.ndarray:
+    """(V,) float64: spacings in world space that are so many pixels, facing the camera.
+
+    Raises
+    ------
+    RosyError
+        If they are not above 0.
+    """
+    if not (np.isfinite(pixels) and pixels > 0):
+        raise RosyError(f"a spacing of {pixels:g} pixels is not above 0")
+    return pixels * pixel_size(_in_world(body), camera)
+
+
+def by_tone(
+    spacing: np.ndarray | float, tone: np.ndarray, lightest: float = LIGHTEST
+) -> np.ndarray:
+    """Nearer where it is darker: ink on paper is the width of strokes over their spacing.
+
+    Parameters
+    ----------
+    spacing : float or ndarray
+        Where it is black.
+    tone : ndarray
+        From 0, black, to 1, white; at vertices or faces.
+    lightest : float
+        How many times as far strokes are at most.
+
+    Raises
+    ------
+    RosyError
+        If a tone is not a number.
+    """
+    tone = np.asarray(tone, dtype=np.float64)
+    if not np.isfinite(tone).all():
+        raise RosyError("a tone is not a number")
+    ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / lightest)
+    return np.asarray(spacing) / ink
+
+
+def by_curvature(surface: Surface, spacing: np.ndarray | float, amount: float = 0.5) -> np.ndarray:
+    """(V,) nearer where the surface bends more.
+
+    Parameters
+    ----------
+    surface : Surface
+    spacing : float or (V,) ndarray
+    amount : float
+        Power of the curvature, relative to its median, that the spacing is divided by: 0 changes
+        nothing, at 1 it is as the radius of curvature. Between `DARKEST` and `LIGHTEST` times as
+        far.
+    """
+    bend = curvature_magnitude(surface, "curvature")
+    corner = surface.corner_vertex
+    count = np.bincount(corner, minlength=len(surface.vertices))
+    mean = np.bincount(corner, bend[surface.corner_face], len(surface.vertices))
+    mean = mean / np.maximum(count, 1)
+    middle = float(np.median(mean[count > 0]))
+    share = np.maximum(mean, 1e-3 * max(middle, 1e-9)) / max(middle, 1e-9)
+    return np.asarray(spacing) * np.clip(share**-amount, DARKEST, LIGHTEST)
+
+
+def headlight(body: Body, camera: Camera) -> np.ndarray:
+    """(V,) tones of a matt surface lit from the camera: 1 where it faces it."""
+    return lambert(body, _toward(body, camera))
+
+
+def lambert(body: Body, light: np.ndarray) -> np.ndarray:
+    """(V,) tones of a matt surface.
+
+    Parameters
+    ----------
+    body : Body
+    light : (3,) or (V, 3) array_like
+        Toward the light, world space.
+    """
+    matrix = np.asarray(body.matrix, dtype=np.float64)[:3, :3]
+    surface = body.surface
+    cofactors = np.array([np.cross(matrix[k - 2], matrix[k - 1]) for k in range(3)])
+    fan = mix_over_fans(surface.corner_normal, surface.corner_vertex)
+    normal = np.zeros_like(surface.vertices)
+    normal[: len(fan)] = fan @ cofactors.T
+    return np.clip(dot(unit(normal), unit(np.broadcast_to(light, normal.shape) + 0.0)), 0, 1)
+
+
+def kept_by_tone(strokes: Strokes, tone: np.ndarray, thresholds: np.ndarray) -> Strokes:
+    """Families one after the other as it gets darker: hatching, then cross-hatching.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    tone : (n,) ndarray
+        At the points of the strokes, 0 to 1; `at_points` gives it.
+    thresholds : (families,) array_like
+        Each family is drawn where the tone is below its own.
+    """
+    below = tone < np.asarray(thresholds, dtype=np.float64)[strokes.family[strokes.stroke]]
+    return replace(strokes.runs(below), names=strokes.names)
+
+
+def at_points(strokes: Strokes, surface: Surface, values: np.ndarray) -> np.ndarray:
+    """(n,) values of (V,) vertices at the points of strokes; not after `seen`, which adds points."""
+    vertex = surface.triangle_vertex[strokes.triangle]
+    return np.einsum("nk,nk->n", strokes.weights, np.asarray(values, dtype=np.float64)[vertex])
+
+
+def _in_world(body: Body) -> np.ndarray:
+    matrix = np.asarray(body.matrix, dtype=np.float64)
+    return body.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _toward(body: Body, camera: Camera) -> np.ndarray:
+    if not camera.is_perspective:
+        return camera.view[2, :3]
+    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
+    return unit(eye - _in_world(body))

@@ -1,0 +1,275 @@
+"""Strokes as an .svg file: for browsers, for Inkscape with a layer a family, and for plotters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..errors import RosyError
+from ..files import write_bytes
+from ..projection.camera import Camera
+from .seen import on_screen
+from .strokes import Strokes
+
+#: Steps of width in which tapered strokes are drawn.
+SHADES = 8
+
+#: Pixels by which a polyline may miss the points that are left out of it.
+TOLERANCE = 0.06
+
+
+@dataclass(frozen=True)
+class Pen:
+    """How strokes are drawn.
+
+    Attributes
+    ----------
+    width : float
+        Of a full stroke, in pixels of the camera.
+    colours : sequence of str
+        Of the families in turn, as SVG names them.
+    paper : str or None
+        Behind them.
+    millimetres : float or None
+        What the width of the frame is on paper; pixels if not given.
+    plotter : bool
+        Lines of constant width, in an order in which a pen travels little.
+    """
+
+    width: float = 1.0
+    colours: Sequence[str] = ("#000000",)
+    paper: str | None = "#ffffff"
+    millimetres: float | None = None
+    plotter: bool = False
+
+
+def write_svg(
+    path: str | os.PathLike[str], strokes: Strokes, camera: Camera, pen: Pen | None = None
+) -> None:
+    """Write what `svg_text` makes.
+
+    Raises
+    ------
+    RosyError
+        If it may not be written.
+    """
+    write_bytes(path, svg_text(strokes, camera, pen).encode())
+
+
+def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
+    """Strokes as a camera sees them; hidden ones are left out by `seen`, not here.
+
+    Parameters
+    ----------
+    strokes : Strokes
+        All in front of the camera.
+    camera : Camera
+    pen : Pen, optional
+
+    Returns
+    -------
+    str
+        SVG 1.1. Each family is a group that Inkscape takes for a layer.
+
+    Raises
+    ------
+    RosyError
+        If the pen has no width or no colour.
+    """
+    pen = pen or Pen()
+    if not pen.width > 0 or not pen.colours:
+        raise RosyError("a pen has a width above 0, and a colour")
+    pixels, _ = on_screen(strokes.points, camera)
+    pixels[:, 1] = camera.height - pixels[:, 1]
+    size = f'width="{camera.width}" height="{camera.height}"'
+    if pen.millimetres is not None:
+        if not pen.millimetres > 0:
+            raise RosyError("a page has a width above 0")
+        height = pen.millimetres * camera.height / camera.width
+        size = f'width="{pen.millimetres:g}mm" height="{height:g}mm"'
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<svg xmlns="http://www.w3.org/2000/svg" '
+        'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" version="1.1" '
+        f'{size} viewBox="0 0 {camera.width} {camera.height}">',
+    ]
+    if pen.paper is not None:
+        lines.append(f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>')
+    for family, name in enumerate(strokes.names):
+        own = strokes.chosen(strokes.family == family)
+        if not len(own):
+            continue
+        flat = pixels[np.repeat(strokes.family == family, np.diff(strokes.start))]
+        colour = pen.colours[family % len(pen.colours)]
+        lines.append(
+            f'<g id="layer{family + 1}" inkscape:groupmode="layer" inkscape:label={quoteattr(name)} '
+            f'fill="none" stroke={quoteattr(colour)} stroke-width="{pen.width:.3g}" '
+            'stroke-linecap="round" stroke-linejoin="round">'
+        )
+        lines += _plotted(flat, own) if pen.plotter else _drawn(flat, own, pen.width)
+        lines.append("</g>")
+    lines.append("</svg>")
+    return "\n".join(lines) + "\n"
+
+
+def _plotted(pixels: np.ndarray, strokes: Strokes) -> list[str]:
+    """A path a stroke, in the order of `pen_order`."""
+    order, turned = pen_order(pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1])
+    kept = simplified(pixels, strokes.start, TOLERANCE)
+    paths = []
+    for stroke, back in zip(order.tolist(), turned.tolist(), strict=True):
+        part = slice(strokes.start[stroke], strokes.start[stroke + 1])
+        points = pixels[part][kept[part]]
+        paths.append(f'<path d="{_path(points[::-1] if back else points)}"/>')
+    return paths
+
+
+def _drawn(pixels: np.ndarray, strokes: Strokes, width: float) -> list[str]:
+    """A path for each stretch of a stroke that is about equally wide."""
+    level = np.ceil(np.clip(strokes.width, 0, 1) * SHADES - 1e-9).astype(np.int64)
+    shade = np.rint(np.clip(strokes.opacity, 0, 1) * SHADES).astype(np.int64)
+    # A piece is as wide as its wider end.
+    key = np.maximum(level[1:], level[:-1]) * (SHADES + 1) + np.minimum(shade[1:], shade[:-1])
+    stroke = strokes.stroke
+    inside = stroke[1:] == stroke[:-1]
+    begins = np.ones(len(key), dtype=bool)
+    begins[1:] = (key[1:] != key[:-1]) | ~inside[:-1]
+    first = np.flatnonzero(begins & inside)
+    ends = np.ones(len(key), dtype=bool)
+    ends[:-1] = begins[1:] | ~inside[1:]
+    last = np.flatnonzero(ends & inside) + 1
+    starts = np.concatenate([[0], np.cumsum(last - first + 1)])
+    point = np.arange(starts[-1]) + np.repeat(first - starts[:-1], last - first + 1)
+    flat = pixels[point]
+    kept = simplified(flat, starts, TOLERANCE)
+    paths = []
+    for number, own in enumerate(key[first].tolist()):
+        wide, opaque = divmod(own, SHADES + 1)
+        if not wide or not opaque:
+            continue
+        part = slice(starts[number], starts[number + 1])
+        more = "" if wide == SHADES else f' stroke-width="{width * wide / SHADES:.3g}"'
+        more += "" if opaque == SHADES else f' stroke-opacity="{opaque / SHADES:.3g}"'
+        paths.append(f'<path{more} d="{_path(flat[part][kept[part]])}"/>')
+    return paths
+
+
+def _path(points: np.ndarray) -> str:
+    return "M" + " ".join(f"{x:.2f},{y:.2f}" for x, y in points.tolist())
+
+
+def simplified(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    """(n,) bool: which points of polylines are enough (Ramer, Douglas and Peucker, all at once).
+
+    Parameters
+    ----------
+    points : (n, k) ndarray
+    start : (S + 1,) ndarray of int
+    tolerance : float
+        How far points that are left out may be from what is left.
+    """
+    kept = np.zeros(len(points), dtype=bool)
+    first, last = start[:-1].astype(np.int64), start[1:].astype(np.int64) - 1
+    kept[first], kept[last] = True, True
+    first, last = first[last - first > 1], last[last - first > 1]
+    while len(first):
+        count = last - first - 1
+        begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+        piece = np.repeat(np.arange(len(first)), count)
+        point = np.arange(count.sum()) + np.repeat(first + 1 - begin, count)
+        base = points[first][piece]
+        along = points[last][piece] - base
+        off = points[point] - base
+        square = np.einsum("ni,ni->n", along, along)
+        share = np.einsum("ni,ni->n", off, along) / np.where(square > 0, square, 1)
+        off = off - np.clip(share, 0, 1)[:, None] * along
+        distance = np.einsum("ni,ni->n", off, off)
+        most = np.maximum.reduceat(distance, begin)
+        split = most > tolerance**2
+        at = np.flatnonzero(distance == most[piece])
+        where, index = np.unique(piece[at], return_index=True)
+        middle = np.zeros(len(first), dtype=np.int64)
+        middle[where] = point[at[index]]
+        first, middle, last = first[split], middle[split], last[split]
+        kept[middle] = True
+        first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
+        first, last = first[last - first > 1], last[last - first > 1]
+    return kept
+
+
+def pen_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An order of strokes, and which of them backward, in which a pen travels little between them.
+
+    Greedy: always the nearest end that is left, found ring by ring in a grid.
+
+    Parameters
+    ----------
+    first, last : (S, 2) ndarray
+        Their ends.
+
+    Returns
+    -------
+    order : (S,) int64 ndarray
+    turned : (S,) bool ndarray
+        In that order.
+    """
+    count = len(first)
+    ends = np.concatenate([first, last])
+    if not count:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
+    low, extent = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-9)
+    cells = max(int(np.sqrt(count)), 1)
+    cell = np.minimum(((ends - low) / extent.max() * cells).astype(np.int64), cells - 1)
+    grid: dict[tuple[int, int], set[int]] = {}
+    keys = [tuple(key) for key in cell.tolist()]
+    for number, key in enumerate(keys):
+        grid.setdefault(key, set()).add(number)
+    places = ends.tolist()
+    here, order, turned = low.tolist(), [], []
+    at = (0, 0)
+    for _ in range(count):
+        best = _nearest_end(grid, places, here, at, cells, extent.max() / cells)
+        stroke = best % count
+        order.append(stroke)
+        turned.append(best >= count)
+        for number in (stroke, stroke + count):
+            grid[keys[number]].discard(number)
+        other = stroke if best >= count else stroke + count
+        here, at = places[other], keys[other]
+    return np.array(order), np.array(turned)
+
+
+def _nearest_end(
+    grid: dict[tuple[int, int], set[int]],
+    places: list[list[float]],
+    here: list[float],
+    at: tuple[int, int],
+    cells: int,
+    side: float,
+) -> int:
+    best, least = -1, np.inf
+    for ring in range(cells + 1):
+        if best >= 0 and least <= (max(ring - 1, 0) * side) ** 2:
+            break
+        for key in _ring(at, ring):
+            for number in sorted(grid.get(key, ())):
+                x, y = places[number]
+                distance = (x - here[0]) ** 2 + (y - here[1]) ** 2
+                if distance < least:
+                    best, least = number, distance
+    return best
+
+
+def _ring(at: tuple[int, int], ring: int) -> list[tuple[int, int]]:
+    x, y = at
+    if not ring:
+        return [at]
+    row = range(-ring, ring + 1)
+    column = range(-ring + 1, ring)
+    return [(x + i, y + j) for i in row for j in (-ring, ring)] + [
+        (x + i, y + j) for i in (-ring, ring) for j in column
+    ]

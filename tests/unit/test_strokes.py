@@ -1,0 +1,565 @@
+"""Strokes: where they run, how far apart, what hides them, and what is written of them."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapes import cube, cylinder, icosphere, plane, torus
+
+from rosy_addon.cli import main
+from rosy_addon.field.frames import carry, dot, unit
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.meshfile import read_mesh
+from rosy_addon.field.representation import face_frames
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.strokes.crossings import crossings, cut, with_gaps
+from rosy_addon.strokes.density import at_points, by_curvature, by_tone, headlight, kept_by_tone
+from rosy_addon.strokes.evenness import side_gaps
+from rosy_addon.strokes.families import global_labels
+from rosy_addon.strokes.ground import lay_ground
+from rosy_addon.strokes.outline import outline
+from rosy_addon.strokes.seen import on_screen, seen
+from rosy_addon.strokes.spread import Rules
+from rosy_addon.strokes.strokes import Strokes
+from rosy_addon.strokes.svg import Pen, pen_order, simplified, svg_text
+from rosy_addon.strokes.trace import trace
+from rosy_addon.strokes.walk import Walkers, go_straight
+
+STILL = np.eye(4)
+
+
+def body_of(surface, degree, angle=0.0, kind=None):
+    """With a field at an angle to the first edges of the faces, or a generated one."""
+    if kind is not None:
+        return Body(surface, STILL, generate(surface, kind, degree))
+    x, y = face_frames(surface)
+    return Body(surface, STILL, RosyField(degree, np.cos(angle) * x + np.sin(angle) * y))
+
+
+def straight_pieces(strokes):
+    """Starts and ends of the pieces, and the triangles that they lie in."""
+    stroke = strokes.stroke
+    end = np.flatnonzero(np.diff(stroke, prepend=-1) == 0)
+    return strokes.points[end - 1], strokes.points[end], strokes.triangle[end]
+
+
+def degrees_off(ground, strokes, shares=(0.0, 0.5, 1.0)):
+    """By how many degrees pieces are off the nearest member, at points along them."""
+    start, end, triangle = straight_pieces(strokes)
+    long = np.linalg.norm(end - start, axis=1) > 1e-9 * np.abs(strokes.points).max()
+    start, end, triangle = start[long], end[long], triangle[long]
+    way = unit(end - start)
+    flat = dot(way, ground.x[triangle]) + 1j * dot(way, ground.y[triangle])
+    flat /= np.abs(flat)
+    worst = np.zeros(len(start))
+    for share in shares:
+        point = start + share * (end - start)
+        corner = ground.points[triangle]
+        local = np.stack(
+            [
+                dot(point - corner[:, 0], ground.x[triangle]),
+                dot(point - corner[:, 0], ground.y[triangle]),
+            ],
+            axis=1,
+        )
+        flat_corner = [
+            np.stack(
+                [dot(corner[:, k] - corner[:, 0], axis[triangle]) for axis in (ground.x, ground.y)],
+                1,
+            )
+            for k in (1, 2)
+        ]
+        matrix = np.stack(flat_corner, axis=2)
+        two = np.linalg.solve(matrix, local[..., None])[..., 0]
+        weights = np.column_stack([1 - two.sum(axis=1), two])
+        z = np.einsum("nk,nk->n", weights, ground.z[triangle])
+        both = 1 if ground.degree % 2 == 0 else 2  # forward or backward along a member
+        off = np.angle((z * (flat.conj() ** ground.degree)) ** both) / (both * ground.degree)
+        worst = np.maximum(worst, np.degrees(np.abs(off)))
+    return worst
+
+
+def nearest_others(strokes):
+    """By brute force, of strokes of one family: the least distance between points of different ones."""
+    stroke, least = strokes.stroke, np.inf
+    for first in range(0, len(stroke), 500):
+        part = slice(first, first + 500)
+        apart = np.linalg.norm(strokes.points[part, None] - strokes.points[None], axis=2)
+        apart[stroke[part, None] == stroke[None]] = np.inf
+        least = min(least, apart.min())
+    return least
+
+
+# --- where strokes run -----------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.floats(0, np.pi), st.integers(1, 6), st.integers(1, 7))
+def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cells):
+    body = body_of(plane(cells, cells), degree, angle)
+    drawn = trace(body, 0.2)
+    chord = drawn.points[drawn.start[1:] - 1] - drawn.points[drawn.start[:-1]]
+    assert np.allclose(np.linalg.norm(chord, axis=1), drawn.length, rtol=1e-6)
+    turn = np.angle(np.exp(1j * angle) / (chord[:, 0] + 1j * chord[:, 1]))
+    lines = degree if degree % 2 else degree // 2
+    off = (turn * lines / np.pi + 0.5) % 1 - 0.5
+    assert np.abs(off).max() < 1e-4
+    assert np.abs(drawn.points).max() <= 1 + 1e-9
+    gaps = side_gaps(lay_ground(body), drawn)
+    assert gaps.even() > 0.9
+    assert gaps.nearest.min() > 0.5
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+def test_directions_are_those_of_the_field_everywhere(degree):
+    surface = icosphere(3)
+    body = body_of(surface, degree, kind="smoothest")
+    ground = lay_ground(body)
+    drawn = trace(body, 0.1)
+    assert degrees_off(ground, drawn).max() < 1.0
+
+
+def test_on_a_torus_strokes_wind_at_the_angle_of_the_field():
+    """In closed form: at an angle to the circles around the axis."""
+    angle = np.radians(25)
+    body = body_of(torus(128, 64), 2, angle)
+    drawn = trace(body, 0.08)
+    start, end, _ = straight_pieces(drawn)
+    middle, way = (start + end) / 2, unit(end - start)
+    around = unit(np.stack([-middle[:, 1], middle[:, 0], 0 * middle[:, 0]], axis=1))
+    out = unit(middle * (1, 1, 0))
+    normal = unit(middle - out)
+    across = np.cross(normal, around)
+    found = np.arctan2(dot(way, across), dot(way, around))
+    off = np.degrees((found - angle + np.pi / 2) % np.pi - np.pi / 2)
+    long = np.linalg.norm(end - start, axis=1) > 1e-3
+    # The field is given on flat faces, 5 degrees wide: it is that of the round torus to second order.
+    assert np.abs(off[long]).max() < 1.0
+
+
+def test_pieces_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
+    body = body_of(icosphere(2), 4, kind="smoothest")
+    ground, drawn = lay_ground(body), trace(body, 0.2)
+    start, end, triangle = straight_pieces(drawn)
+    for point in (start, end):
+        above = dot(point - ground.points[triangle, 0], ground.normal[triangle])
+        assert np.abs(above).max() < 1e-9
+    assert np.allclose(drawn.points, ground.place(drawn.triangle, drawn.weights))
+    assert (drawn.face == body.surface.triangle_face[drawn.triangle]).all()
+
+
+def test_strokes_look_like_the_render():
+    """The pixels that strokes pass hold the field that they follow."""
+    from rosy_addon.field.frames import tangent_frame, view_frame
+    from rosy_addon.projection.project import project
+
+    body = body_of(icosphere(4), 4, kind="smoothest")
+    camera = orbit_camera(body.surface, 20, 30, 900, 900, perspective=False)
+    buffer = project([body], camera)
+    shown = seen(trace(body, 0.1), [body], camera)
+    end = np.flatnonzero(np.diff(shown.stroke, prepend=-1) == 0)
+    pixels, _ = on_screen((shown.points[end] + shown.points[end - 1]) / 2, camera)
+    column, row = np.floor(pixels.T).astype(int)
+    place = np.searchsorted(buffer.pixel, row * camera.width + column).clip(
+        0, len(buffer.pixel) - 1
+    )
+    same = buffer.pixel[place] == row * camera.width + column
+    same &= buffer.triangle[place] == shown.triangle[end]
+    normal = buffer.normal[place].astype(float)
+    same &= normal[:, 2] > 0.4
+    turn = camera.view[:3, :3]
+    way = unit(shown.points[end] - shown.points[end - 1]) @ turn.T
+    flat = buffer.plane_normal[place].astype(float)
+    eye = buffer.toward_eye[place].astype(float)
+    way = carry(carry(way, flat, normal), normal, eye)
+    x, y = view_frame(eye)
+    angle = np.arctan2(dot(way, y), dot(way, x))
+    z = buffer.representation[place]
+    off = np.degrees(np.abs(np.angle(z * np.exp(-4j * angle)))) / 4
+    sharp = np.abs(z) > 0.5  # elsewhere the field turns within a pixel
+    assert (same & sharp).sum() > 1000
+    assert np.percentile(off[same & sharp], 99) < 1.0
+    assert tangent_frame is not None
+
+
+def test_strokes_stop_at_creases_unless_asked():
+    surface = read_cube()
+    drawn = trace(Body(surface, STILL, axis_field(surface, 4, (1, 0.3, 0.2))), 0.1)
+    assert all(
+        len(np.unique(drawn.face[a:b])) == 1
+        for a, b in zip(drawn.start, drawn.start[1:], strict=False)
+    )
+    over = trace(
+        Body(surface, STILL, axis_field(surface, 4, (1, 0.3, 0.2))), 0.1, cross_creases=True
+    )
+    assert any(
+        len(np.unique(over.face[a:b])) > 1 for a, b in zip(over.start, over.start[1:], strict=False)
+    )
+
+
+def read_cube():
+    from rosy_addon.field.surface import build_surface
+
+    whole = cube()
+    return build_surface(
+        whole.vertices, whole.corner_vertex, whole.face_start, name="cube", sharp_angle=0.5
+    )
+
+
+def test_straight_ahead_is_a_geodesic():
+    """Around a cylinder: as far up and around as in the plane that it is unrolled to."""
+    surface = cylinder(64, 8)
+    ground = lay_ground(body_of(surface, 2))
+    count = 20
+    triangle = np.full(count, 100, dtype=np.int32)
+    weights = np.full((count, 3), 1 / 3)
+    angle = np.linspace(0.1, 1.0, count)
+    start = Walkers(triangle, weights, np.ones(count, complex), np.ones(count))
+    here = ground.place(triangle, weights)
+    around = np.cross((0, 0, 1.0), ground.normal[triangle])
+    way = np.cos(angle)[:, None] * around + np.sin(angle)[:, None] * np.array([0, 0, 1.0])
+    flat = dot(way, ground.x[triangle]) + 1j * dot(way, ground.y[triangle])
+    now, walked = go_straight(ground, start, flat, np.full(count, 0.5))
+    there = ground.place(now.triangle, now.weights)
+    inside = walked > 0.5 - 1e-9
+    assert inside.any()
+    assert np.allclose((there - here)[inside, 2], 0.5 * np.sin(angle)[inside], atol=1e-9)
+
+
+# --- how far apart ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_spacing_on_a_torus(degree):
+    surface = torus()
+    body = body_of(surface, degree, kind="axis" if degree == 2 else "smoothest")
+    spacing = 0.02 * surface.size
+    gaps = side_gaps(lay_ground(body), trace(body, spacing))
+    assert gaps.even() >= 0.9
+    assert gaps.nearest.min() >= 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.skipif("ROSY_LONG" not in os.environ, reason="minutes: set ROSY_LONG")
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_spacing_on_the_bunny(shared_data, degree):
+    surface = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
+    body = body_of(surface, degree, kind="smoothest")
+    ground, drawn = lay_ground(body), trace(body, 0.012 * surface.size)
+    gaps = side_gaps(ground, drawn)
+    assert gaps.even() >= 0.9
+    assert np.mean(gaps.nearest < 0.5) < 1e-3
+    assert degrees_off(ground, drawn).max() < 1.0
+
+
+def test_the_measure_knows_how_far_lines_are_apart():
+    """Lines put by hand: 1.0, 1.2 and 1.6 spacings apart, in a plane."""
+    body = body_of(plane(), 2)
+    ground = lay_ground(body)
+    drawn = trace(body, 0.1)
+    y = np.array([-0.4, -0.3, -0.18, -0.02])
+    x = np.linspace(-0.9, 0.9, 181)
+    points = np.stack([np.tile(x, 4), np.repeat(y, 181), np.zeros(4 * 181)], axis=1)
+    lines = Strokes(
+        points=points,
+        start=np.arange(5) * 181,
+        family=np.zeros(4, dtype=np.int32),
+        names=drawn.names,
+        face=np.zeros(724, dtype=np.int32),
+        triangle=np.zeros(724, dtype=np.int32),
+        weights=np.full((724, 3), 1 / 3),
+        normal=np.tile((0, 0, 1.0), (724, 1)),
+        member=np.tile((1.0, 0, 0), (724, 1)),
+        spacing=np.full(724, 0.1),
+        width=np.ones(724),
+        opacity=np.ones(724),
+        closed=np.zeros(4, dtype=bool),
+    )
+    gaps = side_gaps(ground, lines)
+    middle = np.abs(points[gaps.point % 724, 0]) < 0.5
+    line = gaps.point // 181
+    for number, (left, right) in enumerate([(1.0, np.inf), (1.2, 1.0), (1.6, 1.2), (np.inf, 1.6)]):
+        own = gaps.gap[(line == number) & middle]
+        assert np.allclose(own[:, 0], left, atol=1e-6) or np.isinf(left)
+        assert np.allclose(own[:, 1], right, atol=1e-6) or np.isinf(right)
+
+
+def test_none_is_too_near_by_brute_force():
+    body = body_of(plane(), 2, 0.3)
+    assert nearest_others(trace(body, 0.15)) >= 0.5 * 0.15
+
+
+def test_thin_sheets_do_not_interfere():
+    """Two planes a hundredth of the spacing apart, facing away from each other."""
+    from rosy_addon.field.surface import build_surface
+
+    one = plane()
+    count = len(one.vertices)
+    below = one.vertices - (0, 0, 0.001)
+    quads = one.corner_vertex.reshape(-1, 4)
+    both = np.concatenate([quads, quads[:, ::-1] + count])
+    surface = build_surface(
+        np.concatenate([one.vertices, below]), both.ravel(), np.arange(0, both.size + 1, 4)
+    )
+    body = Body(surface, STILL, axis_field(surface, 2, (1, 0, 0)))
+    drawn = trace(body, 0.1)
+    top = drawn.normal[drawn.start[:-1], 2] > 0
+    assert 18 <= top.sum() <= 22 and 18 <= (~top).sum() <= 22
+
+
+def test_same_strokes_again():
+    one, two = (trace(body_of(icosphere(3), 4, kind="smoothest"), 0.1) for _ in range(2))
+    assert np.array_equal(one.points, two.points) and np.array_equal(one.family, two.family)
+
+
+# --- density ---------------------------------------------------------------------------------------
+
+
+def test_darker_is_denser():
+    surface = plane(20, 20)
+    dark = surface.vertices[:, 0] < 0
+    spacing = by_tone(0.05, np.where(dark, 0.0, 0.6))
+    assert np.allclose(np.unique(spacing), (0.05, 0.125))
+    drawn = trace(Body(surface, STILL, axis_field(surface, 2, (0, 1, 0))), spacing)
+    x = drawn.points[drawn.start[:-1], 0]
+    per_length = [drawn.length[side].sum() for side in (x < -0.1, x > 0.1)]
+    assert 1.9 < per_length[0] / per_length[1] < 3.2
+
+
+def test_curvature_and_light():
+    surface = torus()
+    spacing = by_curvature(surface, 1.0, 0.5)
+    assert spacing.shape == (len(surface.vertices),) and np.ptp(spacing) > 0
+    camera = orbit_camera(surface, 0, 90, 100, 100, perspective=False)
+    tone = headlight(Body(surface, STILL), camera)
+    assert np.isclose(tone.max(), 1, atol=1e-3) and tone[surface.vertices[:, 2] < -0.3].max() == 0
+
+
+def test_families_by_tone():
+    body = body_of(plane(10, 10), 4)
+    drawn = trace(body, 0.1)
+    tone = at_points(drawn, body.surface, (body.surface.vertices[:, 0] + 1) / 2)
+    crossed = kept_by_tone(drawn, tone, (0.8, 0.4))
+    for family, threshold in ((0, 0.8), (1, 0.4)):
+        own = crossed.chosen(crossed.family == family)
+        assert len(own) and own.points[:, 0].max() < 2 * threshold - 1
+
+
+# --- families --------------------------------------------------------------------------------------
+
+
+def test_families_are_the_same_all_over_a_torus():
+    body = body_of(torus(48, 24), 4)
+    assert global_labels(lay_ground(body)) is not None
+    drawn = trace(body, 0.15)
+    assert drawn.names == ("family 1", "family 2")
+    middle = (drawn.start[:-1] + drawn.start[1:]) // 2
+    place = drawn.points[middle]
+    around = unit(np.stack([-place[:, 1], place[:, 0], 0 * place[:, 0]], axis=1))
+    along = np.abs(dot(drawn.member[middle], around)) > 0.7
+    assert len(np.unique(along[drawn.family == 0])) == 1
+    assert len(np.unique(along[drawn.family == 1])) == 1
+
+
+def test_around_singularities_families_run_into_each_other():
+    body = body_of(icosphere(3), 4, kind="smoothest")
+    assert global_labels(lay_ground(body)) is None
+    assert set(trace(body, 0.2).family.tolist()) == {0, 1}
+
+
+# --- what is done with them --------------------------------------------------------------------------
+
+
+def test_taper_and_closed_strokes():
+    drawn = trace(body_of(plane(), 2), 0.1).tapered(2.0, 0.2)
+    assert np.allclose(drawn.width[drawn.start[:-1]], 0.2)
+    assert drawn.width.max() == 1.0 and (drawn.width >= 0.2 - 1e-9).all()
+
+
+def test_gaps_at_crossings():
+    body = body_of(plane(3, 3), 4)
+    drawn = trace(body, 0.2)
+    met = crossings(drawn)
+    first = (drawn.family == 0).sum() * (drawn.family == 1).sum()
+    assert 0.8 * first <= len(met.stroke) <= first
+    gapped = with_gaps(drawn, 0.3)
+    assert not len(crossings(gapped).stroke)
+    lost = drawn.length.sum() - gapped.length.sum()
+    assert np.isclose(lost, len(met.stroke) * 0.3 * 0.2, rtol=0.1)
+    over = gapped.chosen(gapped.family == 0)
+    assert np.isclose(over.length.sum(), drawn.length[drawn.family == 0].sum())
+    assert not len(crossings(with_gaps(drawn, 0.3, weave=True)).stroke)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
+def test_cuts_take_out_what_they_say(low, size):
+    drawn = trace(body_of(plane(3, 3), 2), 0.2)
+    left = cut(drawn, np.array([0]), np.array([low]), np.array([low + size]))
+    total = drawn.length[0]
+    assume(low + size < total - 1e-6 or low + size > total + 1e-6)
+    taken = min(low + size, total) - min(low, total)
+    assert np.isclose(drawn.length.sum() - left.length.sum(), taken, atol=1e-9)
+
+
+# --- what a camera sees ------------------------------------------------------------------------------
+
+
+def test_a_sphere_shows_its_near_side():
+    body = body_of(icosphere(4), 2, kind="smoothest")
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
+    drawn = trace(body, 0.1)
+    shown = seen(drawn, [body], camera)
+    assert shown.points[:, 1].max() < 0.06
+    near = drawn.points[:, 1] < 0
+    assert shown.length.sum() > 0.9 * drawn.length.sum() * near.mean()
+    every = seen(drawn, [body], camera, hide=False)
+    assert np.isclose(every.length.sum(), drawn.length.sum())
+
+
+def test_others_hide_and_the_frame_cuts():
+    body = body_of(plane(), 2)
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 200, scale=1.0)
+    drawn = trace(body, 0.05)
+    shown = seen(drawn, [body], camera)
+    assert np.abs(shown.points[:, :2]).max() <= 0.5 + 1e-9
+    wall = plane()
+    moved = np.eye(4)
+    moved[:3, 3] = (1.0, 0, 1.0)
+    left = seen(drawn, [body, Body(wall, moved)], camera)
+    assert left.points[:, 0].max() < 0.02
+    assert len(left) >= 15
+
+
+def test_outlines_of_simple_bodies():
+    sphere = Body(icosphere(4), STILL)
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
+    lines = outline(sphere, camera)
+    assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
+    assert np.abs(lines.points[:, 1]).max() < 0.01
+    assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
+    box = outline(Body(read_cube(), STILL))
+    assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
+    edge = outline(Body(plane(), STILL))
+    assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
+
+
+# --- files -------------------------------------------------------------------------------------------
+
+
+def svg_of(**more):
+    body = body_of(plane(), 4)
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 100, scale=4.0)
+    drawn = seen(trace(body, 0.2).tapered(1.0), [body], camera)
+    return ElementTree.fromstring(svg_text(drawn, camera, Pen(**more))), drawn
+
+
+def test_svg_has_a_layer_a_family():
+    root, _ = svg_of(millimetres=100, colours=("red", "#00f"))
+    space = "{http://www.inkscape.org/namespaces/inkscape}"
+    layers = root.findall("{http://www.w3.org/2000/svg}g")
+    assert [layer.get(space + "label") for layer in layers] == ["family 1", "family 2"]
+    assert all(layer.get(space + "groupmode") == "layer" for layer in layers)
+    assert [layer.get("stroke") for layer in layers] == ["red", "#00f"]
+    assert (root.get("width"), root.get("height")) == ("100mm", "50mm")
+    assert root.get("viewBox") == "0 0 200 100"
+    for path in root.iter("{http://www.w3.org/2000/svg}path"):
+        points = np.array([pair.split(",") for pair in path.get("d")[1:].split()], dtype=float)
+        assert len(points) >= 2
+        assert (points >= 0).all() and (points <= (200, 100)).all()
+
+
+def test_plotters_get_whole_lines_in_a_short_order():
+    root, drawn = svg_of(plotter=True, paper=None)
+    paths = list(root.iter("{http://www.w3.org/2000/svg}path"))
+    assert len(paths) == len(drawn)
+    assert all(path.get("stroke-width") is None for path in paths)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 60), st.integers(0, 10**6))
+def test_pen_order_is_a_short_permutation(count, seed):
+    random = np.random.default_rng(seed)
+    first, last = random.random((2, count, 2))
+    order, turned = pen_order(first, last)
+    assert sorted(order.tolist()) == list(range(count))
+    begin = np.where(turned[:, None], last[order], first[order])
+    end = np.where(turned[:, None], first[order], last[order])
+    travel = np.linalg.norm(begin[1:] - end[:-1], axis=1).sum()
+    plain = np.linalg.norm(first[1:] - last[:-1], axis=1).sum()
+    assert travel <= plain + 1e-9 or count < 6
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.integers(2, 40), min_size=1, max_size=4), st.integers(0, 10**6))
+def test_simplified_lines_stay_near(sizes, seed):
+    random = np.random.default_rng(seed)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    points = np.cumsum(random.normal(size=(start[-1], 2)), axis=0)
+    kept = simplified(points, start, 0.5)
+    assert kept[start[:-1]].all() and kept[start[1:] - 1].all()
+    for a, b in pairwise(start):
+        left = points[a:b][kept[a:b]]
+        for point in points[a:b]:
+            along = left[1:] - left[:-1]
+            off = point - left[:-1]
+            square = np.maximum((along**2).sum(axis=1), 1e-300)
+            share = np.clip((off * along).sum(axis=1) / square, 0, 1)
+            assert np.linalg.norm(off - share[:, None] * along, axis=1).min() <= 0.5 + 1e-9
+
+
+def write_ball(path):
+    surface = icosphere(3)
+    lines = [f"v {x} {y} {z}" for x, y, z in surface.vertices]
+    lines += [
+        "f " + " ".join(str(v + 1) for v in face) for face in surface.corner_vertex.reshape(-1, 3)
+    ]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_command_line(tmp_path, capsys):
+    mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
+    write_ball(mesh)
+    command = [
+        "strokes",
+        str(mesh),
+        "--generate",
+        "smoothest",
+        "--spacing",
+        "12",
+        "--size",
+        "300x200",
+    ]
+    assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
+    root = ElementTree.parse(out).getroot()
+    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 3
+    once = out.read_bytes()
+    assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
+    assert out.read_bytes() == once
+    assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
+    assert "ball.png" in capsys.readouterr().err
+
+
+# --- what is wrong is said ---------------------------------------------------------------------------
+
+
+def test_wrong_input_is_one_line(error_of):
+    surface = plane()
+    body = body_of(surface, 4)
+    assert "above 0" in error_of(trace, body, 0.0)
+    assert "too many" in error_of(trace, body, 1e-6)
+    assert "no field" in error_of(trace, Body(surface, STILL), 0.1)
+    assert "zero all over" in error_of(
+        trace, Body(surface, STILL, RosyField(4, np.zeros((16, 3)))), 0.1
+    )
+    assert "vertices" in error_of(trace, body, np.ones(7))
+    assert "first" in error_of(Rules, nearest=1.2)
+    assert "shortest" in error_of(Rules, shortest=5.0, longest=3.0)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .bake import Source, camera_view, scaled_camera, scene_depsgraph, undefined_of
+from .bake import Source, camera_view, scene_depsgraph, undefined_of
 from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import RosyError
@@ -182,7 +182,7 @@ def _frame(
         inputs = f"{FORMAT}\n{drawn_from.hex()}\n".encode()
         was_there = path.is_file() and note.is_file() and read_bytes(note) == inputs
         if not was_there:
-            fine = scaled_camera(view, look.supersampling)
+            fine = view.scaled(look.supersampling)
             work = painting(card, reading.bodies, fine, look, lights)
             picture = yield from part(work, start, stop)
             note.unlink(missing_ok=True)

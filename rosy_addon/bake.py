@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import bpy
-import numpy as np
 
 from .compositor.look import Look
 from .gpu.painter import find_card, painting
@@ -79,7 +78,7 @@ def baking(
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     views = [camera_view(scene, depsgraph, source, size) for source in sources]
-    fine = [scaled_camera(view, look.supersampling) for view in views]
+    fine = [view.scaled(look.supersampling) for view in views]
     reading = read_scene(depsgraph, objects, undefined_of(scene), KEPT)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
@@ -150,17 +149,6 @@ def camera_view(
     if size is None:
         size = picture_size(scene, scene.rosy.percentage)
     return camera_of_object(scene, depsgraph, source, *check_size(*size))
-
-
-def scaled_camera(camera: Camera, factor: int) -> Camera:
-    """The same camera with more pixels."""
-    return Camera(
-        camera.view,
-        np.array(camera.projection),
-        camera.width * factor,
-        camera.height * factor,
-        camera.name,
-    )
 
 
 def undefined_of(scene: bpy.types.Scene) -> str:

@@ -17,14 +17,14 @@ import blf
 import bpy
 import numpy as np
 
-from .bake import scaled_camera, undefined_of
+from .bake import undefined_of
 from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import DeviceError, RosyError
 from .gpu.card import NO_PLANES, Card
 from .gpu.device import blender_device
 from .gpu.processor import Processor
-from .progress import Work
+from .progress import Work, drain
 from .projection.camera import Camera
 from .scene.cameras import camera_of_view
 from .scene.following import Followed, Follower
@@ -36,6 +36,9 @@ BUDGET, SLICE = 0.06, 0.08
 
 #: Seconds after which things are at rest.
 REST = 0.12
+
+#: Seconds without work on it after which a picture is left to itself.
+LEFT = 1.0
 
 #: What a picture of half the size each way costs, streaks of half the length, of one in full.
 COARSE_COST = 0.2
@@ -66,6 +69,8 @@ class _View:
         What was asked for last, and when.
     work : generator or None
         The picture that is being made.
+    works_on, worked_at
+        What it is a picture of, and when it was worked on last, in seconds.
     """
 
     shown: Any = None
@@ -75,6 +80,12 @@ class _View:
     since: float = 0.0
     work: Work[Any] | None = None
     works_on: Hashable = None
+    worked_at: float = 0.0
+
+    @property
+    def is_being_made(self) -> bool:
+        """Whether work on what is wanted goes on: a view that is not on a screen has stopped."""
+        return self.works_on == self.wanted and time.monotonic() < self.worked_at + LEFT
 
 
 @dataclass(eq=False)
@@ -254,20 +265,16 @@ class Live:
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
     ) -> None:
-        layer = self._read(context)
+        depsgraph = context.evaluated_depsgraph_get()
+        layer = self._read(context, depsgraph)
         look = look_of(context.scene.rosy)
         camera = camera_of_view(region, context.region_data)
-        depsgraph = context.evaluated_depsgraph_get()
         seen = [entry for entry in layer.found if _is_visible(entry.shown_by, depsgraph, space)]
         if all(entry.body.field is None for entry in seen):
             return
         placed = self.maker.place([entry.body for entry in seen], look.display)
         planes = _planes(context.region_data)
-        lights = (
-            read_lights(context.evaluated_depsgraph_get(), camera.view)
-            if look.light == "scene"
-            else []
-        )
+        lights = read_lights(depsgraph, camera.view) if look.light == "scene" else []
         view = self._views.setdefault((space.as_pointer(), region.as_pointer()), _View())
         wanted = (
             tuple(entry.number for entry in seen),
@@ -284,11 +291,10 @@ class Live:
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
             self.maker.show(view.shown, placed, camera, planes, opacity)
 
-    def _read(self, context: bpy.types.Context) -> _Layer:
+    def _read(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> _Layer:
         key = context.scene.name, context.view_layer.name
         layer = self._layers.setdefault(key, _Layer())
         if layer.stale:
-            depsgraph = context.evaluated_depsgraph_get()
             layer.found = layer.follower.read(
                 depsgraph, undefined_of(context.scene), others=self.maker.sees_others
             )
@@ -342,14 +348,9 @@ class Live:
     ) -> Work[Any]:
         if coarseness > 1:
             look = look.with_settings(_coarser(look, coarseness))
-            camera = Camera(
-                camera.view,
-                camera.projection,
-                max(camera.width // coarseness, 1),
-                max(camera.height // coarseness, 1),
-                camera.name,
-            )
-        fine = scaled_camera(camera, look.supersampling)
+            width, height = camera.width // coarseness, camera.height // coarseness
+            camera = camera.resized(max(width, 1), max(height, 1))
+        fine = camera.scaled(look.supersampling)
         return self.maker.drawing(placed, fine, look, lights, planes, name)
 
     def _finish(
@@ -358,12 +359,7 @@ class Live:
         """Make a picture at once, and learn how long one takes."""
         self._refining = None
         start = time.monotonic()
-        while True:
-            try:
-                next(work)
-            except StopIteration as done:
-                view.shown = done.value
-                break
+        view.shown = drain(work)
         self.maker.wait()
         taken = time.monotonic() - start
         # What is compiled or uploaded once counts little in the long run.
@@ -373,7 +369,11 @@ class Live:
 
     def _refine(self, view: _View, wanted: Hashable, start: Callable[[], Work[Any]]) -> None:
         """Go on with a picture in full, for a slice of time."""
-        if self._refining is not view or view.works_on != wanted or view.work is None:
+        other = self._refining
+        if other in self._views.values() and other is not view and other.is_being_made:
+            self._after(0.0, "_wake")  # one at a time: they share the images of the card
+            return
+        if other is not view or view.works_on != wanted or view.work is None:
             view.work, view.works_on = start(), wanted
             self._refining = view
         until = time.monotonic() + SLICE
@@ -386,6 +386,7 @@ class Live:
             view.coarseness = self.maker.coarseness[1]
             view.work = self._refining = None
             return
+        view.worked_at = time.monotonic()
         self._after(0.0, "_wake")
 
     def _draw_text(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -171,19 +172,10 @@ def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:
     """(P, K) noise on the surfaces at the pixels of a flow; None for that of the picture."""
     if look.anchor == "picture":
         return None
-    key = look.grain, look.seed, look.noise, look.density, look.high_pass
+    key = noise_of(look)
     made = gbuffer.made.get("noise")
     if made is None or made[0] != key:
-        channels = 3 if look.noise == "colour" else 1
-        noise = surface_noise(
-            gbuffer,
-            look.grain,
-            look.seed,
-            channels,
-            density=look.density,
-            high_pass=look.high_pass,
-        )
-        made = gbuffer.made["noise"] = key, noise
+        made = gbuffer.made["noise"] = key, surface_noise(gbuffer, **key)
     noise = made[1]
     if len(flow.pixel) == len(gbuffer.pixel):
         return noise
@@ -200,15 +192,18 @@ def _images(flow: Flow, look: Look, noise: np.ndarray | None = None) -> Work[Ima
 
 def look_noise(flow: Flow, look: Look) -> np.ndarray:
     """(P, K) float32: the noise that a look asks for, at the pixels of a flow."""
-    return image_noise(
-        flow.pixel,
-        flow.width,
-        look.grain,
-        look.seed,
-        3 if look.noise == "colour" else 1,
-        density=look.density,
-        high_pass=look.high_pass,
-    )
+    return image_noise(flow.pixel, flow.width, **noise_of(look))
+
+
+def noise_of(look: Look) -> dict[str, Any]:
+    """What a look says about its noise, by the parameters of `image_noise` and `surface_noise`."""
+    return {
+        "grain": look.grain,
+        "seed": look.seed,
+        "channels": 3 if look.noise == "colour" else 1,
+        "density": look.density,
+        "high_pass": look.high_pass,
+    }
 
 
 def _layers(flow: Flow, look: Look, images: Images) -> Layers:

@@ -54,10 +54,8 @@ def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np
     (P,) float32 ndarray
         0 to 1.
     """
-    threshold, deviation = ink_thresholds(
-        (2 * look.length + 1) * look.step, look.grain, look.density, look.high_pass, look.crispness
-    )
-    soft = softness(look)
+    threshold, deviation = thresholds_of(look)
+    soft = softness(look.crispness)
     left = np.clip(1 - tone if is_light(look) else tone, 0, 1)
     paper = np.ones(len(left), dtype=np.float32)
     for share, member in zip(family_shares(flow, look, left), images.members, strict=True):
@@ -111,9 +109,15 @@ def _onset(rank: np.ndarray, look: Look) -> np.ndarray:
     return onset
 
 
-def softness(look: Look) -> float:
+def softness(crispness: float) -> float:
     """Half the width of the step from paper to ink, in deviations."""
-    return SOFTEST * (CRISPEST / SOFTEST) ** look.crispness
+    return SOFTEST * (CRISPEST / SOFTEST) ** crispness
+
+
+def thresholds_of(look: Look) -> tuple[np.ndarray, float]:
+    """`ink_thresholds` of a look, with its lengths in the pixels of the frame."""
+    length = (2 * look.length + 1) * look.step
+    return ink_thresholds(length, look.grain, look.density, look.high_pass, look.crispness)
 
 
 @lru_cache(maxsize=16)
@@ -146,7 +150,7 @@ def ink_thresholds(
     means = ((sums[:, reach:] - sums[:, :-reach]) / reach).ravel()
     deviation = float(means.std())
     streaks = np.sort((means - means.mean()) / deviation)[:: max(len(means) // 20_000, 1)]
-    soft = SOFTEST * (CRISPEST / SOFTEST) ** crispness
+    soft = softness(crispness)
     limits = np.linspace(streaks[-1] + soft, streaks[0] - soft, 4 * STEPS)
     covered = [float(_smooth_step((streaks - limit) / (2 * soft) + 0.5).mean()) for limit in limits]
     return np.interp(np.linspace(0, 1, STEPS), covered, limits), deviation

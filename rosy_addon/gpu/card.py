@@ -15,9 +15,9 @@ import numpy as np
 
 from ..compositor.anchored import LEAN, LOWEST, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops, from_hex, to_linear
-from ..compositor.compose import scaled_look
+from ..compositor.compose import noise_of, scaled_look
 from ..compositor.contrast import averaging_gain, expected_deviation
-from ..compositor.hatching import EARLY, JOINING, ink_thresholds, is_light, softness
+from ..compositor.hatching import EARLY, JOINING, is_light, softness, thresholds_of
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
@@ -64,6 +64,7 @@ class Placed:
     field: RosyField | None
     moving: np.ndarray
     grown: float
+    kind: Kind | None
 
 
 @dataclass(eq=False)
@@ -182,13 +183,15 @@ class Card:
 
     def _placed(self, body: Body, display: str, kinds: dict[int, Kind]) -> Placed:
         linear, moving = placement(body.matrix)
-        layers = () if body.field is None else kinds[body.field.degree].layers
+        kind = None if body.field is None else kinds[body.field.degree]
+        layers = () if kind is None else kind.layers
         key = id(body.surface), id(body.field), linear.tobytes(), display, layers
         if key not in self._shapes:
             self._shapes[key] = self._brought(body.surface, linear, body.field, display, layers)
         entry = self._shapes[key]
         entry.used = self._drawn
-        return Placed(entry, body.field, moving @ shifting(entry.shape.centre), growth(body.matrix))
+        moving = moving @ shifting(entry.shape.centre)
+        return Placed(entry, body.field, moving, growth(body.matrix), kind)
 
     def _brought(
         self,
@@ -251,27 +254,20 @@ class Card:
                 f"large for this graphics card, which draws up to {self.device.largest}"
             )
         yield Progress(0.0, "finding what is seen")
-        self._project(placed, camera, NO_PLANES if planes is None else planes)
+        gbuffer = self._project(placed, camera, NO_PLANES if planes is None else planes)
         whole = look.supersampling == 1
         fine = self._image(("picture", name if whole else None), camera.width, camera.height)
         self.device.clear(fine)
-        boxes = [_window(entry, camera) for entry in placed]
-        fields = [entry.field for entry in placed if entry.field is not None]
-        kinds = kinds_of(fields)
+        kinds = sorted({entry.kind for entry in placed} - {None}, key=lambda kind: kind.degree)
         if look.anchor == "surface":
             noise = self._anchored(placed, camera, scaled_look(look))
         else:
             noise = self._noise(camera.width, camera.height, look)
-        for number, (degree, kind) in enumerate(kinds.items()):
-            own = [
-                box
-                for box, entry in zip(boxes, placed, strict=True)
-                if entry.field is not None and entry.field.degree == degree
-            ]
-            around = _around(own)
+        for number, kind in enumerate(kinds):
+            around = _around([_window(entry, camera) for entry in placed if entry.kind == kind])
             if _is_empty(around):
                 continue
-            work = self._composing(kind, around, camera, look, lights, noise, fine)
+            work = self._composing(kind, around, camera, look, lights, gbuffer, noise, fine)
             start, stop = number / len(kinds), (number + 1) / len(kinds)
             yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
         if whole:
@@ -339,7 +335,10 @@ class Card:
             for name in ("seen", "normals", "values_seen")
         }
 
-    def _project(self, placed: Sequence[Placed], camera: Camera, planes: np.ndarray) -> None:
+    def _project(
+        self, placed: Sequence[Placed], camera: Camera, planes: np.ndarray
+    ) -> dict[str, Any]:
+        """The images of the G-buffer, by their names."""
         width, height = camera.width, camera.height
         seen, depth = self._image("seen", width, height), self._depth(width, height)
         batches = [
@@ -351,16 +350,12 @@ class Card:
         values = self._image("values_seen", width, height)
         self.device.clear(values)
         layers = max((entry.shape.shape.traits for entry in placed), default=0)
-        self._traits = (
-            self._image("traits_seen", width, height, layers=layers)
-            if layers > 0
-            else self._image("traits_seen", 1, 1, layers=1)
-        )
+        traits = (width, height) if layers else (1, 1)
         images = {
             "normals": self._image("normals", width, height),
             "values_seen": values,
             "slopes": self._image("slopes", width, height),
-            "traits_seen": self._traits,
+            "traits_seen": self._image("traits_seen", *traits, layers=max(layers, 1)),
         }
         shared = {
             **_camera_constants(camera),
@@ -389,6 +384,7 @@ class Card:
                 images,
                 constants,
             )
+        return images
 
     def _anchored(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
         """Noise that stays with the surfaces, as `anchored.surface_noise`."""
@@ -403,7 +399,7 @@ class Card:
             "amplitude": spread,
             "density": look.density,
             "bright_below": round(look.density * 2**24),
-            "channels": 3 if look.noise == "colour" else 1,
+            "channels": noise_of(look)["channels"],
             "seed": look.seed,
             "LOWEST": LOWEST,
             "LEAN": LEAN,
@@ -462,6 +458,7 @@ class Card:
         camera: Camera,
         look: Look,
         lights: Sequence[Light],
+        gbuffer: dict[str, Any],
         noise: Any,
         picture: Any,
     ) -> Work[None]:
@@ -477,10 +474,6 @@ class Card:
             "around": kind.around,
             "guiding_angle": look.guiding_angle,
         }
-        gbuffer = {
-            name: self._image(name, width, height) for name in ("normals", "values_seen", "slopes")
-        }
-        gbuffer["traits_seen"] = self._traits
         cells = self._image("cells", width, height)
         ways = self._image("ways", width, height, "RGBA16F", kind.lines)
         turning = self._image("turning", width, height, "RGBA16F", kind.lines)
@@ -589,9 +582,9 @@ class Card:
         """`hatching.ink_thresholds` in the first channel."""
         if look.ink == "soft":
             return self._table("palette", None, lambda: PALETTE)
-        key = _of_streaks(look)
+        threshold, _ = thresholds_of(look)  # the same array as long as it is the same
         return self._table(
-            "thresholds", key, lambda: np.repeat(ink_thresholds(*key)[0][:, None], 3, axis=1)
+            "thresholds", threshold.tobytes(), lambda: np.repeat(threshold[:, None], 3, axis=1)
         )
 
     def _light_table(self, lights: Sequence[Light]) -> Any:
@@ -607,26 +600,17 @@ class Card:
 
     def _noise(self, width: int, height: int, look: Look) -> Any:
         """Noise for a frame of this size at least: it is the same for all of them."""
-        look = scaled_look(look)
-        channels = 3 if look.noise == "colour" else 1
-        key = look.grain, look.seed, channels, look.density, look.high_pass
+        wanted = noise_of(scaled_look(look))
+        channels = wanted["channels"]
         kept = self._tables.get("noise")
-        if kept is None or kept[0][0] != key or width > kept[0][1] or height > kept[0][2]:
+        if kept is None or kept[0][0] != wanted or width > kept[0][1] or height > kept[0][2]:
             width, height = (-(-side // TILE) * TILE for side in (width, height))
             pixel = np.arange(width * height, dtype=np.int32)
-            found = image_noise(
-                pixel,
-                width,
-                look.grain,
-                look.seed,
-                channels,
-                density=look.density,
-                high_pass=look.high_pass,
-            )
             data = np.zeros((height, width, 4), dtype=np.float32)
+            found = image_noise(pixel, width, **wanted)
             data[:, :, :channels] = found.reshape(height, width, channels)
             texture = self.device.texture(width, height, "RGBA32F", data=data)
-            kept = self._tables["noise"] = ((key, width, height), texture)
+            kept = self._tables["noise"] = ((wanted, width, height), texture)
         return kept[1]
 
 
@@ -667,7 +651,7 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "grain": finer.grain,
         "crossing": crossing,
         "gain": look.gain * gain,
-        "channels": 3 if look.noise == "colour" else 1,
+        "channels": noise_of(finer)["channels"],
         "families": kind.families if look.hue == "families" else 1,
         "family_layer": len(kind.layers) - 1,
         "sharpness": SHARPNESS / expected_deviation(finer),
@@ -683,17 +667,11 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "clear_paper": int(look.clear_paper),
         "layers": look.layers,
         "layering": look.layering,
-        "softness": softness(look),
-        "deviation": ink_thresholds(*_of_streaks(finer))[1] if look.ink == "hatch" else 1.0,
+        "softness": softness(look.crispness),
+        "deviation": thresholds_of(finer)[1] if look.ink == "hatch" else 1.0,
         "JOINING": JOINING,
         "EARLY": EARLY,
     }
-
-
-def _of_streaks(look: Look) -> tuple[float, ...]:
-    """What `ink_thresholds` depends on."""
-    length = (2 * look.length + 1) * look.step
-    return length, look.grain, look.density, look.high_pass, look.crispness
 
 
 def _body_constants(number: int, entry: Placed, camera: Camera) -> dict[str, Any]:

@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.compose import composing
 from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..errors import NothingInViewError
-from ..progress import Work, part
+from ..progress import Work
 from ..projection.camera import Camera
 from ..projection.gbuffer import Body
-from ..projection.project import projecting
 from .device import Device
+from .painter import painting
 from .passes import SHOW
 
 
@@ -64,10 +63,9 @@ class Processor:
     ) -> Work[Any]:
         """As `Card.drawing`, but that nothing is cut away."""
         try:
-            gbuffer = yield from part(projecting(placed, camera, look.display), 0.0, 0.4)
+            picture = yield from painting(None, placed, camera, look, lights)
         except NothingInViewError:
             return None
-        picture = yield from part(composing(gbuffer, look, lights), 0.4, 1.0)
         height, width = picture.rgba.shape[:2]
         return self._device.texture(width, height, "RGBA16F", data=picture.rgba)
 

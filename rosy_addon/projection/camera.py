@@ -86,6 +86,14 @@ class Camera:
         scale = _determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
 
+    def resized(self, width: int, height: int) -> Camera:
+        """The same camera with other pixels."""
+        return Camera(self.view, self.projection, width, height, self.name)
+
+    def scaled(self, factor: int) -> Camera:
+        """The same camera with so many times the pixels each way."""
+        return self.resized(self.width * factor, self.height * factor)
+
     @property
     def across_axis(self) -> np.ndarray:
         """(2, 2): x and y in clip space to x and y at depth 1, or at any if orthographic."""

@@ -27,7 +27,7 @@ from .attributes import (
     read_mesh_field,
 )
 from .capabilities import has_properties, is_editable
-from .meshes import mesh_surface
+from .meshes import evaluated_mesh, mesh_surface
 
 #: Custom property on every datablock that RoSy made.
 MADE = "rosy_made"
@@ -169,9 +169,8 @@ class _Reader:
     def _read(
         self, thing: bpy.types.Object, stored: Stored | None
     ) -> tuple[Surface, RosyField | None] | None:
-        mesh = thing.to_mesh()
-        try:
-            if mesh is None or not len(mesh.polygons):
+        with evaluated_mesh(thing) as mesh:
+            if mesh is None:
                 return None
             if stored is None or any(name not in mesh.attributes for name in stored.names):
                 return mesh_surface(mesh, thing.name, plain=True, kept=self.kept), None
@@ -180,8 +179,6 @@ class _Reader:
             return surface, read_carried_field(
                 mesh, stored, surface, self.undefined, owner, self.kept
             )
-        finally:
-            thing.to_mesh_clear()
 
     def check_found(self, objects: Sequence[bpy.types.Object]) -> None:
         found = {owner for _, owner in self.drawn}

@@ -28,7 +28,7 @@ from .attributes import (
     read_mesh_field,
 )
 from .bodies import is_included, own_modifiers, prepared
-from .meshes import mesh_surface
+from .meshes import evaluated_mesh, mesh_surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,21 +193,18 @@ class Follower:
 
     def _plain(self, thing: bpy.types.Object) -> _Read | None:
         """What only hides others."""
-        mesh = thing.to_mesh()
-        try:
-            if mesh is None or not len(mesh.polygons):
+        with evaluated_mesh(thing) as mesh:
+            if mesh is None:
                 return None
             return _Read(mesh_surface(mesh, thing.name, plain=True, kept=self._kept), None)
-        finally:
-            thing.to_mesh_clear()
 
     def _evaluated(
         self, thing: bpy.types.Object, owner: bpy.types.Object, undefined: str
     ) -> _Read | None:
         label = f"object '{owner.name}'"
-        mesh, original = thing.to_mesh(), owner.data
-        try:
-            if mesh is None or not len(mesh.polygons):
+        original = owner.data
+        with evaluated_mesh(thing) as mesh:
+            if mesh is None:
                 return None
             surface = mesh_surface(mesh, label, kept=self._kept)
             if original.is_editmode:
@@ -217,8 +214,6 @@ class Follower:
                 field = self._given(original, given, undefined, label)
                 deformed = bool(own_modifiers(owner) or original.shape_keys)
                 return _Read(_at_rest(surface, given.vertices) if deformed else surface, field)
-        finally:
-            thing.to_mesh_clear()
         learned = self._learned.get(owner.name)
         if learned is None or learned.topology != _topology(surface):
             self._unknown.add(owner.name)
@@ -260,15 +255,11 @@ class Follower:
     ) -> _Learned:
         thing = owner.evaluated_get(depsgraph)
         label = f"object '{owner.name}'"
-        mesh = thing.to_mesh()
-        try:
-            missing = [name for name in stored.names if name not in mesh.attributes]
-            if missing:
+        with evaluated_mesh(thing) as mesh:
+            if mesh is None or any(name not in mesh.attributes for name in stored.names):
                 raise RosyError(f"{label}: after its modifiers the mesh has lost its field")
             surface = mesh_surface(mesh, label, rest=True, kept=self._kept)
             field = read_carried_field(mesh, stored, surface, undefined, label, self._kept)
-        finally:
-            thing.to_mesh_clear()
         return _Learned(_topology(surface), surface.rest, field)
 
 

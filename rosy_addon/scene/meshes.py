@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 import numpy as np
 
@@ -82,6 +85,16 @@ def mesh_surface(
         )
     # Triangles are slow to read, and follow from the rest.
     return kept.find_or_make(("surface", digest(*parts.values())), build)
+
+
+@contextmanager
+def evaluated_mesh(thing: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+    """The mesh of an evaluated object for as long as it is read; None if it has no faces."""
+    mesh = thing.to_mesh()
+    try:
+        yield mesh if mesh is not None and len(mesh.polygons) else None
+    finally:
+        thing.to_mesh_clear()
 
 
 def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:

@@ -16,6 +16,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..live import redraw
 from ..scene.singular import Singular
 
 #: By the sign of the index: orange turns with the way around, blue against it. Linear light.
@@ -47,7 +48,7 @@ def show(name: str, found: Singular) -> None:
         add = bpy.types.SpaceView3D.draw_handler_add
         _handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
         _handlers.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
-    _redraw()
+    redraw()
 
 
 def hide(name: str | None = None) -> None:
@@ -60,7 +61,7 @@ def hide(name: str | None = None) -> None:
             bpy.app.handlers.load_pre.remove(_forget)
         while _handlers:
             bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
-    _redraw()
+    redraw()
 
 
 def _forget(*_: Any) -> None:
@@ -162,10 +163,3 @@ def _lifted(thing: bpy.types.Object, found: Singular) -> np.ndarray:
     size = np.cbrt(abs(np.linalg.det(matrix[:3, :3]))) or 1.0
     raised = found.points + found.normals * (lift / size)
     return raised @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()

@@ -313,7 +313,7 @@ def _matters(settings: Any, name: str) -> bool:
         return look.shading > 0
     if name == "directory":
         return settings.store == "SAVED"
-    if name in {"ink_colour", "paper_colour", "clear_paper", "crispness", "layers", "layering"}:
+    if name in GROUPS["Ink"] and name != "ink":
         return look.ink == "hatch"
     if name == "crease_angle":
         return not look.cross_creases

@@ -360,7 +360,7 @@ def entry_of(surface, matrix=None):
     matrix = np.eye(4) if matrix is None else matrix
     shape = shape_of(surface, np.eye(3), None, "smooth")
     on_card = card_module._OnCard(shape, None, None, ())
-    return card_module.Placed(on_card, None, matrix @ shapes.shifting(shape.centre), 1.0)
+    return card_module.Placed(on_card, None, matrix @ shapes.shifting(shape.centre), 1.0, None)
 
 
 def camera_at(eye=(0, -5, 0), size=(64, 48), perspective=True, clip=(0.1, 100.0)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .kernel import whole_samples
 from .look import Look
 from .noise import MEAN, streak_statistics
 
@@ -22,9 +23,9 @@ def even_out(mean: np.ndarray, samples: np.ndarray, look: Look) -> np.ndarray:
     samples : (P,) float32 ndarray
         n, at least 1.
     look : Look
-        Its `length`, `step` and `grain` count.
+        Its `length`, `taper`, `step` and `grain` count.
     """
-    full = np.float32(2 * look.length + 1)
+    full = np.float32(whole_samples(look))
     cells = samples * np.float32(look.step / look.grain)
     factor = np.sqrt(samples / full) * np.minimum(cells / 2, 1)
     return MEAN + (mean - MEAN) * factor[:, None]
@@ -46,17 +47,15 @@ def blend_gain(images: int, samples: np.ndarray, look: Look) -> np.ndarray:
     samples : (P,) float32 ndarray
         Of a streamline, mean over the M of a pixel.
     look : Look
-        Its `length`, `step`, `grain` and `high_pass` count.
+        Its `length`, `taper`, `step`, `grain` and `high_pass` count.
 
     Returns
     -------
     (P,) float32 ndarray
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
-    full = 2 * look.length + 1
-    noise = (full * look.step, look.grain, look.high_pass)
-    _, crossing = streak_statistics(*noise, images)
-    shared = np.clip(crossing * full / samples, 0, images - 1)
+    _, crossing = streak_statistics(*streaks_of(look), images, tapered=look.taper)
+    shared = np.clip(crossing * whole_samples(look) / samples, 0, images - 1)
     return np.sqrt(images / (1 + shared)).astype(np.float32)
 
 
@@ -69,16 +68,20 @@ def averaging_gain(look: Look) -> float:
         With its lengths in the pixels of the supersampled frame.
     """
     side = look.supersampling
-    full = (2 * look.length + 1) * look.step
-    averaged, _ = streak_statistics(full, look.grain, look.high_pass, average=side)
-    at_once, _ = streak_statistics(full / side, look.grain / side, look.high_pass / side)
+    fine = streaks_of(look)
+    averaged, _ = streak_statistics(*fine, average=side, tapered=look.taper)
+    at_once, _ = streak_statistics(*(length / side for length in fine), tapered=look.taper)
     return at_once / averaged
 
 
 def expected_deviation(look: Look) -> float:
     """Standard deviation of one member image with whole streamlines, from theory."""
-    length = (2 * look.length + 1) * look.step
-    return streak_statistics(length, look.grain, look.high_pass)[0]
+    return streak_statistics(*streaks_of(look), tapered=look.taper)[0]
+
+
+def streaks_of(look: Look) -> tuple[float, float, float]:
+    """Length of the streamlines, grain and high pass of the noise, in pixels."""
+    return (2 * look.length + 1) * look.step, look.grain, look.high_pass
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:

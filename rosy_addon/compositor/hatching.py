@@ -117,12 +117,18 @@ def softness(crispness: float) -> float:
 def thresholds_of(look: Look) -> tuple[np.ndarray, float]:
     """`ink_thresholds` of a look, with its lengths in the pixels of the frame."""
     length = (2 * look.length + 1) * look.step
-    return ink_thresholds(length, look.grain, look.density, look.high_pass, look.crispness)
+    noise = look.grain, look.density, look.high_pass
+    return ink_thresholds(length, *noise, look.crispness, look.taper)
 
 
 @lru_cache(maxsize=16)
 def ink_thresholds(
-    length: float, grain: float, density: float, high_pass: float, crispness: float
+    length: float,
+    grain: float,
+    density: float,
+    high_pass: float,
+    crispness: float,
+    tapered: bool = False,
 ) -> tuple[np.ndarray, float]:
     """Above which value streaks are ink, for them to cover a share of the paper.
 
@@ -133,6 +139,7 @@ def ink_thresholds(
     grain, density, high_pass
         Of the noise.
     crispness : float
+    tapered : bool
         Of the look.
 
     Returns
@@ -146,8 +153,12 @@ def ink_thresholds(
     width = SAMPLE + reach
     pixel = np.arange(SAMPLE * width, dtype=np.int32)
     noise = image_noise(pixel, width, grain, 1, 1, density=density, high_pass=high_pass)
-    sums = np.cumsum(noise.reshape(SAMPLE, width), axis=1, dtype=np.float64)
-    means = ((sums[:, reach:] - sums[:, :-reach]) / reach).ravel()
+    means = noise.reshape(SAMPLE, width)
+    # A mean of tapered weights is one of means over half the length.
+    for part in [max(reach // 2, 1)] * 2 if tapered else [reach]:
+        sums = np.cumsum(means, axis=1, dtype=np.float64)
+        means = (sums[:, part:] - sums[:, :-part]) / part
+    means = means.ravel()
     deviation = float(means.std())
     streaks = np.sort((means - means.mean()) / deviation)[:: max(len(means) // 20_000, 1)]
     soft = softness(crispness)

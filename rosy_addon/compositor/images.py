@@ -10,6 +10,7 @@ import numpy as np
 from ..progress import Progress, Work
 from .contrast import even_out
 from .flow import Flow
+from .kernel import weights_of
 from .look import Look
 from .streamlines import Direction, blocks, gather
 
@@ -28,7 +29,8 @@ class Images:
     blend : (P, K) float32 ndarray
         Their mean.
     samples : (P,) float32 ndarray
-        Samples on a pixel's streamlines, mean over its members.
+        Samples on a pixel's streamlines, as many as would vary as much if all counted the same
+        (`kernel`), mean over its members.
     weight : (P,) float32 ndarray
         Share of `members` in `blend`, the rest being that of another set.
     """
@@ -57,7 +59,7 @@ def member_images(
     ----------
     flow : Flow
     look : Look
-        Its `length`, `step` and `magnitude` count.
+        Its `length`, `taper`, `step` and `magnitude` count.
     noise : (P, K) float32 ndarray
     walkers : sequence of functions
         One a member.
@@ -69,15 +71,16 @@ def member_images(
     samples = np.zeros(count, dtype=np.float32)
     for member, walker in enumerate(walkers):
         for block in blocks(count):
-            total = noise[block].copy()
-            found = np.ones(len(total), dtype=np.float32)
-            for follow in walker(block):
-                steps = None if limit is None else limit[block]
-                half, more = gather(flow, block, follow, ended, look.length, look.step, steps)
-                total += half
-                found += more
-            members[member, block] = even_out(total / found[:, None], found, look)
-            samples[block] += found
+            steps = None if limit is None else limit[block]
+            (forth, ahead), (back, behind) = (
+                gather(flow, block, follow, ended, look.length, look.step, steps, look.taper)
+                for follow in walker(block)
+            )
+            reach = look.length if steps is None else steps
+            weights = weights_of(ahead, behind, reach, look.taper)
+            mean = (noise[block] + forth + back) / weights.total[:, None]
+            members[member, block] = even_out(mean, weights.samples, look)
+            samples[block] += weights.samples
             fraction = (member + block.stop / count) / len(walkers)
             yield Progress(fraction, "Following streamlines")
     samples /= len(walkers)

@@ -68,6 +68,11 @@ class Look:
         flat="Each face as it is",
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
+    taper: bool = _switch(
+        False,
+        "Let streaks fade toward their ends, so that lines end in points and stay more like "
+        "themselves as one comes nearer",
+    )
     step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
     grain: float = _number(1.5, 0.5, 256.0, "Size of a cell of the noise, in pixels")
     density: float = _number(

@@ -194,7 +194,12 @@ def _mean_along(image: np.ndarray, reach: int, axis: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def streak_statistics(
-    length: float, grain: float, high_pass: float, images: int = 1, average: int = 1
+    length: float,
+    grain: float,
+    high_pass: float,
+    images: int = 1,
+    average: int = 1,
+    tapered: bool = False,
 ) -> tuple[float, float]:
     """How much the noise averaged along straight streamlines varies, in closed form.
 
@@ -208,6 +213,8 @@ def streak_statistics(
         M streamlines through a pixel, at multiples of pi / M.
     average : int
         Side of the squares of pixels over which the picture is averaged afterwards.
+    tapered : bool
+        Whether samples count the less the nearer they are to the ends.
 
     Returns
     -------
@@ -224,7 +231,8 @@ def streak_statistics(
     S(k) sinc(l k.u) sinc(l k.v). S is that of a lattice of bits with cells of side g, averaged
     over pixels, with a Gaussian taken out:
     g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
-    It is averaged over all directions here, and the integral taken in polar coordinates.
+    It is averaged over all directions here, and the integral taken in polar coordinates. A mean of
+    tapered weights is one of means over half the length: sinc(l k.u) becomes sinc(l k.u / 2)^2.
     """
     k, dk = np.linspace(0, 4 / (1 + grain), 700, retstep=True)
     angle = np.arange(1440) * np.pi / 1440
@@ -236,11 +244,16 @@ def streak_statistics(
     power = (grain * DEVIATION * amplitude) ** 2
     kept = 1 - np.exp(-2 * (np.pi * BLUR * high_pass * k) ** 2) if high_pass else 1.0
     weight = power.mean(axis=1) * kept**2 * k * dk * (2 * np.pi / len(angle))
-    one = np.sinc(length * kx)
+    one = _passed(length * kx, tapered)
     variance = weight @ np.sum(one * one, axis=1)
     crossing = 0.0
     for other in range(1, images):
         turn = np.pi * other / images
         along = np.cos(turn) * kx + np.sin(turn) * ky
-        crossing += weight @ np.sum(one * np.sinc(length * along), axis=1)
+        crossing += weight @ np.sum(one * _passed(length * along, tapered), axis=1)
     return float(np.sqrt(variance)), float(crossing / variance)
+
+
+def _passed(turns: np.ndarray, tapered: bool) -> np.ndarray:
+    """What a mean along a line leaves of waves, by how many of them there are along it."""
+    return np.sinc(turns / 2) ** 2 if tapered else np.sinc(turns)

@@ -28,6 +28,7 @@ from .covering import (
 )
 from .flow import Flow
 from .images import Images, limits
+from .kernel import whole_samples
 from .look import Look
 from .noise import MEAN
 from .walker import Walker
@@ -129,7 +130,7 @@ def _fade(known: np.ndarray, carried: np.ndarray | None, row: np.ndarray) -> Non
 
 def _average(known: np.ndarray, look: Look, members: np.ndarray) -> None:
     """Write (M, n, K) averages, of even spread, of (M, n, K + 1) sums and samples."""
-    whole = 2 * look.length + 1
+    whole = np.float32(whole_samples(look) - 0.5)
     for line, member in zip(known, members, strict=True):
         for start in range(0, len(line), BLOCK):
             sums, samples = line[start : start + BLOCK, :-1], line[start : start + BLOCK, -1].copy()
@@ -186,7 +187,9 @@ def _cut(flow: Flow, wide: slice) -> Flow:
 
 
 class _Averages:
-    """What is known of each line of each cell: the sum of the noise along it, and its samples.
+    """What is known of each line of each cell: the mean of the noise along it, and its samples.
+
+    The mean is kept times the samples.
 
     The samples of a line that no streamline has passed are 0, or -1 if it is not wanted.
 

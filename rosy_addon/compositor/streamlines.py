@@ -76,6 +76,7 @@ def gather(
     length: int,
     step: float,
     limit: np.ndarray | None,
+    tapered: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
@@ -101,11 +102,13 @@ def gather(
         Pixels, at most 1.
     limit : (B,) ndarray or None
         Steps after which each of them ends; None for `length`.
+    tapered : bool
+        Whether samples count the less the farther they are from the start (`kernel`).
 
     Returns
     -------
     total : (B, K) float32 ndarray
-        Sum of the noise after each step, without the start.
+        Sum of the noise after each step, times its weight, without the start.
     samples : (B,) float32 ndarray
         How many of them, before the streamline ended.
     """
@@ -116,6 +119,7 @@ def gather(
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
     samples = np.zeros(len(entry), dtype=np.float32)
     before = None
+    fall = 1 / (1 + np.asarray(length if limit is None else limit, dtype=np.float32))
     for count in range(1, length + 1):
         ahead = follow(entry, offset)
         if before is None:
@@ -133,6 +137,9 @@ def gather(
         alive = entry != end
         if not alive.any():
             break
-        total += noise.take(entry, axis=0)
+        gathered = noise.take(entry, axis=0)
+        if tapered:
+            gathered *= (1 - count * fall)[..., None]
+        total += gathered
         samples += alive
     return total, samples

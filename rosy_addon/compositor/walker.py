@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .covering import END, OPEN, Covering, joined
+from .kernel import weights_of
 from .look import Look
 
 #: Steps after which those that have ended are left out, if they are many.
@@ -27,7 +28,7 @@ class Walker:
     ----------
     covering : Covering
     look : Look
-        Its `length` and `step` count.
+        Its `length`, `taper` and `step` count.
     limit : (C,) intp ndarray or None
         Steps each way that count for a cell; None for `look.length`.
     served : int
@@ -42,7 +43,7 @@ class Walker:
     ) -> None:
         self._covering = covering
         self._served, self._reach = served, served + look.length
-        self._length = look.length
+        self._length, self._tapered = look.length, look.taper
         step, tone, slope = covering.units
         self._step, self._tone = np.float32(1.5 * step), np.float32(tone)
         self._lateral = np.float32(LATERAL * slope / look.step * step)
@@ -50,6 +51,7 @@ class Walker:
         self._limit = None if limit is None else np.tile(limit, covering.lines)
         lanes, channels = 2 * most, covering.channels
         self._sums = np.empty((self._reach + 1, lanes, channels), dtype=np.complex64)
+        self._totals = np.empty((lanes, channels), dtype=np.complex64)
         self._state = np.empty((served + 1, lanes), dtype=np.int32)
         self._aside = np.empty((served + 1, lanes), dtype=np.float32)
         #: Steps that the streamlines of the last walk took before their end, of those that serve.
@@ -68,8 +70,8 @@ class Walker:
         line : (2 n,) int32 ndarray
             Of the cell `END` where streamlines have ended.
         values : (2 n, K + 1) float32 ndarray
-            The sum of the noise of each channel around there, and its samples. Overwritten by the
-            next step.
+            The mean of the noise of each channel around there, times its samples, and these.
+            Overwritten by the next step.
         near : (m,) intp ndarray
             Which of the streamlines pass close to the centre of the pixel.
         """
@@ -82,16 +84,22 @@ class Walker:
         for number in range(min(steps, self._served) + 1):
             line = self._covering.line_of(self._state[number, :lanes])
             length = self._length if self._limit is None else self._limit.take(line)
-            last, first = np.minimum(number + length, steps), np.maximum(number - length, -steps)
-            between = self._sums_to(last, lanes) - self._sums_before(first, lanes)
+            ahead = np.clip(alive - np.float32(number), 0, length)
+            behind = np.minimum(other + np.float32(number), length)
+            weights = weights_of(ahead, behind, length, self._tapered)
+            if self._tapered:
+                between = self._weighed(number, length, lanes)
+                between *= (weights.samples / weights.total)[:, None]
+            else:
+                last = np.minimum(number + length, steps)
+                first = np.maximum(number - length, -steps)
+                between = self._sums_to(last, lanes) - self._sums_before(first, lanes)
             # A streamline passes beside the centre of a pixel, not through it, by up to half a
             # pixel: each sum is moved to the centre by its slope across the streamline.
             aside = self._aside[number, :lanes]
             np.multiply(between.real, self._tone, out=values[:, :-1])
             values[:, :-1] -= (aside * self._lateral)[:, None] * between.imag
-            samples = np.minimum(alive, last, dtype=np.float32, casting="same_kind")
-            samples += np.minimum(other, -first, dtype=np.float32, casting="same_kind")
-            np.add(samples, np.float32(1), out=values[:, -1])
+            values[:, -1] = weights.samples
             yield line, values, np.flatnonzero(np.abs(aside) < self._near)
 
     def _follow(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
@@ -99,6 +107,7 @@ class Walker:
 
         `_state` is where they are, `_aside` how far to the left of the pixel's centre, and `_sums`
         the noise from the seed on, itself included, with its slope to the left as imaginary part.
+        For tapered weights `_sums` are the sums of these sums, in all rows there are.
 
         Returns
         -------
@@ -159,6 +168,7 @@ class Walker:
                     live = np.arange(lanes) if live is None else live
                     lives[live] = alive
                     if not len(left):
+                        self._go_on_from(number, lanes)
                         return lives, number
                     live, alive, cell, sheet = live[left], alive[left], cell[left], sheet[left]
                     turn, angle, position = turn[left], angle[left], position[left]
@@ -193,12 +203,10 @@ class Walker:
         total: np.ndarray,
     ) -> None:
         """Write row `number` of the room, for all streamlines or the live ones alone."""
-        sums = self._sums[number, :lanes]
-        if live is None:
-            sums[...] = total
-        else:
-            sums[...] = self._sums[number - 1, :lanes]
-            sums[live] = total
+        self._totals[slice(lanes) if live is None else live] = total
+        self._sums[number, :lanes] = self._totals[:lanes]
+        if self._tapered and number:
+            self._sums[number, :lanes] += self._sums[number - 1, :lanes]
         if number > self._served:
             return
         aside = position.imag * ahead.real
@@ -211,6 +219,43 @@ class Walker:
             self._state[number, live] = state
             self._aside[number, :lanes] = 0
             self._aside[number, live] = aside
+
+    def _go_on_from(self, number: int, lanes: int) -> None:
+        """Fill the rows after the last streamline's end, where sums of sums still grow."""
+        if self._tapered:
+            for row in range(number, self._reach):
+                np.add(
+                    self._sums[row, :lanes], self._totals[:lanes], out=self._sums[row + 1, :lanes]
+                )
+
+    def _weighed(self, number: int, reach: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64: tapered sums of the noise around a step, `reach` steps each way.
+
+        With E the sums of sums, (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1): a triangle is a
+        mean of r + 1 windows of r + 1 steps, one step apart.
+        """
+        found = self._sums_of_sums(number + reach, lanes)
+        found = found - 2 * self._sums_of_sums(number - 1, lanes)
+        found += self._sums_of_sums(number - reach - 2, lanes)
+        found *= 1 / np.asarray(reach + 1, dtype=np.float32)[..., None]
+        return found
+
+    def _sums_of_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64: E up to some step, from the seed on; that of step -1 is 0."""
+        half, seed = lanes // 2, self._sums[0, :lanes]
+        if np.ndim(step) == 0:
+            if step >= 0:
+                return self._sums[step, :lanes]
+            if step == -1:
+                return np.zeros_like(seed)
+            other = self._sums[-step - 2, :lanes]
+            return (step + 1) * seed + np.concatenate([other[half:], other[:half]]).conj()
+        flat, most = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        lane, same = np.arange(lanes), (step >= 0)[:, None]
+        row = np.where(step >= 0, step, np.maximum(-step - 2, 0)) * most
+        found = flat.take(row + np.where(same[:, 0], lane, (lane + half) % lanes), axis=0)
+        there = (step + 1)[:, None] * seed + found.conj()
+        return np.where(same, found, np.where((step == -1)[:, None], np.complex64(0), there))
 
     def _sums_to(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64: sums up to some step, included."""

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.anchored import LEAN, LOWEST, SIDE, TAPS, identities, lattice_axes
+from ..compositor.anchored import LOWEST, OCTAVES, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops, from_hex, to_linear
 from ..compositor.compose import noise_of, scaled_look
-from ..compositor.contrast import averaging_gain, expected_deviation
+from ..compositor.contrast import averaging_gain, expected_deviation, streaks_of
 from ..compositor.hatching import EARLY, JOINING, is_light, softness, thresholds_of
 from ..compositor.hues import PALETTE, SHARPNESS
+from ..compositor.kernel import whole_samples
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
 from ..compositor.shading import Light, lights_of
@@ -402,7 +403,7 @@ class Card:
             "channels": noise_of(look)["channels"],
             "seed": look.seed,
             "LOWEST": LOWEST,
-            "LEAN": LEAN,
+            "OCTAVES": OCTAVES,
         }
         names = identities([entry.shape.owners[0].name for entry in placed]).view(np.int32)
         for number, entry in enumerate(placed):
@@ -642,11 +643,12 @@ def _to_pixels(camera: Camera) -> tuple[float, ...]:
 def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
     """What of a look is told to the shader that walks, lengths in the pixels of the fine frame."""
     finer = scaled_look(look)
-    full = (2 * finer.length + 1) * finer.step
-    _, crossing = streak_statistics(full, finer.grain, finer.high_pass, kind.lines)
+    _, crossing = streak_statistics(*streaks_of(finer), kind.lines, tapered=look.taper)
     gain = averaging_gain(finer) if look.supersampling > 1 else 1.0
     return {
         "walk_length": finer.length,
+        "taper": int(look.taper),
+        "whole": whole_samples(finer),
         "step_length": finer.step,
         "grain": finer.grain,
         "crossing": crossing,

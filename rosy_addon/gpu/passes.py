@@ -156,7 +156,7 @@ ANCHORED = Compute(
         ("seed", "int"),
         ("identity", "int"),
         ("LOWEST", "int"),
-        ("LEAN", "float"),
+        ("OCTAVES", "int"),
     ),
 )
 
@@ -216,6 +216,8 @@ WALK = Compute(
         *_COVERING,
         *_GUIDE,
         ("walk_length", "int"),
+        ("taper", "int"),
+        ("whole", "float"),
         ("step_length", "float"),
         ("grain", "float"),
         ("crossing", "float"),

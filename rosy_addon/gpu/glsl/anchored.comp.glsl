@@ -40,10 +40,7 @@ void main()
   float depth = -dot(middle / (whole == 0.0 ? 1.0 : whole), vec3(a.z, b.z, c.z));
   float size = (perspective != 0 ? depth : 1.0) * unit_of_pixel;
   float level = log2(max(size, 1e-30));
-  float octave = floor(level);
-  float share = level - octave;
-  share = (share + LEAN * sin(0.5 * TAU * share)) * 0.25 * TAU;
-  vec2 mixed = vec2(cos(share), sin(share));
+  float finest = floor(level - (0.5 * float(OCTAVES) - 1.0));
   vec3 total = vec3(0.0);
   for (int tap = 0; tap < 4; ++tap) {
     // No two in a row or a column.
@@ -58,11 +55,11 @@ void main()
     weights = clamp(weights / (sum == 0.0 ? 1.0 : sum), -4.0, 5.0);
     vec3 rest = weights.x * rest0 + weights.y * rest1 + weights.z * rest2;
     vec3 askew = vec3(dot(lattice_x.xyz, rest), dot(lattice_y.xyz, rest), dot(lattice_z.xyz, rest));
-    for (int finer = 0; finer < 2; ++finer) {
-      float at = octave + float(finer);
+    for (int rung = 0; rung < OCTAVES; ++rung) {
+      float at = finest + float(rung);
       ivec3 cell = ivec3(floor(askew * exp2(-at)));
       int turn = int(at) + LOWEST;
-      float part = finer == 0 ? mixed.x : mixed.y;
+      float part = cos((at - level) * 0.5 * TAU / float(OCTAVES)) * sqrt(2.0 / float(OCTAVES));
       for (int channel = 0; channel < channels; ++channel) {
         float bit = part * (bright(cell, turn, channel) - density);
         total += channel == 0 ? vec3(bit, 0.0, 0.0) :

@@ -4,9 +4,11 @@
 
 #define MEAN 0.5
 
+// The sums of the noise times its weights, of these, and of their squares.
 struct Half {
   vec3 total;
-  float count;
+  float weight;
+  float square;
 };
 
 // The noise along one half of the streamline that leaves a pixel on a sheet, without the start.
@@ -14,7 +16,8 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
 {
   Half found;
   found.total = vec3(0.0);
-  found.count = 0.0;
+  found.weight = found.square = 0.0;
+  float fall = taper != 0 ? 1.0 / float(steps + 1) : 0.0;
   vec2 offset = vec2(0.0), before = vec2(0.0);
   for (int count = 0; count < steps; ++count) {
     bool opposite = sheet >= lines;
@@ -38,8 +41,10 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
       // k' = k + round((t(p) - t(q)) S / 2 pi) mod S
       sheet = wrapped(sheet + int(round(turn - cell.x)), around);
     }
-    found.total += cell.yzw;
-    found.count += 1.0;
+    float weight = 1.0 - float(count + 1) * fall;
+    found.total += weight * cell.yzw;
+    found.weight += weight;
+    found.square += weight * weight;
   }
   return found;
 }
@@ -133,7 +138,6 @@ void main()
     relative = min(length(value.xy) / (top > 0.0 ? top : 1.0), 1.0);
   }
   int steps = magnitude_drives >= 2 ? int(round(float(walk_length) * relative)) : walk_length;
-  float full = float(2 * walk_length + 1);
 
   float toward = float(degree) * guiding_angle;
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
@@ -169,10 +173,12 @@ void main()
     bool paired = around == 2 * lines;
     Half ahead = followed(pixel, line, 1.0, cell, steps);
     Half behind = followed(pixel, paired ? line + lines : line, paired ? 1.0 : -1.0, cell, steps);
-    float count = 1.0 + ahead.count + behind.count;
-    vec3 mean = (cell.yzw + ahead.total + behind.total) / count;
+    float weight = 1.0 + ahead.weight + behind.weight;
+    vec3 mean = (cell.yzw + ahead.total + behind.total) / weight;
+    // So many samples that all count the same would vary as much (`kernel.weights_of`).
+    float count = weight * weight / (1.0 + ahead.square + behind.square);
     // Streamlines that ended early get the spread of whole ones (`contrast.even_out`).
-    mean = (mean - MEAN) * sqrt(count / full) * min(0.5 * count * step_length / grain, 1.0);
+    mean = (mean - MEAN) * sqrt(count / whole) * min(0.5 * count * step_length / grain, 1.0);
     if (hatch != 0) {
       float later = onset_of(line, nearest) - soonest;
       float own = smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY)) / sharers;
@@ -183,15 +189,15 @@ void main()
     blend += mean;
     samples += count;
     if (families > 1) {
-      float weight = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
-      hue += weight * hue_of_line(line, first, stored, told);
-      weights += weight;
+      float shine = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
+      hue += shine * hue_of_line(line, first, stored, told);
+      weights += shine;
     }
   }
   blend /= float(lines);
   samples /= float(lines);
   // The mean of M images has the contrast of one (equation 6, `contrast.blend_gain`).
-  float shared_ = clamp(crossing * full / samples, 0.0, float(lines - 1));
+  float shared_ = clamp(crossing * whole / samples, 0.0, float(lines - 1));
   blend *= gain * sqrt(float(lines) / (1.0 + shared_));
   vec3 tone = channels == 1 ? blend.xxx : blend;
   vec3 ink = tone + MEAN;

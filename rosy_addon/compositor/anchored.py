@@ -68,9 +68,7 @@ def surface_noise(
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for number in range(OCTAVES):
         octave = finest + number
-        # The squares of all sum to 1, so that the variance is that of one.
-        away = (octave - level).astype(np.float32) * np.float32(np.pi / OCTAVES)
-        weight = np.cos(away) * np.float32(np.sqrt(2 / OCTAVES))
+        weight = octave_shares((octave - level).astype(np.float32))
         scale = np.exp2(-octave).astype(np.float32)
         turn = (octave + LOWEST).astype(np.int32)
         for place in lattice:
@@ -83,6 +81,14 @@ def surface_noise(
         for values in total:
             values -= _broad(gbuffer, values, BLUR * high_pass)
     return np.ascontiguousarray(total.T) + np.float32(MEAN)
+
+
+def octave_shares(away: np.ndarray) -> np.ndarray:
+    """How much octaves have to say that are so far from that of the size which is asked for.
+
+    The squares of those of all `OCTAVES` sum to 1, so that the variance is that of one.
+    """
+    return np.cos(away * np.float32(np.pi / OCTAVES)) * np.float32(np.sqrt(2 / OCTAVES))
 
 
 def identities(names: Sequence[str]) -> np.ndarray:

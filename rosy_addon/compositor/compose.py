@@ -16,15 +16,17 @@ from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
-from .hatching import ink_coverage, inked
+from .hatching import Hand, hatched, piece_length, unevenness
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
 from .members import members_images
 from .noise import MEAN, image_noise
+from .paper import paper_tooth
 from .picture import Layers, Picture
 from .shading import Light, diffuse
 from .sheets import sheets_images
+from .waver import SWAY, swayed, waver
 
 #: The ways to compose, by their names in a look.
 METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
@@ -42,11 +44,15 @@ AFTERWARDS = (
     "hue",
     "ink",
     "ink_colour",
+    "ink_ramp",
+    "ink_colour_light",
     "paper_colour",
     "clear_paper",
     "crispness",
     "layers",
     "layering",
+    "breaks",
+    "paper_grain",
 )
 
 
@@ -74,24 +80,20 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     layers = []
     degrees = np.unique(degree_of).tolist()
     for count, degree in enumerate(degrees):
-        flow = _flow(gbuffer, degree, look)
+        flow = _flow(gbuffer, degree, finer)
         start, stop = count / len(degrees), (count + 1) / len(degrees)
         images = yield from part(_images_of(gbuffer, flow, finer), start, stop)
         layer = _layers(flow, finer, images)
         own = degree_of == degree
         if look.ink == "hatch":
-            coverage = ink_coverage(flow, images, finer, light[own].mean(axis=1))
-            colour[own], alpha[own] = inked(coverage, finer), coverage
+            hand = yield from part(_hand(gbuffer, flow, finer, own), stop, stop)
+            tone = light[own].mean(axis=1)
+            colour[own], alpha[own] = hatched(flow, images, finer, tone, hand)
         else:
             colour[own] = _ink(flow, layer, finer)
         layers.append(layer)
     if look.ink == "soft":
         colour *= light
-    elif look.clear_paper:
-        # There is nothing but ink, more or less of it.
-        colour[:] = inked(np.ones(1, dtype=np.float32), look)
-    if look.ink == "soft" or not look.clear_paper:
-        alpha[:] = 1
     rgba = _frame(gbuffer.pixel, colour, alpha, camera.width, camera.height, look.supersampling)
     return Picture(rgba, tuple(layers))
 
@@ -155,17 +157,50 @@ def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
     if made is None or made[0] != key:
         made = key, surface_flow(gbuffer, degree, look.crease_angle, look.cross_creases)
         gbuffer.made["flow", degree] = made
+    if not wavers(look):
+        return made[1]
+    _, course = _waver(gbuffer, look)
+    own = np.searchsorted(gbuffer.pixel, made[1].pixel)
+    return swayed(made[1], np.float32(SWAY * look.wobble) * course[own])
+
+
+def wavers(look: Look) -> bool:
+    """Whether lines are drawn as by hand."""
+    return look.ink == "hatch" and look.wobble > 0
+
+
+def _waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
+    """`waver`, or that made for the last look if it would be the same."""
+    key = look.anchor, look.grain
+    made = gbuffer.made.get("waver")
+    if made is None or made[0] != key:
+        made = gbuffer.made["waver"] = key, waver(gbuffer, look)
     return made[1]
 
 
-def _images_of(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Images]:
-    """`_images`, or those made for the last look if they would be the same."""
+def _images_of(gbuffer: GBuffer, flow: Flow, look: Look, name: str = "images") -> Work[Images]:
+    """`_images`, or those made for the last look under this name if they would be the same."""
     key = replace(look, **{name: getattr(Look, name) for name in AFTERWARDS})
-    made = gbuffer.made.get(("images", flow.degree))
+    key = replace(key, wobble=look.wobble if wavers(look) else 0.0)
+    made = gbuffer.made.get((name, flow.degree))
     if made is None or made[0] != key:
         made = key, (yield from _images(flow, look, _noise(gbuffer, flow, look)))
-        gbuffer.made["images", flow.degree] = made
+        gbuffer.made[name, flow.degree] = made
     return made[1]
+
+
+def _hand(gbuffer: GBuffer, flow: Flow, look: Look, own: np.ndarray) -> Work[Hand]:
+    """What makes the lines of a flow uneven, at its `own` pixels of the G-buffer."""
+    broken = swell = tooth = None
+    if look.breaks:
+        shorter = replace(look, length=piece_length(look))
+        broken = yield from _images_of(gbuffer, flow, shorter, "pieces")
+    if wavers(look):
+        swell = _waver(gbuffer, look)[0][own]
+    if look.paper_grain:
+        side = look.supersampling
+        tooth = paper_tooth(flow.pixel, flow.width, look.grain / side, look.seed, side)
+    return Hand(broken, unevenness(look, swell, tooth))
 
 
 def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:

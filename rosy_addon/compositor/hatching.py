@@ -6,22 +6,29 @@ so the threshold follows from the coverage that is wanted; no image is analysed.
 lines each leaves (1 - a) of the light, so that together they leave the tone T if they take shares s of
 it, 1 - a = T^s with shares that sum to 1. In light tones one family has it all, in darker ones the next
 ones join in, those nearest to the guiding angle first.
+
+Whatever makes lines uneven is part of the streaks before they are compared with the threshold, and
+of the statistics that it comes from, so that the tone stays: shorter streaks, which break lines, the
+wavering of the hand, and the tooth of the paper.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from .colour import from_hex, to_linear
+from .anchored import OCTAVES, octave_shares
+from .colour import map_colours, to_linear
 from .flow import Flow, all_members
-from .images import Images
+from .hues import families_of_lines
+from .images import Images, relative_magnitude
+from .inks import INKS, inks_of
 from .look import Look
 from .noise import MEAN, image_noise
-
-#: Of linear light (Rec. 709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+from .paper import TOOTH, paper_tooth
+from .waver import SWELL
 
 #: Darkness over which a family that joins in comes to its full share.
 JOINING = 0.35
@@ -32,12 +39,39 @@ EARLY = 0.15
 #: Half the width of the step from paper to ink, in deviations of the streaks: soft and crisp.
 SOFTEST, CRISPEST = 1.6, 0.2
 
-#: Side of the sample that thresholds are read off, pixels, and how many coverages are looked up.
-SAMPLE, STEPS = 320, 256
+#: Length of the pieces of broken lines each way, in grains, and at most as a part of the whole.
+PIECE, LONGEST_PIECE = 4.0, 0.4
+
+#: Share of a pixel below which it has no ink that could be seen.
+LEAST = 1e-3
+
+#: Coverages of which a line's is looked up, and of how many degrees of brokenness.
+STEPS, BREAKS = 256, 17
+
+#: Side of the sample that thresholds are read off, in grains and at least and at most in pixels; and
+#: into how many steps the streaks in it are sorted.
+SAMPLE, SMALLEST_SAMPLE, LARGEST_SAMPLE, BINS = 64, 320, 768, 1600
 
 
-def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np.ndarray:
-    """How much of each pixel is ink.
+class Hand(NamedTuple):
+    """What makes lines uneven.
+
+    Attributes
+    ----------
+    broken : Images or None
+        Of streaks as long as the pieces of broken lines (`piece_length`).
+    uneven : (P,) float32 ndarray or None
+        By how much a line is the more firmly drawn at a pixel, in deviations of the streaks.
+    """
+
+    broken: Images | None = None
+    uneven: np.ndarray | None = None
+
+
+def hatched(
+    flow: Flow, images: Images, look: Look, tone: np.ndarray, hand: Hand
+) -> tuple[np.ndarray, np.ndarray]:
+    """Lines of ink on paper.
 
     Parameters
     ----------
@@ -48,36 +82,156 @@ def ink_coverage(flow: Flow, images: Images, look: Look, tone: np.ndarray) -> np
         With its lengths in the pixels of the frame.
     tone : (P,) float32 ndarray
         The light that there is to be, 0 to 1, linear.
+    hand : Hand
+
+    Returns
+    -------
+    colour : (P, 3) float32 ndarray
+        Linear light; of clear paper that of the ink alone.
+    alpha : (P,) float32 ndarray
+        1, and of clear paper how much of the pixel is ink.
+    """
+    tone = np.clip(tone, 0, 1)
+    families = families_of_ink(flow, look)
+    if families is None:
+        ink, coverage = _one_ink(flow, images, look, tone, hand)
+    else:
+        ink, coverage = _many_inks(flow, images, look, tone, hand, families)
+    if look.clear_paper:
+        return ink, coverage
+    paper = inks_of(look).paper
+    return paper + coverage[:, None] * (ink - paper), np.ones_like(coverage)
+
+
+def _one_ink(
+    flow: Flow, images: Images, look: Look, tone: np.ndarray, hand: Hand
+) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 3) linear light of the ink, and (P,) how much of each pixel it covers."""
+    inks = inks_of(look)
+    left = 1 - tone if inks.is_light else tone
+    if look.magnitude in ("colour", "both"):
+        ink = to_linear(map_colours(relative_magnitude(flow, look), look.colour_map))
+    else:
+        ink = inks.at(np.zeros_like(tone), tone)
+        left = 1 - inks.covering(inks.wanted(left), ink)
+    paper = np.ones_like(tone)
+    for line, share in enumerate(family_shares(flow, look, left)):
+        paper *= 1 - line_coverage(line, 1 - left**share, images, look, hand)
+    return ink, 1 - paper
+
+
+def _many_inks(
+    flow: Flow,
+    images: Images,
+    look: Look,
+    tone: np.ndarray,
+    hand: Hand,
+    families: list[np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same with an ink for each family: each lets some light through, and they multiply."""
+    inks = inks_of(look, inks_told(flow))
+    left = 1 - tone if inks.is_light else tone
+    wanted = inks.wanted(left)
+    paper = np.ones_like(tone)
+    through = np.ones((len(tone), 3), dtype=np.float32)
+    for line, share in enumerate(family_shares(flow, look, left)):
+        ink = inks.at(families[line], tone)
+        coverage = line_coverage(line, inks.covering(wanted**share, ink), images, look, hand)
+        through *= 1 - coverage[:, None] * (1 - inks.through(ink))
+        paper *= 1 - coverage
+    colour = inks.inverted(inks.inverted(inks.paper) * through)
+    coverage = 1 - paper
+    # What is seen is paper and ink: the ink is what is left without the paper.
+    ink = inks.paper + (colour - inks.paper) / np.maximum(coverage, LEAST)[:, None]
+    return np.clip(ink, 0, 1), coverage
+
+
+def line_coverage(
+    line: int, covered: np.ndarray, images: Images, look: Look, hand: Hand
+) -> np.ndarray:
+    """How much of each pixel the ink of one line covers.
+
+    Parameters
+    ----------
+    line : int
+        Which of the images' members.
+    covered : (P,) ndarray
+        How much of the paper it is to cover, 0 to 1.
+    images, look, hand
+        As of `hatched`.
 
     Returns
     -------
     (P,) float32 ndarray
-        0 to 1.
     """
-    threshold, deviation = thresholds_of(look)
-    soft = softness(look.crispness)
-    left = np.clip(1 - tone if is_light(look) else tone, 0, 1)
-    paper = np.ones(len(left), dtype=np.float32)
-    for share, member in zip(family_shares(flow, look, left), images.members, strict=True):
-        covered = 1 - left**share
-        limit = np.interp(covered, np.linspace(0, 1, STEPS), threshold)
-        above = (member.mean(axis=1) - MEAN) / deviation - limit
-        paper *= 1 - _smooth_step(above / (2 * soft) + 0.5)
-    return 1 - paper
+    statistics = statistics_of(look)
+    streak = (images.members[line].mean(axis=1) - MEAN) / statistics.deviation
+    if hand.broken is not None:
+        piece = (hand.broken.members[line].mean(axis=1) - MEAN) / statistics.piece_deviation
+        streak += brokenness(covered, look.breaks) * (piece - streak)
+    if hand.uneven is not None:
+        streak += hand.uneven
+    limit = np.interp(covered, np.linspace(0, 1, STEPS), statistics.threshold)
+    return _smooth_step((streak - limit) / (2 * softness(look.crispness)) + 0.5)
 
 
-def is_light(look: Look) -> bool:
-    """Whether the ink is lighter than the paper, so that there is the more of it the more light."""
-    ink, paper = (
-        to_linear(from_hex(code)) @ LUMINANCE for code in (look.ink_colour, look.paper_colour)
-    )
-    return bool(ink > paper)
+def brokenness(covered: np.ndarray, breaks: float) -> np.ndarray:
+    """How far lines are made of pieces, where they are to cover so much: the lights break first."""
+    return breaks * (1 - covered) ** 2
 
 
-def inked(coverage: np.ndarray, look: Look) -> np.ndarray:
-    """(P, 3) float32 linear light of ink on paper."""
-    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
-    return paper + coverage[:, None] * (ink - paper)
+def piece_length(look: Look) -> int:
+    """Steps each way of the streaks that break lines into pieces."""
+    steps = min(PIECE * look.grain / look.step, LONGEST_PIECE * look.length)
+    return max(round(steps), 1)
+
+
+def unevenness(look: Look, swell: np.ndarray | None, tooth: np.ndarray | None) -> np.ndarray | None:
+    """(P,) `Hand.uneven` of a wavering hand (`waver`) and the tooth of the paper (`paper_tooth`)."""
+    parts = []
+    if swell is not None:
+        parts.append(np.float32(SWELL * look.wobble) * swell)
+    if tooth is not None:
+        parts.append(np.float32(TOOTH * look.paper_grain) * tooth)
+    return sum(parts) if parts else None
+
+
+def families_of_ink(flow: Flow, look: Look) -> list[np.ndarray] | None:
+    """M times (P,): the number of the ink that each line is drawn with; None if all have one.
+
+    That of its family or, if the field's lines are not told apart, by how near it is to the guiding
+    angle, in between where two change places.
+    """
+    if look.hue == "one" or look.magnitude in ("colour", "both"):
+        return None
+    told = families_of_lines(flow, look)
+    if told is not None:
+        return [np.minimum(family, INKS - 1) for family in told]
+    return [_places(rank, flow.lines) for rank in _ranks(flow, look)]
+
+
+def inks_told(flow: Flow) -> int:
+    """How many inks the lines of a field are drawn with, if each has its own."""
+    told = next((number for kind, number in flow.traits if kind == "family"), flow.lines)
+    return min(told, INKS)
+
+
+def _ranks(flow: Flow, look: Look) -> list[np.ndarray]:
+    """M times (P,): how many lines are nearer to the guiding angle, going over from one to the next."""
+    ranks = []
+    for member in all_members(flow, look.guiding_angle)[: flow.lines]:
+        toward = member * np.complex64(np.exp(-1j * look.guiding_angle))
+        away = np.arctan2(np.abs(toward.imag), np.abs(toward.real))
+        ranks.append(away * np.float32(2 * flow.lines / np.pi))
+    return ranks
+
+
+def _places(rank: np.ndarray, count: int) -> np.ndarray:
+    """Ranks as whole numbers from 0, but around those at which two lines change places."""
+    place = np.zeros_like(rank)
+    for layer in range(1, count):
+        place += _smooth_step((rank - layer + 0.4) / 0.8)
+    return place
 
 
 def family_shares(flow: Flow, look: Look, tone: np.ndarray) -> list[np.ndarray]:
@@ -87,12 +241,7 @@ def family_shares(flow: Flow, look: Look, tone: np.ndarray) -> list[np.ndarray]:
     next: where two families change places both take the same, and no seam shows.
     """
     dark = 1 - tone
-    ranks = []
-    for member in all_members(flow, look.guiding_angle)[: flow.lines]:
-        toward = member * np.complex64(np.exp(-1j * look.guiding_angle))
-        away = np.arctan2(np.abs(toward.imag), np.abs(toward.real))
-        ranks.append(away * np.float32(2 * flow.lines / np.pi))
-    onsets = [_onset(rank, look) for rank in ranks]
+    onsets = [_onset(rank, look) for rank in _ranks(flow, look)]
     first = np.minimum.reduce(onsets)
     shares = [_smooth_step((dark - onset + first + EARLY) / (JOINING + EARLY)) for onset in onsets]
     total = np.add.reduce(shares)
@@ -101,12 +250,8 @@ def family_shares(flow: Flow, look: Look, tone: np.ndarray) -> list[np.ndarray]:
 
 def _onset(rank: np.ndarray, look: Look) -> np.ndarray:
     """The darkness at which lines of a rank join in; beyond 1 where they are one layer too many."""
-    onset = np.zeros_like(rank)
-    for layer in range(1, look.layers):
-        onset += _smooth_step((rank - layer + 0.4) / 0.8)
-    onset *= np.float32(look.layering)
-    onset += 2 * _smooth_step((rank - look.layers + 0.4) / 0.8)
-    return onset
+    onset = _places(rank, look.layers) * np.float32(look.layering)
+    return onset + 2 * _smooth_step((rank - look.layers + 0.4) / 0.8)
 
 
 def softness(crispness: float) -> float:
@@ -114,23 +259,58 @@ def softness(crispness: float) -> float:
     return SOFTEST * (CRISPEST / SOFTEST) ** crispness
 
 
-def thresholds_of(look: Look) -> tuple[np.ndarray, float]:
-    """`ink_thresholds` of a look, with its lengths in the pixels of the frame."""
-    length = (2 * look.length + 1) * look.step
-    noise = look.grain, look.density, look.high_pass
-    return ink_thresholds(length, *noise, look.crispness, look.taper)
+class Statistics(NamedTuple):
+    """What streaks are like, by which lines of ink are drawn.
+
+    Attributes
+    ----------
+    threshold : (STEPS,) float64 ndarray
+        Above which value streaks are ink, for them to cover even shares of the paper from 0 to 1,
+        in deviations from the mean.
+    deviation : float
+        Of the streaks.
+    piece_deviation : float
+        Of those as long as the pieces of broken lines.
+    """
+
+    threshold: np.ndarray
+    deviation: float
+    piece_deviation: float
+
+
+def statistics_of(look: Look) -> Statistics:
+    """`ink_statistics` of a look, with its lengths in the pixels of the frame."""
+    return ink_statistics(
+        (2 * look.length + 1) * look.step,
+        look.grain,
+        look.density,
+        look.high_pass,
+        look.crispness,
+        tapered=look.taper,
+        anchored=look.anchor == "surface",
+        piece=(2 * piece_length(look) + 1) * look.step,
+        breaks=look.breaks,
+        swell=SWELL * look.wobble,
+        tooth=TOOTH * look.paper_grain,
+    )
 
 
 @lru_cache(maxsize=16)
-def ink_thresholds(
+def ink_statistics(
     length: float,
     grain: float,
     density: float,
     high_pass: float,
     crispness: float,
+    *,
     tapered: bool = False,
-) -> tuple[np.ndarray, float]:
-    """Above which value streaks are ink, for them to cover a share of the paper.
+    anchored: bool = False,
+    piece: float = 1.0,
+    breaks: float = 0.0,
+    swell: float = 0.0,
+    tooth: float = 0.0,
+) -> Statistics:
+    """Read off a sample of noise what streaks cover.
 
     Parameters
     ----------
@@ -138,33 +318,74 @@ def ink_thresholds(
         Of the streamlines, pixels.
     grain, density, high_pass
         Of the noise.
-    crispness : float
-    tapered : bool
+    crispness, breaks : float
         Of the look.
-
-    Returns
-    -------
-    threshold : (STEPS,) float64 ndarray
-        For even shares from 0 to 1, in deviations from the mean.
-    deviation : float
-        Of the streaks.
+    tapered : bool
+        Whether they are less of a streamline's ends.
+    anchored : bool
+        Whether the noise is that of surfaces.
+    piece : float
+        Length of the pieces of broken lines, pixels.
+    swell, tooth : float
+        Deviation of what a wavering hand and the tooth of the paper add to the streaks.
     """
+    side = int(np.clip(SAMPLE * grain, SMALLEST_SAMPLE, LARGEST_SAMPLE))
     reach = max(round(length), 1)
-    width = SAMPLE + reach
-    pixel = np.arange(SAMPLE * width, dtype=np.int32)
-    noise = image_noise(pixel, width, grain, 1, 1, density=density, high_pass=high_pass)
-    means = noise.reshape(SAMPLE, width)
-    # A mean of tapered weights is one of means over half the length.
-    for part in [max(reach // 2, 1)] * 2 if tapered else [reach]:
-        sums = np.cumsum(means, axis=1, dtype=np.float64)
-        means = (sums[:, part:] - sums[:, :-part]) / part
-    means = means.ravel()
-    deviation = float(means.std())
-    streaks = np.sort((means - means.mean()) / deviation)[:: max(len(means) // 20_000, 1)]
+    width = side + reach
+    pixel = np.arange(side * width, dtype=np.int32)
+    # Of a surface across which the middle one of its octaves has the size that is asked for.
+    away = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
+    noise = np.zeros((side, width), dtype=np.float32)
+    for octave, share in zip(away, octave_shares(away) if anchored else (1.0,), strict=True):
+        size = grain * 2.0**octave
+        cells = image_noise(pixel, width, size, 1, 1, density=density, high_pass=high_pass)
+        noise += np.float32(share) * cells.reshape(side, width)
+    streaks, deviation = _standardised(_means_along(noise, reach, side, tapered))
+    within = min(max(round(piece), 1), reach)
+    pieces, piece_deviation = _standardised(_means_along(noise, within, side, tapered))
+    uneven = np.zeros_like(streaks)
+    if swell:
+        # Waves are about normal, and as independent of the streaks as any numbers.
+        uneven += swell * np.random.default_rng(0).standard_normal(streaks.shape)
+    if tooth:
+        uneven += tooth * paper_tooth(pixel[: streaks.size], streaks.shape[1], grain, 1, 1).reshape(
+            streaks.shape
+        )
     soft = softness(crispness)
-    limits = np.linspace(streaks[-1] + soft, streaks[0] - soft, 4 * STEPS)
-    covered = [float(_smooth_step((streaks - limit) / (2 * soft) + 0.5).mean()) for limit in limits]
-    return np.interp(np.linspace(0, 1, STEPS), covered, limits), deviation
+    low = min(streaks.min(), pieces.min()) + uneven.min()
+    high = max(streaks.max(), pieces.max()) + uneven.max()
+    edges = np.linspace(low, high, BINS + 1)
+    limits = np.linspace(high + soft, low - soft, 4 * STEPS)
+    inked = _smooth_step(((edges[:-1] + edges[1:]) / 2 - limits[:, None]) / (2 * soft) + 0.5)
+    wanted = np.linspace(0, 1, STEPS)
+    degrees = np.linspace(0, breaks, BREAKS) if breaks else np.zeros(1)
+    found = []
+    for degree in degrees:
+        mixed = streaks + degree * (pieces - streaks) + uneven
+        share = np.histogram(mixed, edges)[0] / mixed.size
+        found.append(np.interp(wanted, inked @ share, limits))
+    place = brokenness(wanted, breaks) / breaks * (BREAKS - 1) if breaks else np.zeros(STEPS)
+    below = np.minimum(place.astype(int), max(len(found) - 2, 0))
+    above = np.minimum(below + 1, len(found) - 1)
+    table, step = np.array(found), np.arange(STEPS)
+    threshold = table[below, step] + (place - below) * (table[above, step] - table[below, step])
+    return Statistics(threshold, deviation, piece_deviation)
+
+
+def _means_along(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:
+    """(n, side) means over so many pixels of the rows of (n, width) noise, from its middle."""
+    # A mean of tapered weights is one of means over half the length.
+    for reach in [max(length // 2, 1)] * 2 if tapered else [length]:
+        sums = np.cumsum(np.pad(noise, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
+        noise = (sums[:, reach:] - sums[:, :-reach]) / reach
+    start = (noise.shape[1] - side) // 2
+    return noise[:, start : start + side]
+
+
+def _standardised(means: np.ndarray) -> tuple[np.ndarray, float]:
+    """Means in deviations from their own mean; and the deviation."""
+    deviation = float(means.std())
+    return (means - means.mean()) / deviation, deviation
 
 
 def _smooth_step(x: np.ndarray) -> np.ndarray:

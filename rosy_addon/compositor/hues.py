@@ -56,20 +56,33 @@ def family_hues(flow: Flow, images: Images, look: Look) -> np.ndarray | None:
     (P, 3) float32 ndarray or None
         Display values (sRGB); None if the field's lines are not told apart.
     """
-    found = next((pair for pair in flow.traits.items() if pair[0][0] == "family"), None)
-    if found is None:
+    family_of = families_of_lines(flow, look)
+    if family_of is None:
         return None
-    (_, families), stored = found
     stands_out = images.members.mean(axis=2)
     stands_out = np.exp(
         (stands_out - stands_out.mean(axis=0)) * (SHARPNESS / expected_deviation(look))
     )
     total = np.zeros((len(flow.pixel), 3), dtype=np.float32)
-    members = all_members(flow, look.guiding_angle)[: flow.lines]
-    for member, weight in zip(members, stands_out, strict=True):
+    for family, weight in zip(family_of, stands_out, strict=True):
+        total += weight[:, None] * PALETTE.take(family, axis=0)
+    return total / stands_out.sum(axis=0)[:, None]
+
+
+def families_of_lines(flow: Flow, look: Look) -> list[np.ndarray] | None:
+    """M times (P,) int: the family of each line, from that nearest to the look's guiding angle on.
+
+    None if the field's lines are not told apart.
+    """
+    found = next((pair for pair in flow.traits.items() if pair[0][0] == "family"), None)
+    if found is None:
+        return None
+    (_, families), stored = found
+    family_of = []
+    for member in all_members(flow, look.guiding_angle)[: flow.lines]:
         # The angle from the stored line, in units of that between neighbouring ones. Where no line
         # is stored it is 0: the sum has no -0, whose angle is pi.
         ahead = member.astype(np.complex128) ** (flow.degree // families) * stored.conj() + 0
-        family = np.rint(np.angle(ahead) * (families / (2 * np.pi))).astype(np.intp) % families
-        total += weight[:, None] * PALETTE.take(family, axis=0)
-    return total / stands_out.sum(axis=0)[:, None]
+        turns = np.rint(np.angle(ahead) * (families / (2 * np.pi)))
+        family_of.append(turns.astype(np.intp) % families)
+    return family_of

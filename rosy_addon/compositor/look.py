@@ -107,7 +107,8 @@ class Look:
         "Whether families of directions differ in hue",
         one="All the same",
         families="A hue for each line that the field tells apart: of tensors the major and the "
-        "minor, of dir0, dir1 ... each, if they are the same lines all over the mesh",
+        "minor, of dir0, dir1 ... each, if they are the same lines all over the mesh. Hatched, "
+        "those of other fields have an ink each, too, by how near they are to the guiding angle",
     )
     seed: int = _number(0, 0, 2**31 - 1, "Which noise")
     gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
@@ -157,12 +158,28 @@ class Look:
         hatch="Lines of ink on paper, as many and as wide as the light asks for",
     )
     ink_colour: str = _colour("#08080d", "Colour of the ink")
+    ink_ramp: bool = _switch(
+        False, "Let the ink's colour go over into another one from the shadows to the lights"
+    )
+    ink_colour_light: str = _colour("#b06a3c", "Colour of the ink in the lights")
     paper_colour: str = _colour("#ffffff", "Colour of the paper")
     clear_paper: bool = _switch(False, "Leave the paper transparent, so that there is only ink")
     crispness: float = _number(0.7, 0.0, 1.0, "From soft grey streaks to lines with sharp borders")
     layers: int = _number(3, 1, 12, "Families of lines that may cross in the darkest tones")
     layering: float = _number(
         0.3, 0.0, 1.0, "Darkness between the tone at which one family begins and the next"
+    )
+    breaks: float = _number(
+        0.0, 0.0, 1.0, "How much lines are broken along their length, first where it is light"
+    )
+    wobble: float = _number(
+        0.0, 0.0, 1.0, "How much lines waver in course and width, as drawn by hand"
+    )
+    paper_grain: float = _number(
+        0.0,
+        0.0,
+        1.0,
+        "How much the ink catches on the tooth of the paper, as pencil and charcoal do",
     )
     supersampling: int = _number(1, 1, 4, "Samples of a pixel along each side")
 

@@ -8,21 +8,24 @@ that which a processor lacks, so no averages are shared between neighbours.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..compositor.anchored import LOWEST, OCTAVES, SIDE, TAPS, identities, lattice_axes
-from ..compositor.colour import colour_stops, from_hex, to_linear
-from ..compositor.compose import noise_of, scaled_look
+from ..compositor.colour import colour_stops
+from ..compositor.compose import noise_of, scaled_look, wavers
 from ..compositor.contrast import averaging_gain, expected_deviation, streaks_of
-from ..compositor.hatching import EARLY, JOINING, is_light, softness, thresholds_of
+from ..compositor.hatching import EARLY, JOINING, LEAST, piece_length, softness, statistics_of
 from ..compositor.hues import PALETTE, SHARPNESS
+from ..compositor.inks import INKS, inks_of
 from ..compositor.kernel import whole_samples
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
+from ..compositor.paper import TOOTH, paper_tooth
 from ..compositor.shading import Light, lights_of
+from ..compositor.waver import EVENED, SWAY, SWELL, WAVELENGTH, WAVES, wave_table
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -264,6 +267,7 @@ class Card:
             noise = self._anchored(placed, camera, scaled_look(look))
         else:
             noise = self._noise(camera.width, camera.height, look)
+        gbuffer["wavering"] = self._wavering(placed, camera, look)
         for number, kind in enumerate(kinds):
             around = _around([_window(entry, camera) for entry in placed if entry.kind == kind])
             if _is_empty(around):
@@ -426,6 +430,42 @@ class Card:
             )
         return self._without_clouds(raw, camera, look.high_pass)
 
+    def _wavering(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
+        """How a hand wavers at each pixel, as `waver.waver`."""
+        if not wavers(look):
+            return self._table("palette", None, lambda: PALETTE)
+        width, height = camera.width, camera.height
+        wavering = self._image("wavering", width, height)
+        waves = self._values("waves", None, wave_table)
+        length = scaled_look(look).grain * WAVELENGTH
+        on_surface = look.anchor == "surface"
+        for number, entry in enumerate(placed):
+            left, bottom, right, top = box = _window(entry, camera)
+            if entry.field is None or _is_empty(box):
+                continue
+            growing = camera.pixels_per_unit * entry.grown if on_surface else 1.0
+            constants = {
+                **_camera_constants(camera),
+                **_body_constants(number, entry, camera),
+                "corner": (left, bottom),
+                "on_surface": int(on_surface),
+                "unit_of_pixel": length / growing,
+                "wave_count": WAVES,
+                "evened": EVENED,
+            }
+            self.device.compute(
+                passes.WAVER,
+                (right - left, top - bottom),
+                {
+                    "seen": self._image("seen", width, height),
+                    "triangles": entry.shape.records,
+                    "waves": waves,
+                },
+                {"wavering": wavering},
+                constants,
+            )
+        return wavering
+
     def _without_clouds(self, raw: Any, camera: Camera, high_pass: float) -> Any:
         """Noise around its mean, and nothing broad in it: `anchored._broad`."""
         size = camera.width, camera.height
@@ -491,6 +531,7 @@ class Card:
                 "foreshorten": int(look.foreshorten),
                 "harmonics": len(deviations),
                 "lowest": deviations[0] if deviations else 0,
+                "sway": SWAY * look.wobble if wavers(look) else 0.0,
             },
         )
         read = {"cells": cells, "ways": ways}
@@ -512,6 +553,8 @@ class Card:
             "palette": self._table("palette", None, lambda: PALETTE),
             "lights": self._light_table(lit_by),
             "thresholds": self._thresholds(scaled_look(look)),
+            "inks": self._inks(kind, look),
+            "tooth": self._tooth(width, height, look),
         }
         constants = {**covering, **_look_constants(kind, look, len(lit_by))}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
@@ -580,24 +623,53 @@ class Card:
         return self._tables[name][1]
 
     def _thresholds(self, look: Look) -> Any:
-        """`hatching.ink_thresholds` in the first channel."""
+        """`hatching.ink_statistics` in the first channel."""
         if look.ink == "soft":
             return self._table("palette", None, lambda: PALETTE)
-        threshold, _ = thresholds_of(look)  # the same array as long as it is the same
+        threshold = statistics_of(look).threshold
         return self._table(
             "thresholds", threshold.tobytes(), lambda: np.repeat(threshold[:, None], 3, axis=1)
         )
+
+    def _inks(self, kind: Kind, look: Look) -> Any:
+        """`inks.Inks`: in the shadows, then in the lights."""
+        count = _ink_count(kind, look)
+        key = count, look.ink_colour, look.ink_ramp, look.ink_colour_light
+        found = inks_of(look, count)
+        return self._table("inks", key, lambda: np.concatenate([found.dark, found.light]))
+
+    def _tooth(self, width: int, height: int, look: Look) -> Any:
+        """`paper.paper_tooth` in the first channel, for a frame of this size at least."""
+        if not has_tooth(look):
+            return self._table("palette", None, lambda: PALETTE)
+        side = look.supersampling
+        width, height = (-(-length // (side * TILE)) * TILE for length in (width, height))
+        key = look.grain, look.seed
+        kept = self._tables.get("tooth")
+        if kept is None or kept[0][0] != key or width > kept[0][1] or height > kept[0][2]:
+            pixel = np.arange(width * height, dtype=np.int32)
+            data = np.zeros((height, width, 4), dtype=np.float32)
+            data[:, :, 0] = paper_tooth(pixel, width, look.grain, look.seed, 1).reshape(
+                height, width
+            )
+            texture = self.device.texture(width, height, "RGBA32F", data=data)
+            kept = self._tables["tooth"] = (key, width, height), texture
+        return kept[1]
 
     def _light_table(self, lights: Sequence[Light]) -> Any:
         data = np.zeros((max(len(lights), 1), 2, 4), dtype=np.float32)
         for row, light in zip(data, lights, strict=False):
             row[0, :3], row[0, 3] = light.vector, light.kind != "sun"
             row[1, :3] = np.asarray(light.colour) * light.strength
-        key = data.tobytes()
-        if "lights" not in self._tables or self._tables["lights"][0] != key:
-            texture = self.device.texture(2, len(data), "RGBA32F", data=data)
-            self._tables["lights"] = key, texture
-        return self._tables["lights"][1]
+        return self._values("lights", data.tobytes(), lambda: data)
+
+    def _values(self, name: str, key: Any, make: Callable[[], np.ndarray]) -> Any:
+        """(H, W, 4) numbers as a texture, made anew if its key is another."""
+        if name not in self._tables or self._tables[name][0] != key:
+            data = make()
+            texture = self.device.texture(data.shape[1], data.shape[0], "RGBA32F", data=data)
+            self._tables[name] = key, texture
+        return self._tables[name][1]
 
     def _noise(self, width: int, height: int, look: Look) -> Any:
         """Noise for a frame of this size at least: it is the same for all of them."""
@@ -645,6 +717,8 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
     finer = scaled_look(look)
     _, crossing = streak_statistics(*streaks_of(finer), kind.lines, tapered=look.taper)
     gain = averaging_gain(finer) if look.supersampling > 1 else 1.0
+    inks = inks_of(look, _ink_count(kind, look))
+    statistics = statistics_of(finer) if look.ink == "hatch" else None
     return {
         "walk_length": finer.length,
         "taper": int(look.taper),
@@ -662,18 +736,40 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "shading": look.shading,
         "headlight": int(look.light == "headlight"),
         "light_count": lights,
-        "paper_light": (*to_linear(from_hex(look.paper_colour)), 1.0),
-        "ink_light": (*to_linear(from_hex(look.ink_colour)), 1.0),
+        "paper_light": (*inks.paper, 1.0),
+        "ink_count": len(inks.dark),
+        "ink_floor": inks.floor,
         "hatch": int(look.ink == "hatch"),
-        "light_ink": int(is_light(look)),
+        "light_ink": int(inks.is_light),
         "clear_paper": int(look.clear_paper),
         "layers": look.layers,
         "layering": look.layering,
         "softness": softness(look.crispness),
-        "deviation": thresholds_of(finer)[1] if look.ink == "hatch" else 1.0,
+        "deviation": statistics.deviation if statistics else 1.0,
+        "breaks": look.breaks if look.ink == "hatch" else 0.0,
+        "piece_length": piece_length(finer),
+        "piece_whole": whole_samples(replace(finer, length=piece_length(finer))),
+        "piece_deviation": statistics.piece_deviation if statistics else 1.0,
+        "sway": SWAY * look.wobble if wavers(look) else 0.0,
+        "swell": SWELL * look.wobble if wavers(look) else 0.0,
+        "tooth_depth": TOOTH * look.paper_grain if has_tooth(look) else 0.0,
+        "subpixels": look.supersampling,
         "JOINING": JOINING,
         "EARLY": EARLY,
+        "LEAST": LEAST,
     }
+
+
+def _ink_count(kind: Kind, look: Look) -> int:
+    """Of how many inks lines are drawn, as `hatching.families_of_ink`."""
+    if look.ink == "soft" or look.hue == "one" or look.magnitude in ("colour", "both"):
+        return 1
+    return min(kind.families if kind.families > 1 else kind.lines, INKS)
+
+
+def has_tooth(look: Look) -> bool:
+    """Whether ink catches on the tooth of the paper."""
+    return look.ink == "hatch" and look.paper_grain > 0
 
 
 def _body_constants(number: int, entry: Placed, camera: Camera) -> dict[str, Any]:

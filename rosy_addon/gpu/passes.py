@@ -160,6 +160,26 @@ ANCHORED = Compute(
     ),
 )
 
+WAVER = Compute(
+    "waver",
+    ("seen", "triangles", "waves"),
+    (("wavering", "RGBA32F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("place_x", "vec4"),
+        ("place_y", "vec4"),
+        ("place_z", "vec4"),
+        ("body", "float"),
+        ("texels", "int"),
+        ("row_bits", "int"),
+        ("on_surface", "int"),
+        ("unit_of_pixel", "float"),
+        ("wave_count", "int"),
+        ("evened", "float"),
+    ),
+)
+
 SMOOTH = Compute(
     "smooth", ("rough",), (("smoother", "RGBA32F"),), (("along", "ivec2"), ("reach", "int"))
 )
@@ -173,7 +193,7 @@ SETTLE = Compute(
 
 FLOW = Compute(
     "flow",
-    ("normals", "values_seen", "slopes", "traits_seen[]", "noise"),
+    ("normals", "values_seen", "slopes", "traits_seen[]", "noise", "wavering"),
     (("cells", "RGBA32F"), ("ways[]", "RGBA16F")),
     (
         *_WINDOW,
@@ -185,6 +205,7 @@ FLOW = Compute(
         ("foreshorten", "int"),
         ("harmonics", "int"),
         ("lowest", "int"),
+        ("sway", "float"),
     ),
 )
 
@@ -208,6 +229,9 @@ WALK = Compute(
         "palette",
         "lights",
         "thresholds",
+        "inks",
+        "wavering",
+        "tooth",
     ),
     (("picture", "RGBA32F"),),
     (
@@ -232,7 +256,8 @@ WALK = Compute(
         ("headlight", "int"),
         ("light_count", "int"),
         ("paper_light", "vec4"),
-        ("ink_light", "vec4"),
+        ("ink_count", "int"),
+        ("ink_floor", "float"),
         ("hatch", "int"),
         ("light_ink", "int"),
         ("clear_paper", "int"),
@@ -240,8 +265,17 @@ WALK = Compute(
         ("layering", "float"),
         ("softness", "float"),
         ("deviation", "float"),
+        ("breaks", "float"),
+        ("piece_length", "int"),
+        ("piece_whole", "float"),
+        ("piece_deviation", "float"),
+        ("sway", "float"),
+        ("swell", "float"),
+        ("tooth_depth", "float"),
+        ("subpixels", "int"),
         ("JOINING", "float"),
         ("EARLY", "float"),
+        ("LEAST", "float"),
     ),
 )
 
@@ -274,6 +308,7 @@ ALL = (
     SEEN_CUT,
     RESOLVE,
     ANCHORED,
+    WAVER,
     SMOOTH,
     SETTLE,
     FLOW,

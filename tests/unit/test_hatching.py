@@ -13,7 +13,7 @@ from rosy_addon.compositor.anchored import identities, surface_noise
 from rosy_addon.compositor.colour import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.flow import planar_flow
-from rosy_addon.compositor.hatching import family_shares, ink_thresholds
+from rosy_addon.compositor.hatching import family_shares, ink_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.presets import load_preset, preset_names
 from rosy_addon.compositor.shading import diffuse
@@ -137,7 +137,7 @@ def test_presets_reproduce_a_ramp(name):
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
 def test_thresholds_cover_what_they_say(crispness):
     """Of normal streaks, those of a threshold cover as much of the paper as it is for."""
-    threshold, deviation = ink_thresholds(81, 2.0, 0.5, 16.0, crispness)
+    threshold, deviation, _ = ink_statistics(81, 2.0, 0.5, 16.0, crispness)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # half of the paper: streaks of dense noise are hardly skew

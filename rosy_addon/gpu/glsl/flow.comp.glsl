@@ -37,16 +37,18 @@ vec2 on_screen(vec3 tangent, vec3 toward_eye, vec3 normal, vec2 ray)
   return vec2(dot(to_pixels.xy, flat_), dot(to_pixels.zw, flat_));
 }
 
-// The direction that belongs to a member: of a RoSy the member itself (`Flow.direction`).
-vec2 direction_of(vec2 member, ivec2 pixel)
+// The direction that belongs to a member: of a RoSy the member itself (`Flow.direction`). Deviations
+// are functions of the member as it was before the hand wavered (`waver.swayed`).
+vec2 direction_of(vec2 member, float wavered, ivec2 pixel)
 {
   if (harmonics == 0) {
     return member;
   }
+  vec2 before = times(member, vec2(cos(wavered), -sin(wavered)));
   vec2 total = vec2(0.0);
   for (int layer = 0; layer < harmonics; ++layer) {
     vec4 found = texelFetch(traits_seen, ivec3(pixel, layer), 0);
-    total += times(found.xy, signed_power(member, lowest + layer));
+    total += times(found.xy, signed_power(before, lowest + layer));
   }
   return unit_or_zero(times(member, total));
 }
@@ -77,7 +79,8 @@ void main()
       bits |= 1 << bit;
     }
   }
-  float toward = float(degree) * guiding_angle;
+  float wavered = sway != 0.0 ? sway * texelFetch(wavering, pixel, 0).y : 0.0;
+  float toward = float(degree) * (guiding_angle - wavered);
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
   float angle = atan(z.y, z.x) / float(degree);
   float turn = angle * float(around) / TAU + 2.0;
@@ -92,7 +95,7 @@ void main()
   vec2 axis_x = on_screen(x, eye, normal.xyz, ray), axis_y = on_screen(y, eye, normal.xyz, ray);
   for (int line = 0; line < lines; ++line) {
     float at = angle + guiding_angle + TAU * float(line) / float(around);
-    vec2 member = direction_of(vec2(cos(at), sin(at)), pixel);
+    vec2 member = direction_of(vec2(cos(at), sin(at)), wavered, pixel);
     vec2 way = axis_x * member.x + axis_y * member.y;
     imageStore(ways, ivec3(pixel, line), vec4(foreshorten != 0 ? way : unit_or_zero(way), 0.0, 0.0));
   }

@@ -4,20 +4,56 @@
 
 #define MEAN 0.5
 
-// The sums of the noise times its weights, of these, and of their squares.
-struct Half {
+// Of the noise along a streamline times its weights, of these, and of their squares.
+struct Sums {
   vec3 total;
   float weight;
   float square;
 };
 
+// Of one half of a streamline, and of its first steps alone, with weights of their own.
+struct Half {
+  Sums all;
+  Sums near;
+};
+
+void add(inout Sums sums, vec3 noise_there, float weight)
+{
+  sums.total += weight * noise_there;
+  sums.weight += weight;
+  sums.square += weight * weight;
+}
+
+Sums none()
+{
+  Sums sums;
+  sums.total = vec3(0.0);
+  sums.weight = sums.square = 0.0;
+  return sums;
+}
+
+Sums whole_of(vec3 start, Sums ahead, Sums behind)
+{
+  Sums sums = ahead;
+  sums.total += behind.total + start;
+  sums.weight += behind.weight + 1.0;
+  sums.square += behind.square + 1.0;
+  return sums;
+}
+
+// So many samples that all count the same would vary as much (`kernel.Weights`).
+float samples_of(Sums sums)
+{
+  return sums.weight * sums.weight / sums.square;
+}
+
 // The noise along one half of the streamline that leaves a pixel on a sheet, without the start.
-Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
+Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps, int near_steps)
 {
   Half found;
-  found.total = vec3(0.0);
-  found.weight = found.square = 0.0;
+  found.all = found.near = none();
   float fall = taper != 0 ? 1.0 / float(steps + 1) : 0.0;
+  float near_fall = taper != 0 ? 1.0 / float(near_steps + 1) : 0.0;
   vec2 offset = vec2(0.0), before = vec2(0.0);
   for (int count = 0; count < steps; ++count) {
     bool opposite = sheet >= lines;
@@ -41,10 +77,11 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps)
       // k' = k + round((t(p) - t(q)) S / 2 pi) mod S
       sheet = wrapped(sheet + int(round(turn - cell.x)), around);
     }
-    float weight = 1.0 - float(count + 1) * fall;
-    found.total += weight * cell.yzw;
-    found.weight += weight;
-    found.square += weight * weight;
+    float away = float(count + 1);
+    add(found.all, cell.yzw, 1.0 - away * fall);
+    if (count < near_steps) {
+      add(found.near, cell.yzw, 1.0 - away * near_fall);
+    }
   }
   return found;
 }
@@ -59,17 +96,30 @@ vec3 mapped_colour(float value)
   return mix(low, high, place - float(below));
 }
 
-// The hue of a line: that of the family it belongs to (`hues.family_hues`), from the angle of line 0
-// and of what the field stores. Of `told` families: 1 where nothing is stored, as of fields beside
-// this one of which no lines are told apart.
-vec3 hue_of_line(int line, float first, float stored, int told)
+// The family that a line belongs to (`hues.families_of_lines`), from the angle of line 0 and of what
+// the field stores. Of `told` families: 1 where nothing is stored, as of fields beside this one of
+// which no lines are told apart.
+int family_of_line(int line, float first, float stored, int told)
 {
   // Of odd degree every other line is a member's opposite half.
   float opposite = (around > degree && (degree & line & 1) == 1) ? 0.5 * TAU : 0.0;
   float at = first + opposite + TAU * float(line) / float(around);
   float ahead = (at * float(degree) - stored * float(families)) / TAU;
-  int family = modulo(int(round(ahead)), told);
-  return texelFetch(palette, ivec2(modulo(family, textureSize(palette, 0).x), 0), 0).xyz;
+  return modulo(int(round(ahead)), told);
+}
+
+// The mean of the noise along a streamline, around 0: those that ended early get the spread of whole
+// ones (`contrast.even_out`).
+vec3 evened_out(Sums sums, float of_whole_ones)
+{
+  float count = samples_of(sums);
+  float cells_met = count * step_length / grain;
+  return (sums.total / sums.weight - MEAN) * sqrt(count / of_whole_ones) * min(0.5 * cells_met, 1.0);
+}
+
+float grey(vec3 mean)
+{
+  return channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
 }
 
 // What Lambert's law leaves (`shading.diffuse`). A light is two texels: where it is or, for a sun
@@ -98,17 +148,55 @@ float smooth_step(float x)
   return x * x * (3.0 - 2.0 * x);
 }
 
-// The darkness at which a line joins in (`hatching._onset`), by how many others are nearer to the
-// guiding angle; `first` is the angle from there of the nearest.
-float onset_of(int line, float first)
+// How many lines are nearer to the guiding angle than this one (`hatching._ranks`); `first` is the
+// angle from there of the nearest.
+float rank_of(int line, float first)
 {
   float at = first + TAU * float(line) / float(around);
-  float rank = atan(abs(sin(at)), abs(cos(at))) * 4.0 * float(lines) / TAU;
-  float onset = 0.0;
-  for (int layer = 1; layer < layers; ++layer) {
-    onset += smooth_step((rank - float(layer) + 0.4) / 0.8);
+  return atan(abs(sin(at)), abs(cos(at))) * 4.0 * float(lines) / TAU;
+}
+
+// `hatching._places`
+float place_of(float rank, int count)
+{
+  float place = 0.0;
+  for (int layer = 1; layer < count; ++layer) {
+    place += smooth_step((rank - float(layer) + 0.4) / 0.8);
   }
-  return onset * layering + 2.0 * smooth_step((rank - float(layers) + 0.4) / 0.8);
+  return place;
+}
+
+// The darkness at which a line joins in (`hatching._onset`).
+float onset_of(int line, float first)
+{
+  float rank = rank_of(line, first);
+  float too_many = smooth_step((rank - float(layers) + 0.4) / 0.8);
+  return place_of(rank, layers) * layering + 2.0 * too_many;
+}
+
+// An ink by its number, or between two, in the shadows and in the lights (`inks.Inks`).
+vec3 ink_at(float number, float tone)
+{
+  int below = min(int(number), ink_count - 1);
+  int above = min(below + 1, ink_count - 1);
+  float share = number - float(below);
+  vec3 dark = mix(texelFetch(inks, ivec2(below, 0), 0).xyz, texelFetch(inks, ivec2(above, 0), 0).xyz, share);
+  below += ink_count;
+  above += ink_count;
+  vec3 light = mix(texelFetch(inks, ivec2(below, 0), 0).xyz, texelFetch(inks, ivec2(above, 0), 0).xyz, share);
+  return mix(dark, light, tone);
+}
+
+vec3 inverted(vec3 light)
+{
+  return light_ink != 0 ? 1.0 - light : light;
+}
+
+float covering(float wanted, vec3 ink)
+{
+  vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+  float left_by = dot(inverted(ink), luminance) / max(dot(inverted(paper_light.xyz), luminance), 1e-3);
+  return clamp((1.0 - wanted) / max(1.0 - left_by, 1e-3), 0.0, 1.0);
 }
 
 float threshold_of(float covered)
@@ -139,7 +227,9 @@ void main()
   }
   int steps = magnitude_drives >= 2 ? int(round(float(walk_length) * relative)) : walk_length;
 
-  float toward = float(degree) * guiding_angle;
+  // Without a wavering hand or tooth there are no such images to look into.
+  vec2 hand = sway != 0.0 ? texelFetch(wavering, pixel, 0).xy : vec2(0.0);
+  float toward = float(degree) * (guiding_angle - sway * hand.y);
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
   float first = 0.0, stored = 0.0;
   int told = 1;
@@ -155,10 +245,25 @@ void main()
   vec3 position = vec3(ray * (perspective != 0 ? depth : 1.0), -depth);
   vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
   // What light the ink is to leave, and between how many lines that is shared.
-  float left = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
-  left = light_ink != 0 ? 1.0 - left : left;
+  float tone_here = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
+  float left = light_ink != 0 ? 1.0 - tone_here : tone_here;
+  float wanted = ink_floor + left * (1.0 - ink_floor);
+  bool by_magnitude = magnitude_drives == 1 || magnitude_drives == 3;
   float nearest = angle_of(z) / float(degree), soonest = 10.0, sharers = 0.0, paper = 1.0;
+  float uneven = 0.0;
+  vec3 one_ink = vec3(0.0), through = vec3(1.0);
   if (hatch != 0) {
+    if (by_magnitude) {
+      one_ink = to_linear(mapped_colour(relative));
+    }
+    else if (ink_count == 1) {
+      one_ink = ink_at(0.0, tone_here);
+      left = 1.0 - covering(wanted, one_ink);
+    }
+    uneven = swell * hand.x;
+    if (tooth_depth != 0.0) {
+      uneven += tooth_depth * texelFetch(tooth, pixel / subpixels, 0).x;
+    }
     for (int line = 0; line < lines; ++line) {
       soonest = min(soonest, onset_of(line, nearest));
     }
@@ -167,30 +272,51 @@ void main()
       sharers += smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY));
     }
   }
+  int near_steps = breaks > 0.0 ? piece_length : 0;
+  if (magnitude_drives >= 2) {
+    near_steps = int(round(float(near_steps) * relative));
+  }
   vec3 blend = vec3(0.0), hue = vec3(0.0);
   float samples = 0.0, weights = 0.0;
   for (int line = 0; line < lines; ++line) {
     bool paired = around == 2 * lines;
-    Half ahead = followed(pixel, line, 1.0, cell, steps);
-    Half behind = followed(pixel, paired ? line + lines : line, paired ? 1.0 : -1.0, cell, steps);
-    float weight = 1.0 + ahead.weight + behind.weight;
-    vec3 mean = (cell.yzw + ahead.total + behind.total) / weight;
-    // So many samples that all count the same would vary as much (`kernel.weights_of`).
-    float count = weight * weight / (1.0 + ahead.square + behind.square);
-    // Streamlines that ended early get the spread of whole ones (`contrast.even_out`).
-    mean = (mean - MEAN) * sqrt(count / whole) * min(0.5 * count * step_length / grain, 1.0);
+    int back = paired ? line + lines : line;
+    Half ahead = followed(pixel, line, 1.0, cell, steps, near_steps);
+    Half behind = followed(pixel, back, paired ? 1.0 : -1.0, cell, steps, near_steps);
+    Sums sums = whole_of(cell.yzw, ahead.all, behind.all);
+    vec3 mean = evened_out(sums, whole);
     if (hatch != 0) {
       float later = onset_of(line, nearest) - soonest;
       float own = smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY)) / sharers;
-      float streak = channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
-      float above = streak / deviation - threshold_of(1.0 - pow(left, own));
-      paper *= 1.0 - smooth_step(above / (2.0 * softness) + 0.5);
+      float covered = 1.0 - pow(left, own);
+      vec3 ink = one_ink;
+      if (ink_count > 1) {
+        float number = families > 1 ?
+                           float(min(family_of_line(line, first, stored, told), ink_count - 1)) :
+                           place_of(rank_of(line, nearest), lines);
+        ink = ink_at(number, tone_here);
+        covered = covering(pow(wanted, own), ink);
+      }
+      float streak = grey(mean) / deviation;
+      if (breaks > 0.0) {
+        vec3 near = evened_out(whole_of(cell.yzw, ahead.near, behind.near), piece_whole);
+        // `hatching.brokenness`
+        float broken = breaks * (1.0 - covered) * (1.0 - covered);
+        streak = mix(streak, grey(near) / piece_deviation, broken);
+      }
+      float above = streak + uneven - threshold_of(covered);
+      float coverage = smooth_step(above / (2.0 * softness) + 0.5);
+      paper *= 1.0 - coverage;
+      vec3 passed = inverted(ink) / max(inverted(paper_light.xyz), 1e-3);
+      through *= 1.0 - coverage * (1.0 - passed);
     }
     blend += mean;
-    samples += count;
+    samples += samples_of(sums);
     if (families > 1) {
-      float shine = exp(sharpness * (channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0));
-      hue += shine * hue_of_line(line, first, stored, told);
+      float shine = exp(sharpness * grey(mean));
+      int family = family_of_line(line, first, stored, told);
+      family = modulo(family, textureSize(palette, 0).x);
+      hue += shine * texelFetch(palette, ivec2(family, 0), 0).xyz;
       weights += shine;
     }
   }
@@ -201,7 +327,7 @@ void main()
   blend *= gain * sqrt(float(lines) / (1.0 + shared_));
   vec3 tone = channels == 1 ? blend.xxx : blend;
   vec3 ink = tone + MEAN;
-  if (magnitude_drives == 1 || magnitude_drives == 3) {
+  if (by_magnitude) {
     ink = mapped_colour(relative) * (1.0 + 1.5 * tone);
   }
   else if (families > 1) {
@@ -209,8 +335,15 @@ void main()
   }
   vec4 colour = vec4(to_linear(ink) * light, 1.0);
   if (hatch != 0) {
-    colour = clear_paper != 0 ? vec4(ink_light.xyz, 1.0 - paper) :
-                                vec4(mix(ink_light.xyz, paper_light.xyz, paper), 1.0);
+    vec3 drawn = one_ink;
+    if (ink_count > 1) {
+      vec3 seen_light = inverted(inverted(paper_light.xyz) * through);
+      // What is seen is paper and ink: the ink is what is left without the paper.
+      drawn = paper_light.xyz + (seen_light - paper_light.xyz) / max(1.0 - paper, LEAST);
+      drawn = clamp(drawn, 0.0, 1.0);
+    }
+    colour = clear_paper != 0 ? vec4(drawn, 1.0 - paper) :
+                                vec4(mix(drawn, paper_light.xyz, paper), 1.0);
   }
   imageStore(picture, pixel, colour);
 }

@@ -1,0 +1,96 @@
+"""The tooth of paper: heights that catch the ink of a soft tool, and stay with the picture."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from .noise import TILE, blur_reach, blurred, hash_bits
+
+#: Deviation of the finest blur whose differences are the bands of the relief, in grains, and the
+#: least, pixels: what is finer is not paper, but noise.
+FINEST, SMOOTHEST = 0.16, 0.7
+
+#: How much each band has to say, an octave each: fine tooth on broad unevenness.
+SHARES = (1.0, 0.6, 0.4)
+
+#: Of the threshold of ink, at `Look.paper_grain` 1, in deviations of the streaks.
+TOOTH = 1.2
+
+#: So many pixels of paper are kept for the next picture.
+_KEPT = 1 << 22
+
+
+def paper_tooth(pixel: np.ndarray, width: int, grain: float, seed: int, side: int) -> np.ndarray:
+    """How deep the paper lies at each pixel, with mean 0 and deviation 1.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixel indices into a supersampled frame, ascending.
+    width : int
+        Of that frame.
+    grain : float
+        Of the noise of streaks, pixels of the picture: the tooth is as much finer or broader.
+    seed : int
+    side : int
+        Subpixels of a pixel, each way; all of them are of one height.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+    """
+    row, column = np.divmod(pixel, np.int32(width))
+    row, column = row // side, column // side
+    left, right = _tiled(int(column.min()), int(column.max()) + 1)
+    bottom, top = _tiled(int(row[0]), int(row[-1]) + 1)
+    make = _sheet if (right - left) * (top - bottom) <= _KEPT else _sheet.__wrapped__
+    return make(left, right, bottom, top, grain, seed).take(
+        (row - bottom) * np.int32(right - left) + (column - left)
+    )
+
+
+def _tiled(start: int, stop: int) -> tuple[int, int]:
+    """The whole tiles that hold some rows or columns of pixels, so that views share a sheet."""
+    return start // TILE * TILE, -(-stop // TILE) * TILE
+
+
+@lru_cache(maxsize=2)
+def _sheet(left: int, right: int, bottom: int, top: int, grain: float, seed: int) -> np.ndarray:
+    """(pixels,) float32 heights of a rectangle of the picture."""
+    finest = max(FINEST * grain, SMOOTHEST)
+    blurs = [finest * 2**number for number in range(len(SHARES) + 1)]
+    margin = 4 * max(map(blur_reach, blurs))
+    column = np.arange(left - margin, right + margin, dtype=np.int32)
+    row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
+    # A seed of its own: the tooth is not to know of the streaks.
+    white = hash_bits(column, row, seed ^ 0x5EED, 0, 0.5).astype(np.float32) - np.float32(0.5)
+    total = np.zeros_like(white)
+    finer = _softened(white, blurs[0])
+    for blur, broader_blur, share in zip(blurs, blurs[1:], SHARES, strict=False):
+        broader = _softened(white, broader_blur)
+        total += np.float32(share / _deviation(blur, broader_blur)) * (finer - broader)
+        finer = broader
+    total = total[margin : len(total) - margin, margin : total.shape[1] - margin]
+    return np.ascontiguousarray(total / np.float32(np.hypot.reduce(SHARES))).reshape(-1)
+
+
+def _softened(image: np.ndarray, deviation: float) -> np.ndarray:
+    """Nearly a Gaussian blur, also of less than `blurred` can do."""
+    if deviation > 1.5:
+        return blurred(image, deviation)
+    for axis in (0, 1) * max(round(2 * deviation**2), 1):
+        # Weights 1, 2, 1: a variance of a half.
+        ahead, behind = (np.roll(image, way, axis=axis) for way in (1, -1))
+        image = np.float32(0.5) * image + np.float32(0.25) * (ahead + behind)
+    return image
+
+
+@lru_cache(maxsize=16)
+def _deviation(finer: float, broader: float) -> float:
+    """Of the difference of two blurs of white noise, by what they make of a single pixel."""
+    reach = 4 * blur_reach(broader)
+    single = np.zeros((2 * reach + 1,) * 2, dtype=np.float32)
+    single[reach, reach] = 1
+    return float(np.linalg.norm(_softened(single, finer) - _softened(single, broader)) / 2)

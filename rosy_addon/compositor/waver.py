@@ -1,0 +1,117 @@
+"""How a hand wavers: slow, smooth changes in the course of lines and in how firmly they are drawn.
+
+They are sums of a few plane waves, in the space in which the body is at rest or in the picture, with
+the noise. In space their length follows that of a pixel in octaves of which two are mixed, as in
+`anchored`, so that they stay with the surface and yet are as long in the picture from near as from afar.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..projection.gbuffer import GBuffer
+from ..projection.rest import rest_places
+from ..trigonometry import cosine_sine, phase_of
+from .flow import Flow
+from .look import Look
+
+#: Waves that one wavering is the sum of.
+WAVES = 6
+
+#: Mean length of a wave, in grains.
+WAVELENGTH = 40.0
+
+#: Deviation of a line's course from the field's at `Look.wobble` 1, radians, and of the threshold
+#: above which it is drawn, in deviations of the streaks.
+SWAY, SWELL = 0.09, 0.6
+
+#: Brings a sum of waves to deviation 1. Each is 4 v (1 - |v|), v from -1 to 1: a sine made of two
+#: parabolas, the same bits everywhere, of which 16 / 30 is the variance.
+EVENED = (WAVES * 16 / 30) ** -0.5
+
+#: Pixels that are worked on at once.
+_BLOCK = 1 << 15
+
+
+def wave_table() -> np.ndarray:
+    """(2, WAVES, 4) float32: waves of two waverings, as how many there are in a unit, and the phase.
+
+    Their directions are spread evenly over the sphere, as a spiral, and their lengths over an octave.
+    """
+    golden = (5**0.5 - 1) / 2
+    number = np.arange(2 * WAVES)
+    height = 1 - (2 * number + 1) / (2 * WAVES)
+    turn = 2 * np.pi * golden * number
+    out = np.sqrt(1 - height**2)
+    often = 2.0 ** ((number * 7 % WAVES + 0.5) / WAVES - 0.5)
+    table = np.stack(
+        [
+            often * out * np.cos(turn),
+            often * out * np.sin(turn),
+            often * height,
+            number * golden * 5 % 1,
+        ],
+        axis=1,
+    )
+    # Neighbours on the spiral take turns, so that each of the two has waves of all directions.
+    return table.astype(np.float32).reshape(WAVES, 2, 4).transpose(1, 0, 2).copy()
+
+
+def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
+    """Two waverings that know nothing of each other, with mean 0 and deviation 1, about.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its bodies, for a look anchored to the surface.
+    look : Look
+        With its lengths in the pixels of the frame; its `anchor` and `grain` count.
+
+    Returns
+    -------
+    (2, P) float32 ndarray
+        For the firmness of lines and for their course.
+    """
+    if look.anchor == "surface":
+        places = rest_places(gbuffer)
+        place, size = places.at(0, 0), places.size
+    else:
+        row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+        place = np.stack([column, row, 0 * row]).astype(np.float32)
+        size = np.ones(len(row), dtype=np.float32)
+    level = np.log2(np.maximum(size, 1e-30) * np.float32(look.grain * WAVELENGTH))
+    found = np.empty((2, len(level)), dtype=np.float32)
+    for start in range(0, len(level), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        found[:, block] = _waves(place[:, block], level[block])
+    return found
+
+
+def swayed(flow: Flow, angle: np.ndarray) -> Flow:
+    """A flow whose directions are turned in the view plane by (P,) angles, radians."""
+    angle = angle.astype(np.float64)
+    traits = {
+        # Deviations are functions of the member: those of one that was turned are the same.
+        (kind, number): values * phase_of(-number * angle) if kind == "deviation" else values
+        for (kind, number), values in flow.traits.items()
+    }
+    turned = flow.representation * phase_of(flow.degree * angle)
+    return replace(flow, representation=turned, traits=traits)
+
+
+def _waves(place: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """(2, P) waverings at (3, P) places, for waves of (P,) lengths, as powers of two."""
+    octave = np.floor(level)
+    share = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
+    total = np.zeros((2, len(level)), dtype=np.float32)
+    # The squares of both weights sum to 1, so that the variance is that of one.
+    for number, weight in enumerate(cosine_sine(share)):
+        x, y, z = place * np.exp2(-(octave + number)).astype(np.float32)
+        for out, waves in zip(total, wave_table(), strict=True):
+            for wave in waves:
+                at = wave[0] * x + wave[1] * y + wave[2] * z + wave[3]
+                at = 2 * (at - np.floor(at)) - 1
+                out += weight * (4 * at * (1 - np.abs(at)))
+    return total * np.float32(EVENED)

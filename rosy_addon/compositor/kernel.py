@@ -34,15 +34,15 @@ def weights_of(ahead: Any, behind: Any, reach: Any, tapered: bool) -> Weights:
     Parameters
     ----------
     ahead, behind : ndarray or float
-        Samples on either side, at most `reach`.
+        Floats: samples on either side, at most `reach`.
     reach : ndarray or float
         Samples on either side of a streamline that has not ended early: the one at a distance d
         weighs 1 - d / (reach + 1) if they are tapered.
     tapered : bool
     """
     if not tapered:
-        return Weights(*[np.float32(1) + ahead + behind] * 2)
-    fall = 1 / (np.float32(1) + reach)
+        return Weights(*[1 + ahead + behind] * 2)
+    fall = 1 / (1 + np.asarray(reach, dtype=np.result_type(ahead)))
     total = 1 + _sum(ahead, fall) + _sum(behind, fall)
     return Weights(total, total**2 / (1 + _squares(ahead, fall) + _squares(behind, fall)))
 

@@ -38,7 +38,13 @@ def own_noise(size, grain=1.5, seed=0):
     return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
 
 
-def plain_lic(angle, noise, size, length, step):
+def window(length, taper):
+    """What the samples of a streamline weigh, from end to end."""
+    whole = np.arange(-length, length + 1)
+    return 1 - np.abs(whole) / (length + 1) if taper else np.ones(2 * length + 1)
+
+
+def plain_lic(angle, noise, size, length, step, taper=False):
     """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
     x, y = pixel_centres(size)
     start = x + 1j * y
@@ -57,7 +63,7 @@ def plain_lic(angle, noise, size, length, step):
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
-        for _ in range(length):
+        for weight in window(length, taper)[length + 1 :]:
             h = sign * step
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
@@ -65,8 +71,8 @@ def plain_lic(angle, noise, size, length, step):
             k4 = direction(p + h * k3)
             p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             alive &= inside(p)
-            total += np.where(alive, look_up(p), 0)
-            count += alive
+            total += weight * np.where(alive, look_up(p), 0)
+            count += weight * alive
     return total / count
 
 
@@ -74,24 +80,27 @@ def whole(image, margin=50):
     return image[margin:-margin, margin:-margin]
 
 
-def test_one_direction_agrees_with_a_plain_integrator():
+@pytest.mark.parametrize("taper", [False, True])
+def test_one_direction_agrees_with_a_plain_integrator(taper):
     x, y = pixel_centres(SIZE)
     noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step)
-    found = tone(swirl_angle(x, y, SIZE), 1, plain(method="members"), noise=noise)
+    expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
+    look = plain(method="members", taper=taper)
+    found = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
     assert correlation(whole(found), whole(expected)) > 0.99
 
 
-def test_one_direction_resembles_another_library():
+@pytest.mark.parametrize("taper", [False, True])
+def test_one_direction_resembles_another_library(taper):
     rlic = pytest.importorskip("rlic")
     x, y = pixel_centres(SIZE)
     angles = swirl_angle(x, y, SIZE)
     noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     length = PLAIN.length
     expected = rlic.convolve(
-        noise, np.cos(angles), np.sin(angles), kernel=np.ones(2 * length + 1), iterations=1
+        noise, np.cos(angles), np.sin(angles), kernel=window(length, taper), iterations=1
     )
-    found = tone(angles, 1, noise=noise)
+    found = tone(angles, 1, plain(taper=taper), noise=noise)
     assert correlation(whole(found), whole(expected)) > 0.7
 
 
@@ -115,7 +124,7 @@ def test_any_member_stands_for_the_field(degree, method):
     assert np.mean(difference > 1e-5) < 0.002
 
 
-@pytest.mark.parametrize("noise", [{}, {"high_pass": 16.0, "density": 0.1}])
+@pytest.mark.parametrize("noise", [{}, {"high_pass": 16.0, "density": 0.1}, {"taper": True}])
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6, 7])
 @pytest.mark.parametrize("method", ["members", "sheets"])
 def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
@@ -137,9 +146,10 @@ def test_independence_alone_would_overstate_the_contrast_of_seven():
 @pytest.mark.parametrize("high_pass", [0.0, 8.0, 24.0])
 @pytest.mark.parametrize("grain", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("length", [20, 80])
-def test_deviation_of_one_member_is_as_theory_says(grain, length, high_pass):
+@pytest.mark.parametrize("taper", [False, True])
+def test_deviation_of_one_member_is_as_theory_says(taper, grain, length, high_pass):
     size = 512
-    look = plain(grain=grain, length=length, high_pass=high_pass)
+    look = plain(grain=grain, length=length, high_pass=high_pass, taper=taper)
     spread = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)

@@ -15,6 +15,7 @@ from rosy_addon.compositor import sheets
 from rosy_addon.compositor.brute import brute_images
 from rosy_addon.compositor.covering import unfold
 from rosy_addon.compositor.flow import planar_flow
+from rosy_addon.compositor.kernel import weights_of
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.noise import image_noise
 from rosy_addon.compositor.sheets import sheets_images
@@ -55,11 +56,14 @@ def singular(degree, size=SIZE):
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_force(degree):
-    flow = uniform(0.0, degree)
+@pytest.mark.parametrize("taper", [False, True])
+def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_force(
+    taper, degree
+):
+    flow, look = uniform(0.0, degree), replace(LOOK, taper=taper)
     noise = np.tile(noise_of(flow)[:SIZE], (SIZE, 1))
-    found, expected = drawn(flow, noise=noise), brute(flow, noise=noise)
-    np.testing.assert_array_equal(found.samples, expected.samples)
+    found, expected = drawn(flow, look, noise), brute(flow, look, noise)
+    np.testing.assert_allclose(found.samples, expected.samples, rtol=1e-6)
     contrast = (found.members - 0.5) / sheets.CONTRAST
     np.testing.assert_allclose(contrast, expected.members - 0.5, atol=5e-4)
 
@@ -123,9 +127,10 @@ def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4, 6])
-def test_pictures_of_singular_fields_resemble_brute_force(degree):
-    flow = singular(degree)
-    found, expected = drawn(flow).blend[:, 0], brute(flow).blend[:, 0]
+@pytest.mark.parametrize("taper", [False, True])
+def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
+    flow, look = singular(degree), replace(LOOK, taper=taper)
+    found, expected = drawn(flow, look).blend[:, 0], brute(flow, look).blend[:, 0]
     # Not the same: each streak is shifted by up to half a pixel.
     assert np.corrcoef(found, expected)[0, 1] > 0.85
     assert found.std() == pytest.approx(expected.std(), rel=0.03)
@@ -147,11 +152,13 @@ def test_the_surroundings_of_singularities_are_not_grainy(degree):
     assert grain(drawn(flow)) < 1.15 * grain(brute(flow))
 
 
-def test_streamlines_end_where_those_of_brute_force_end():
+@pytest.mark.parametrize("taper", [False, True])
+def test_streamlines_end_where_those_of_brute_force_end(taper):
+    look = replace(LOOK, taper=taper)
     x, y = pixel_centres(SIZE)
     angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, 4), np.nan)
     flow = planar_flow(angles, 4)
-    found, expected = drawn(flow), brute(flow)
+    found, expected = drawn(flow, look), brute(flow, look)
     inside = flow.representation != 0
     assert (found.samples[~inside] == 1).all()
     difference = found.samples[inside] - expected.samples[inside]
@@ -159,13 +166,16 @@ def test_streamlines_end_where_those_of_brute_force_end():
     assert np.abs(difference).mean() < 2
 
 
-def test_magnitude_sets_the_samples_of_a_pixel():
+@pytest.mark.parametrize("taper", [False, True])
+def test_magnitude_sets_the_samples_of_a_pixel(taper):
     x, _ = pixel_centres(SIZE)
     flow = planar_flow(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
-    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30)
+    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, taper=taper)
     samples = drawn(flow, look).samples.reshape(SIZE, SIZE)[:, 40:-40]
-    expected = 2 * np.rint(30 * x / SIZE)[:, 40:-40] + 1
-    np.testing.assert_array_equal(samples, expected)
+    reach = np.rint(30 * x / SIZE)[:, 40:-40]
+    np.testing.assert_allclose(samples, weights_of(reach, reach, reach, taper).samples, rtol=1e-5)
+    expected = brute(flow, look).samples.reshape(SIZE, SIZE)[:, 40:-40]
+    np.testing.assert_allclose(samples, expected, rtol=1e-5)
 
 
 def test_three_channels_are_three_pictures():

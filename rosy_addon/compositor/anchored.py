@@ -18,6 +18,7 @@ import numpy as np
 from ..projection.gbuffer import GBuffer
 from ..projection.rest import rest_places
 from .noise import BLUR, DEVIATION, MEAN, blur_reach, blurred, random_bits
+from .streamlines import blocks
 
 #: Parts of a pixel at which the cells are looked up: no two in a row or a column.
 TAPS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
@@ -62,25 +63,53 @@ def surface_noise(
     """
     places = rest_places(gbuffer)
     level = np.log2(np.maximum(places.size, 1e-30) * np.float32(grain * SIDE))
-    finest = np.floor(level - (OCTAVES / 2 - 1))
-    lattice = [_turned(places.at(*tap)) for tap in TAPS]
     identity = identities(gbuffer.names)[gbuffer.body]
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
+    for block in blocks(len(gbuffer.pixel)):
+        part = places.block(block)
+        lattice = [_turned(part.at(*tap)) for tap in TAPS]
+        _add_cells(total[:, block], lattice, level[block], identity[block], seed, density)
+    total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
+    if high_pass:
+        for values in total:
+            values -= _broad(gbuffer, values, BLUR * high_pass)
+    return np.ascontiguousarray(total.T) + np.float32(MEAN)
+
+
+def _add_cells(
+    total: np.ndarray,
+    lattice: Sequence[np.ndarray],
+    level: np.ndarray,
+    identity: np.ndarray,
+    seed: int,
+    density: float,
+) -> None:
+    """Add the bits of the cells of all octaves to (K, n) sums.
+
+    Parameters
+    ----------
+    total : (K, n) float32 ndarray
+        Changed.
+    lattice : sequence of (3, n) float32 ndarray
+        Places at which cells are looked up.
+    level : (n,) float32 ndarray
+        The octave of the size of cell that is asked for, with its fraction.
+    identity : (n,) uint32 ndarray
+        Of the bodies.
+    seed, density
+        As of `surface_noise`.
+    """
+    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
     for number in range(OCTAVES):
-        octave = finest + number
-        weight = octave_shares((octave - level).astype(np.float32))
-        scale = np.exp2(-octave).astype(np.float32)
+        octave = finest + np.float32(number)
+        weight = octave_shares(octave - level)
+        scale = np.exp2(-octave)
         turn = (octave + LOWEST).astype(np.int32)
         for place in lattice:
             cell = np.floor(place * scale).astype(np.int32)
             for channel, out in enumerate(total):
                 bits = random_bits((*cell, turn, identity), seed, channel, density)
                 out += weight * (bits - np.float32(density))
-    total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
-    if high_pass:
-        for values in total:
-            values -= _broad(gbuffer, values, BLUR * high_pass)
-    return np.ascontiguousarray(total.T) + np.float32(MEAN)
 
 
 def octave_shares(away: np.ndarray) -> np.ndarray:

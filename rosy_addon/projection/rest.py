@@ -34,6 +34,16 @@ class RestPlaces:
     corners: tuple[np.ndarray, np.ndarray, np.ndarray]
     size: np.ndarray
 
+    def block(self, pixels: slice) -> RestPlaces:
+        """Those of some of the pixels."""
+        return RestPlaces(
+            self.weight[:, pixels],
+            self.across[:, pixels],
+            self.upward[:, pixels],
+            tuple(corner[:, pixels] for corner in self.corners),
+            self.size[pixels],
+        )
+
     def at(self, x: float, y: float) -> np.ndarray:
         """(3, P) float32: the places that many pixels to the right of the centres, and above."""
         weight = self.weight + np.float32(x) * self.across

@@ -24,6 +24,7 @@ OTHERS = (
     "looks-page",
     "hatching-page",
     "presets-page",
+    "peers",
     "fields-page",
     "turntable",
     "performance",

@@ -134,18 +134,15 @@ def drawn(scene):
     return seen(Strokes.joined(lines, outline(body, camera)), [body], camera)
 
 
-@pytest.fixture(scope="module")
-def svg(drawn, scene, tmp_path_factory):
-    path = tmp_path_factory.mktemp("svg") / "torus.svg"
-    write_svg(path, drawn, scene[1], Pen(width=WIDE))
-    return path
-
-
+@pytest.mark.parametrize("width", [WIDE, 5.0])
 @pytest.mark.parametrize("program", [browser, inkscape])
-def test_programs_draw_the_strokes_where_the_camera_sees_them(program, svg, drawn, scene, tmp_path):
-    program(svg, tmp_path / "a.png")
+def test_programs_draw_the_strokes_where_the_camera_sees_them(
+    program, width, drawn, scene, tmp_path
+):
+    write_svg(tmp_path / "a.svg", drawn, scene[1], Pen(width=width))
+    program(tmp_path / "a.svg", tmp_path / "a.png")
     found = ink_of(tmp_path / "a.png")
-    expected = raster(drawn, scene[1], WIDE)
+    expected = raster(drawn, scene[1], width)
     assert found.shape == expected.shape
     assert correlation(found, expected) > 0.98
     assert correlation(found, expected, 3.0) > 0.998
@@ -153,7 +150,9 @@ def test_programs_draw_the_strokes_where_the_camera_sees_them(program, svg, draw
 
 
 @needs_inkscape
-def test_inkscape_finds_a_layer_a_family(svg, drawn, scene, tmp_path):
+def test_inkscape_finds_a_layer_a_family(drawn, scene, tmp_path):
+    svg = tmp_path / "a.svg"
+    write_svg(svg, drawn, scene[1], Pen(width=WIDE))
     found = [line.split()[0] for line in run(INKSCAPE, LAYERS, svg).splitlines()]
     families = np.unique(drawn.family)
     assert found == ["paper", *(f"layer{family + 1}" for family in families)]

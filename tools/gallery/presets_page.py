@@ -85,11 +85,12 @@ def write() -> None:
     models = _models()
     pieces = [
         "# Presets",
-        "Every look that comes with RoSy, on Suzanne, on [Spot](https://www.cs.cmu.edu/~kmcrane/"
-        "Projects/ModelRepository/) and on the Stanford bunny: the same field, curvature with a "
-        f"reach of {REACH:g}, and the lamp that the preset brings. The two lines below each picture "
-        "go from a selected mesh to it, in Blender's Python console or a script; in the panel they "
-        "are *Make Field*, *Look > Presets* and *Bake*. With a mesh file and no Blender:",
+        "Every look that comes with RoSy, on Suzanne (three times subdivided), on [Spot](https://www."
+        "cs.cmu.edu/~kmcrane/Projects/ModelRepository/) and on the Stanford bunny: the same field, "
+        f"curvature with a reach of {REACH:g}, and the lamp that the preset brings. The two lines "
+        "below each picture go from a selected mesh in a new scene to it, in Blender's Python console "
+        "or a script; in the panel they are *Make Field*, *Look > Presets* and *Bake*. The view "
+        "transform *Standard* shows ink and paper as they were drawn. With a mesh file and no Blender:",
         "    python -m rosy_addon render bunny.obj -o bunny.png --generate curvature --reach "
         f"{REACH:g} --preset engraving --size 1600x1200",
         "Lengths are in pixels of the finished picture: pictures of twice the size show twice as "

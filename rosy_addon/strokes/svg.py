@@ -15,8 +15,14 @@ from ..projection.camera import Camera
 from .seen import on_screen
 from .strokes import Strokes
 
-#: Steps of width in which tapered strokes are drawn.
-SHADES = 8
+#: Steps of opacity in which strokes are drawn.
+SHADES = 16
+
+#: Widths, as shares of the full one, that differ by less are the same.
+SAME_WIDTH = 0.02
+
+#: How much farther out than half the width the outline of a stroke goes where it turns, at most.
+MITRE = 1.25
 
 #: Pixels by which a polyline may miss the points that are left out of it.
 TOLERANCE = 0.06
@@ -73,7 +79,8 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
     Returns
     -------
     str
-        SVG 1.1. Each family is a group that Inkscape takes for a layer.
+        SVG 1.1. Each family is a group that Inkscape takes for a layer, and so is the paper. Each
+        stroke is one path.
 
     Raises
     ------
@@ -94,11 +101,18 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<svg xmlns="http://www.w3.org/2000/svg" '
-        'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" version="1.1" '
+        'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '
+        'xmlns:sodipodi="http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd" version="1.1" '
         f'{size} viewBox="0 0 {camera.width} {camera.height}">',
     ]
     if pen.paper is not None:
-        lines.append(f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>')
+        # A layer of its own, and locked: a drag over the drawing takes strokes alone.
+        lines += [
+            '<g id="paper" inkscape:groupmode="layer" inkscape:label="paper" '
+            'sodipodi:insensitive="true">',
+            f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>',
+            "</g>",
+        ]
     for family, name in enumerate(strokes.names):
         own = strokes.chosen(strokes.family == family)
         if not len(own):
@@ -110,7 +124,7 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
             f'fill="none" stroke={quoteattr(colour)} stroke-width="{pen.width:.3g}" '
             'stroke-linecap="round" stroke-linejoin="round">'
         )
-        lines += _plotted(flat, own) if pen.plotter else _drawn(flat, own, pen.width)
+        lines += _plotted(flat, own) if pen.plotter else _drawn(flat, own, pen.width, colour)
         lines.append("</g>")
     lines.append("</svg>")
     return "\n".join(lines) + "\n"
@@ -128,38 +142,105 @@ def _plotted(pixels: np.ndarray, strokes: Strokes) -> list[str]:
     return paths
 
 
-def _drawn(pixels: np.ndarray, strokes: Strokes, width: float) -> list[str]:
-    """A path for each stretch of a stroke that is about equally wide."""
-    level = np.ceil(np.clip(strokes.width, 0, 1) * SHADES - 1e-9).astype(np.int64)
+def _drawn(pixels: np.ndarray, strokes: Strokes, width: float, colour: str) -> list[str]:
+    """A path a stroke: a line where it is as wide all along, else its outline, filled.
+
+    Where the opacity changes a stroke is cut, into pieces that end square so as not to overlap.
+    """
     shade = np.rint(np.clip(strokes.opacity, 0, 1) * SHADES).astype(np.int64)
-    # A piece is as wide as its wider end.
-    key = np.maximum(level[1:], level[:-1]) * (SHADES + 1) + np.minimum(shade[1:], shade[:-1])
-    stroke = strokes.stroke
-    inside = stroke[1:] == stroke[:-1]
-    begins = np.ones(len(key), dtype=bool)
-    begins[1:] = (key[1:] != key[:-1]) | ~inside[:-1]
-    first = np.flatnonzero(begins & inside)
-    ends = np.ones(len(key), dtype=bool)
-    ends[:-1] = begins[1:] | ~inside[1:]
-    last = np.flatnonzero(ends & inside) + 1
-    starts = np.concatenate([[0], np.cumsum(last - first + 1)])
-    point = np.arange(starts[-1]) + np.repeat(first - starts[:-1], last - first + 1)
-    flat = pixels[point]
-    kept = simplified(flat, starts, TOLERANCE)
+    point, start, first = _pieces(shade, strokes)
+    radius = np.clip(strokes.width[point], 0, 1) * width / 2
+    kept = simplified(np.column_stack([pixels[point], radius]), start, TOLERANCE)
+    count = np.add.reduceat(kept, start[:-1]) if len(start) > 1 else np.empty(0, dtype=np.int64)
+    start = np.concatenate([[0], np.cumsum(count)])
+    flat, radius = pixels[point][kept], radius[kept]
+    least, most = (side.reduceat(radius, start[:-1]) for side in (np.minimum, np.maximum))
+    left, right = _sides(flat, radius, start)
+    whole = np.bincount(strokes.stroke[first], minlength=len(strokes))[strokes.stroke[first]] == 1
     paths = []
-    for number, own in enumerate(key[first].tolist()):
-        wide, opaque = divmod(own, SHADES + 1)
-        if not wide or not opaque:
+    for piece, opaque in enumerate(shade[first].tolist()):
+        part = slice(start[piece], start[piece + 1])
+        if not opaque or not most[piece]:
             continue
-        part = slice(starts[number], starts[number + 1])
-        more = "" if wide == SHADES else f' stroke-width="{width * wide / SHADES:.3g}"'
-        more += "" if opaque == SHADES else f' stroke-opacity="{opaque / SHADES:.3g}"'
-        paths.append(f'<path{more} d="{_path(flat[part][kept[part]])}"/>')
+        more = "" if opaque == SHADES else f' opacity="{opaque / SHADES:.3g}"'
+        if most[piece] - least[piece] > SAME_WIDTH * width / 2 or not whole[piece]:
+            ends = (radius[part][0], radius[part][-1]) if whole[piece] else (0.0, 0.0)
+            more += f' fill={quoteattr(colour)} stroke="none"'
+            paths.append(f'<path{more} d="{_outline(left[part], right[part], ends)}"/>')
+        else:
+            wide = 2 * most[piece]
+            more += "" if wide > (1 - SAME_WIDTH) * width else f' stroke-width="{wide:.3g}"'
+            paths.append(f'<path{more} d="{_path(flat[part])}"/>')
     return paths
 
 
+def _pieces(shade: np.ndarray, strokes: Strokes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stretches of strokes of one shade; the point where the next begins belongs to both.
+
+    Returns
+    -------
+    point : (m,) int64 ndarray
+        Of the strokes, for the points of all pieces in turn.
+    start : (pieces + 1,) int64 ndarray
+    first : (pieces,) int64 ndarray
+        Their first points.
+    """
+    last_of_stroke = np.zeros(len(shade), dtype=bool)
+    last_of_stroke[strokes.start[1:] - 1] = True
+    begins = np.ones(len(shade), dtype=bool)
+    begins[1:] = (shade[1:] != shade[:-1]) | last_of_stroke[:-1]
+    # A last point alone is the end of the piece before.
+    begins &= ~last_of_stroke
+    first = np.flatnonzero(begins)
+    end = np.append(first[1:], len(shade))
+    # Where a stroke ends the piece does, elsewhere it reaches the next one.
+    last = np.where(last_of_stroke[end - 1], end - 1, np.minimum(end, len(shade) - 1))
+    start = np.concatenate([[0], np.cumsum(last - first + 1)])
+    point = np.arange(start[-1]) + np.repeat(first - start[:-1], last - first + 1)
+    return point, start, first
+
+
+def _sides(
+    points: np.ndarray, radius: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) points half a width to either side of polylines."""
+    ahead = np.zeros_like(points)
+    ahead[:-1] = points[1:] - points[:-1]
+    length = np.hypot(*ahead.T)
+    ahead /= np.where(length > 0, length, 1)[:, None]
+    behind = np.roll(ahead, 1, axis=0)
+    ahead[start[1:] - 1] = behind[start[1:] - 1]
+    behind[start[:-1]] = ahead[start[:-1]]
+    middle = ahead + behind
+    size = np.hypot(*middle.T)
+    back = size < 1e-6
+    middle = np.where(back[:, None], ahead, middle / np.where(back, 1, size)[:, None])
+    # Half the width of each straight piece, so more where two meet at an angle.
+    farther = np.minimum(2 / np.maximum(size, 1e-6), MITRE)
+    off = (radius * farther)[:, None] * middle[:, ::-1] * (1, -1)
+    return points + off, points - off
+
+
+def _outline(left: np.ndarray, right: np.ndarray, ends: tuple[float, float]) -> str:
+    """Down one side, around the end, back on the other, and around the beginning."""
+    back = right[::-1]
+    return (
+        f"M{_listed(left)} {_turn(ends[1])}{_listed(back[:1])} L{_listed(back[1:])} "
+        f"{_turn(ends[0])}{_listed(left[:1])}Z"
+    )
+
+
+def _turn(radius: float) -> str:
+    """Half a circle clockwise, or straight where it would not be seen."""
+    return f"A{radius:.2f},{radius:.2f} 0 0 1 " if radius >= 0.05 else "L"
+
+
 def _path(points: np.ndarray) -> str:
-    return "M" + " ".join(f"{x:.2f},{y:.2f}" for x, y in points.tolist())
+    return f"M{_listed(points)}"
+
+
+def _listed(points: np.ndarray) -> str:
+    return " ".join(f"{x:.2f},{y:.2f}" for x, y in points.tolist())
 
 
 def simplified(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 
@@ -462,19 +463,25 @@ def svg_of(**more):
     return ElementTree.fromstring(svg_text(drawn, camera, Pen(**more))), drawn
 
 
-def test_svg_has_a_layer_a_family():
-    root, _ = svg_of(millimetres=100, colours=("red", "#00f"))
+def test_svg_has_a_layer_a_family_and_a_path_a_stroke():
+    root, drawn = svg_of(millimetres=100, colours=("red", "#00f"))
     space = "{http://www.inkscape.org/namespaces/inkscape}"
     layers = root.findall("{http://www.w3.org/2000/svg}g")
-    assert [layer.get(space + "label") for layer in layers] == ["family 1", "family 2"]
+    assert [layer.get(space + "label") for layer in layers] == ["paper", "family 1", "family 2"]
     assert all(layer.get(space + "groupmode") == "layer" for layer in layers)
-    assert [layer.get("stroke") for layer in layers] == ["red", "#00f"]
+    assert [layer.get("stroke") for layer in layers[1:]] == ["red", "#00f"]
     assert (root.get("width"), root.get("height")) == ("100mm", "50mm")
     assert root.get("viewBox") == "0 0 200 100"
-    for path in root.iter("{http://www.w3.org/2000/svg}path"):
-        points = np.array([pair.split(",") for pair in path.get("d")[1:].split()], dtype=float)
+    paths = list(root.iter("{http://www.w3.org/2000/svg}path"))
+    assert len(paths) == len(drawn)
+    for path in paths:
+        assert path.get("d").endswith("Z") == (path.get("stroke") == "none")
+        # An outline goes around the points of its stroke, half the width of the pen away.
+        without_arcs = re.sub(r"A\S+ 0 0 1", "", path.get("d"))
+        pairs = re.findall(r"(-?[\d.]+),(-?[\d.]+)", without_arcs)
+        points = np.array(pairs, dtype=float)
         assert len(points) >= 2
-        assert (points >= 0).all() and (points <= (200, 100)).all()
+        assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
 def test_plotters_get_whole_lines_in_a_short_order():
@@ -540,7 +547,7 @@ def test_command_line(tmp_path, capsys):
     ]
     assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
     root = ElementTree.parse(out).getroot()
-    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 3
+    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
     once = out.read_bytes()
     assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
     assert out.read_bytes() == once

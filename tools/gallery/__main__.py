@@ -19,7 +19,16 @@ PAGES = {
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
 #: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
-OTHERS = ("hero", "looks-page", "hatching-page", "fields-page", "turntable", "performance")
+OTHERS = (
+    "hero",
+    "looks-page",
+    "hatching-page",
+    "presets-page",
+    "peers",
+    "fields-page",
+    "turntable",
+    "performance",
+)
 
 
 def main() -> int:

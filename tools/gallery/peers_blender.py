@@ -1,0 +1,293 @@
+"""Suzanne as Blender's own line renderers draw her, and as RoSy does. Run by Blender 5:
+
+    blender -b --factory-startup -P tools/gallery/peers_blender.py -- FOLDER [NAME ...]
+
+One mesh, one camera and one sun for all. Writes a .png for each into FOLDER, and `seconds.json`:
+the processor's time that each took, the render included. `python -m tools.gallery peers FOLDER`
+puts the pictures side by side.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+from mathutils import Vector
+
+ROOT = Path(__file__).resolve().parents[2]
+
+#: Pixels, twice the size at which the pictures are shown.
+WIDTH, HEIGHT = 804, 660
+INK = (0.006, 0.006, 0.008)
+
+#: Toward the light, as the camera sees it: over the left shoulder, RoSy's own lamp.
+LAMP = Vector((-0.50, 0.60, 0.62)).normalized()
+
+#: Kinds of edges that a line set of Freestyle may draw.
+EDGES = (
+    "silhouette",
+    "border",
+    "crease",
+    "ridge_valley",
+    "suggestive_contour",
+    "material_boundary",
+    "contour",
+    "external_contour",
+    "edge_mark",
+)
+
+Prepare = Callable[[bpy.types.Object], None]
+
+
+def main() -> None:
+    """Draw those that are named, or all."""
+    folder, *names = sys.argv[sys.argv.index("--") + 1 :]
+    load_rosy()
+    kept = Path(folder).resolve() / "seconds.json"
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    seconds = json.loads(kept.read_text()) if kept.exists() else {}
+    for prepare in (line_art, freestyle, shader, rosy):
+        if not names or prepare.__name__ in names:
+            seconds[prepare.__name__] = drawn(prepare, kept.with_name(f"{prepare.__name__}.png"))
+            kept.write_text(json.dumps(seconds, indent=1) + "\n", encoding="utf-8")
+
+
+def drawn(prepare: Prepare, path: Path) -> float:
+    """Processor seconds of preparing and rendering, the second time: shaders are compiled then."""
+    for _ in range(2):
+        monkey = new_scene()
+        start = time.process_time()
+        prepare(monkey)
+        bpy.context.scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+    return time.process_time() - start
+
+
+def load_rosy() -> None:
+    """The repository's root as the package `rosy`, switched on."""
+    spec = importlib.util.spec_from_file_location(
+        "rosy", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["rosy"] = module
+    spec.loader.exec_module(module)
+    module.register()
+
+
+def new_scene() -> bpy.types.Object:
+    """Suzanne, white and subdivided, before a camera, under a sun, on white."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    scene = bpy.context.scene
+    scene.rosy.bakes.clear()
+    bpy.ops.mesh.primitive_monkey_add()
+    monkey = bpy.context.object
+    # Two levels are the mesh, as its edges can be marked, and one is on top.
+    subdivide(monkey, 2)
+    bpy.ops.object.modifier_apply(modifier=monkey.modifiers[0].name)
+    subdivide(monkey, 1)
+    bpy.ops.object.shade_smooth()
+    monkey.data.materials.append(plain("White", (1, 1, 1)))
+
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    camera.data.lens, camera.data.shift_x, camera.data.shift_y = 82, -0.082, -0.004
+    place = Vector((-2.62, -5.35, 0.88))
+    camera.location = place
+    camera.rotation_euler = (Vector((0, 0, -0.02)) - place).to_track_quat("-Z", "Y").to_euler()
+    scene.camera = camera
+    bpy.context.view_layer.update()
+
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    scene.collection.objects.link(sun)
+    toward = camera.matrix_world.to_3x3() @ LAMP
+    sun.rotation_euler = toward.to_track_quat("Z", "Y").to_euler()
+    sun.data.energy, sun.data.angle = 3.14159, 0
+
+    world = bpy.data.worlds.new("White")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (1, 1, 1, 1)
+    scene.world = world
+    scene.view_settings.view_transform = "Standard"
+    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
+    scene.render.resolution_percentage = 100
+    scene.render.use_freestyle = False
+    use_cycles()
+    return monkey
+
+
+def subdivide(thing: bpy.types.Object, levels: int) -> None:
+    modifier = thing.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = modifier.render_levels = levels
+
+
+def use_cycles() -> None:
+    """Enough for flat colours: they have no noise."""
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.samples = "CPU", 16
+    scene.cycles.use_denoising = False
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.max_bounces = 0
+
+
+def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    """A material that is of one colour, lit or not."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    glow = nodes.new("ShaderNodeEmission")
+    glow.inputs["Color"].default_value = (*colour, 1)
+    links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material
+
+
+def line_art(monkey: bpy.types.Object) -> None:
+    """Contours and creases, thinner toward their ends."""
+    bpy.ops.object.select_all(action="DESELECT")
+    monkey.select_set(True)
+    bpy.context.view_layer.objects.active = monkey
+    bpy.ops.object.grease_pencil_add(type="LINEART_OBJECT")
+    lines = bpy.context.object
+    for material in lines.data.materials:
+        material.grease_pencil.color = (*INK, 1)
+    drawing = lines.modifiers[0]
+    drawing.radius = 0.011
+    drawing.use_crease = drawing.use_crease_on_smooth = True
+    drawing.crease_threshold = 2.53
+    taper = lines.modifiers.new("Taper", "GREASE_PENCIL_THICKNESS")
+    taper.use_custom_curve = True
+    points = taper.custom_curve.curves[0].points
+    points[0].location, points[1].location = (0, 0.15), (1, 0.15)
+    points.new(0.5, 1.0)
+    taper.custom_curve.update()
+
+
+def freestyle(monkey: bpy.types.Object) -> None:
+    """Sketched contours, and as hatching the edges of the mesh that lie in the shade, marked."""
+    mark_shaded_edges(monkey)
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    scene.render.use_freestyle = layer.use_freestyle = True
+    scene.render.line_thickness_mode = "ABSOLUTE"
+    settings = layer.freestyle_settings
+    for lines in list(settings.linesets):
+        settings.linesets.remove(lines)
+    settings.use_smoothness = True
+    form = settings.linesets.new("Form")
+    chosen(form, "silhouette", "border", "crease", "external_contour", "suggestive_contour")
+    sketched(form, thickness=3.2, rounds=2, shake=2.0)
+    shade = settings.linesets.new("Shade")
+    chosen(shade, "edge_mark")
+    sketched(shade, thickness=2.2, rounds=2, shake=1.2)
+
+
+def mark_shaded_edges(monkey: bpy.types.Object) -> None:
+    """Mark level edges that face away from the sun: Freestyle has no light of its own."""
+    toward = bpy.data.objects["Sun"].matrix_world.to_3x3() @ Vector((0, 0, 1))
+    mesh = monkey.data
+    marks = mesh.attributes.get("freestyle_edge") or mesh.attributes.new(
+        "freestyle_edge", "BOOLEAN", "EDGE"
+    )
+    for edge in mesh.edges:
+        normal = sum((mesh.vertices[v].normal for v in edge.vertices), Vector()).normalized()
+        start, end = (mesh.vertices[v].co for v in edge.vertices)
+        level = abs((end - start).normalized().z) < 0.6
+        marks.data[edge.index].value = level and normal.dot(toward) < 0.45
+
+
+def chosen(lines: bpy.types.FreestyleLineSet, *kinds: str) -> None:
+    """Which edges a line set draws."""
+    for name in EDGES:
+        setattr(lines, f"select_{name}", name in kinds)
+
+
+def sketched(
+    lines: bpy.types.FreestyleLineSet, thickness: float, rounds: int, shake: float
+) -> None:
+    """Lines drawn several times over by an unsteady hand, thinner toward their ends."""
+    style = lines.linestyle or bpy.data.linestyles.new(lines.name)
+    lines.linestyle = style
+    style.color, style.thickness = INK, thickness
+    style.use_chaining, style.chaining, style.rounds = True, "SKETCHY", rounds
+    style.caps = "ROUND"
+    taper = style.thickness_modifiers.new("Taper", "ALONG_STROKE")
+    taper.mapping, taper.value_min, taper.value_max = "CURVE", 0.4, thickness
+    points = taper.curve.curves[0].points
+    points[0].location, points[1].location = (0, 0), (1, 0)
+    points.new(0.5, 1.0)
+    taper.curve.update()
+    hand = style.geometry_modifiers.new("Hand", "PERLIN_NOISE_2D")
+    hand.frequency, hand.amplitude, hand.octaves = 8, shake, 2
+
+
+def shader(monkey: bpy.types.Object) -> None:
+    """EEVEE: light turned into colour, and bands of the window that get wider where it is darker."""
+    scene = bpy.context.scene
+    scene.render.engine = "BLENDER_EEVEE"
+    scene.eevee.taa_render_samples = 16
+    material = bpy.data.materials.new("Hatching")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+
+    def maths(operation: str, *inputs: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
+        node = nodes.new("ShaderNodeMath")
+        node.operation = operation
+        for socket, value in zip(node.inputs, inputs, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node.outputs[0]
+
+    light = nodes.new("ShaderNodeShaderToRGB")
+    links.new(nodes.new("ShaderNodeBsdfDiffuse").outputs[0], light.inputs[0])
+    tone = nodes.new("ShaderNodeRGBToBW")
+    links.new(light.outputs[0], tone.inputs[0])
+    places = nodes.new("ShaderNodeTexCoord").outputs["Window"]
+    paper = None
+    # Bands at three angles, each from darker tones on.
+    for degrees, darker in ((40, 0.72), (-50, 0.45), (-5, 0.22)):
+        turned = nodes.new("ShaderNodeVectorRotate")
+        turned.rotation_type = "Z_AXIS"
+        links.new(places, turned.inputs["Vector"])
+        turned.inputs["Angle"].default_value = degrees * 3.14159 / 180
+        bands = nodes.new("ShaderNodeTexWave")
+        bands.inputs["Scale"].default_value = 26
+        bands.inputs["Distortion"].default_value = 1.2
+        bands.inputs["Detail Scale"].default_value = 0.6
+        links.new(turned.outputs[0], bands.inputs["Vector"])
+        width = maths("SUBTRACT", darker, tone.outputs[0])
+        line = maths(
+            "LESS_THAN", bands.outputs["Factor" if "Factor" in bands.outputs else "Fac"], width
+        )
+        clear = maths("SUBTRACT", 1.0, line)
+        paper = clear if paper is None else maths("MULTIPLY", paper, clear)
+    glow = nodes.new("ShaderNodeEmission")
+    links.new(paper, glow.inputs["Color"])
+    links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    monkey.data.materials.clear()
+    monkey.data.materials.append(material)
+    # The world would light the shadows.
+    world = bpy.context.scene.world.node_tree
+    rays, switch = world.nodes.new("ShaderNodeLightPath"), world.nodes["Background"]
+    world.links.new(rays.outputs["Is Camera Ray"], switch.inputs["Strength"])
+
+
+def rosy(monkey: bpy.types.Object) -> None:
+    """A field, a preset, a bake."""
+    bpy.context.view_layer.objects.active = monkey
+    monkey.select_set(True)
+    bpy.ops.rosy.field_generate(kind="curvature", reach=0.03)
+    bpy.ops.rosy.preset_apply(preset="cross-hatch")
+    bpy.ops.rosy.bake()
+
+
+if __name__ == "__main__":
+    main()

@@ -19,7 +19,15 @@ PAGES = {
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
 #: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
-OTHERS = ("hero", "looks-page", "hatching-page", "fields-page", "turntable", "performance")
+OTHERS = (
+    "preset-pictures",
+    "hero",
+    "looks-page",
+    "hatching-page",
+    "fields-page",
+    "turntable",
+    "performance",
+)
 
 
 def main() -> int:

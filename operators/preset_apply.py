@@ -22,7 +22,7 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
     preset: bpy.props.StringProperty(
         name="Preset",
         description="Name of a preset, RoSy's or your own, or the path of a .json file",
-        search=shelf.names,
+        search=lambda self, context, typed: shelf.names(),
         search_options={"SUGGESTION"},
     )
 

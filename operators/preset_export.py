@@ -23,7 +23,9 @@ class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
 
     filename_ext = ".json"
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    preset: bpy.props.StringProperty(search=shelf.names, **ANY_PRESET)
+    preset: bpy.props.StringProperty(
+        search=lambda self, context, typed: shelf.names(), **ANY_PRESET
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{Path(preset_of(self, context)).stem}.json"

@@ -18,17 +18,22 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
     bl_label = "Delete Preset"
     bl_options = {"REGISTER"}
 
-    preset: bpy.props.StringProperty(search=shelf.own_names, **ANY_PRESET)
+    preset: bpy.props.StringProperty(
+        search=lambda self, context, typed: shelf.own_names(), **ANY_PRESET
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return has_own(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        key = preset_of(self, context)
+        entry = shelf.entries().get(key)
+        name = key if entry is None else entry.preset.name
         return context.window_manager.invoke_confirm(
             self,
             event,
-            title=f"Delete the preset '{preset_of(self, context)}'?",
+            title=f"Delete the preset '{name}'?",
             message="This cannot be undone",
             confirm_text="Delete",
             icon="WARNING",

@@ -18,7 +18,9 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
     bl_label = "Rename Preset"
     bl_options = {"REGISTER"}
 
-    preset: bpy.props.StringProperty(search=shelf.own_names, **ANY_PRESET)
+    preset: bpy.props.StringProperty(
+        search=lambda self, context, typed: shelf.own_names(), **ANY_PRESET
+    )
     name: bpy.props.StringProperty(
         name="Name", description="What the preset is to be called", maxlen=LONGEST_NAME
     )

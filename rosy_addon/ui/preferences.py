@@ -20,7 +20,7 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         name="Preset",
         description="Look that a scene starts from, by name or as the path of one's own preset; "
         "empty: RoSy's own",
-        search=shelf.names,
+        search=lambda self, context, typed: shelf.names(),
         search_options={"SUGGESTION"},
     )
     directory: bpy.props.StringProperty(

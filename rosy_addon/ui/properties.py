@@ -100,7 +100,7 @@ class RosyScene(bpy.types.PropertyGroup):
     look: bpy.props.PointerProperty(type=RosyLook)
     preset: bpy.props.EnumProperty(
         name="Preset",
-        description="Look to take over; the settings below start from it",
+        description="Look to start from",
         items=shelf.items,
         get=shelf.get_chosen,
         set=shelf.set_chosen,

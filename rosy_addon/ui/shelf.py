@@ -84,12 +84,12 @@ def faults() -> list[str]:
     return _SHELF.faults
 
 
-def names(*_: Any) -> list[str]:
+def names() -> list[str]:
     """What presets are called by, for properties that search."""
     return list(entries())
 
 
-def own_names(*_: Any) -> list[str]:
+def own_names() -> list[str]:
     """The same of the user's own."""
     return [key for key, entry in entries().items() if entry.own]
 

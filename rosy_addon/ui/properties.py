@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from dataclasses import fields
 from typing import Any
 
@@ -212,7 +213,14 @@ def unregister() -> None:
 def ensure_registered() -> None:
     """Add the properties unless they are there, as they are while the extension is on.
 
-    For the command line and scripts that run without the extension.
+    For the command line and scripts that run without the extension. As Python ends they go again:
+    Blender's Python module cannot let go of them after that.
     """
     if not has_properties():
         register()
+        atexit.register(_unregister_if_there)
+
+
+def _unregister_if_there() -> None:
+    if has_properties():
+        unregister()

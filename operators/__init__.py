@@ -14,6 +14,11 @@ from . import (
     field_generate,
     field_import,
     preset_apply,
+    preset_export,
+    preset_import,
+    preset_remove,
+    preset_rename,
+    preset_save,
     remove,
     show,
     singularities,
@@ -35,6 +40,11 @@ MODULES = (
     show,
     remove,
     preset_apply,
+    preset_save,
+    preset_rename,
+    preset_remove,
+    preset_import,
+    preset_export,
 )
 
 

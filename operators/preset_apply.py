@@ -6,9 +6,10 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.compositor.presets import load_preset, preset_names
+from ..rosy_addon.compositor.presets import load_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.ui.properties import apply_look
+from ..rosy_addon.scene.folders import presets_folder
+from ..rosy_addon.ui import shelf
 
 
 class ROSY_OT_preset_apply(bpy.types.Operator):
@@ -20,8 +21,8 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
 
     preset: bpy.props.StringProperty(
         name="Preset",
-        description="Name of a preset that comes with RoSy, or path of one's own",
-        search=lambda self, context, typed: preset_names(),
+        description="Name of a preset, RoSy's or your own, or the path of a .json file",
+        search=lambda self, context, typed: shelf.names(),
         search_options={"SUGGESTION"},
     )
 
@@ -29,13 +30,13 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
     def description(cls, context: bpy.types.Context, properties: Any) -> str:
         """What the preset says of itself."""
         try:
-            return load_preset(properties.preset).description
+            return load_preset(properties.preset, presets_folder()).description
         except RosyError as error:
             return str(error)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            apply_look(context.scene.rosy, load_preset(self.preset).look)
+            shelf.apply_preset(context.scene.rosy, self.preset)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

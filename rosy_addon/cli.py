@@ -1,6 +1,6 @@
 """The command line, the same in Blender and in plain Python.
 
-``render``, ``strokes``, ``field`` and ``info`` need numpy alone; ``bake`` needs a Blender, or its Python module.
+``render``, ``strokes``, ``field``, ``info`` and ``presets`` need numpy alone; ``bake`` needs a Blender, or its Python module.
 """
 
 from __future__ import annotations
@@ -19,7 +19,15 @@ import numpy as np
 from .compositor.compose import compose
 from .compositor.look import Look
 from .compositor.png import write_png
-from .compositor.presets import load_preset, preset_names
+from .compositor.presets import (
+    FOLDER,
+    find_preset,
+    load_preset,
+    own_folder,
+    preset_files,
+    preset_names,
+    read_preset,
+)
 from .errors import RosyError
 from .field.analysis import angle_errors, error_facts, field_energy
 from .field.convert import Conversion, convert
@@ -208,6 +216,35 @@ def info(options: argparse.Namespace) -> None:
     print(json.dumps(facts) if options.json else _in_words(facts))
 
 
+def presets(options: argparse.Namespace) -> None:
+    """Say which presets there are and what they are like, RoSy's and the user's own."""
+    own, listed = _own_presets(), []
+    for key, path in preset_files(own).items():
+        try:
+            found = read_preset(path)
+        except RosyError as fault:
+            _note(str(fault))
+            continue
+        words = {"preset": key, "name": found.name, "description": found.description}
+        listed.append(words | {"own": path.parent == own})
+    if options.json:
+        print(json.dumps(listed))
+        return
+    width = max(len(each["preset"]) for each in listed)
+    for each in listed:
+        print(f"{each['preset']:{width}}  {each['description']}{'  (own)' * each['own']}")
+    print(f"your own are in {own}")
+
+
+def _own_presets() -> Path:
+    """The folder of the user's own presets: Blender's, if this runs in one."""
+    if "bpy" not in sys.modules:
+        return own_folder()
+    from .scene.folders import presets_folder
+
+    return presets_folder()
+
+
 def _compared(
     options: argparse.Namespace,
     surface: Surface,
@@ -377,13 +414,18 @@ def _same_for_others(options: argparse.Namespace) -> list[str]:
     if options.size is not None:
         words += ["--size", f"{options.size[0]}x{options.size[1]}"]
     if options.preset is not None:
-        preset = Path(options.preset)
-        words += ["--preset", str(preset.resolve()) if preset.suffix else options.preset]
+        words += ["--preset", _preset_for_others(options.preset)]
     if options.device is not None:
         words += ["--device", options.device]
     for text in options.set:
         words += ["--set", text]
     return words
+
+
+def _preset_for_others(preset: str) -> str:
+    """RoSy's own by its name, for it may lie elsewhere there; another's by its path."""
+    path = find_preset(preset, _own_presets())
+    return path.stem if path.parent == FOLDER else str(path.resolve())
 
 
 def _cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
@@ -446,7 +488,7 @@ def _note(text: str) -> None:
 
 
 def _look(options: argparse.Namespace, default: Look) -> Look:
-    look = load_preset(options.preset).look if options.preset else default
+    look = load_preset(options.preset, _own_presets()).look if options.preset else default
     return look.with_settings(dict(_setting(text) for text in options.set))
 
 
@@ -523,7 +565,15 @@ def _parser(prog: str) -> argparse.ArgumentParser:
         prog=prog, description="Draw N-way rotational symmetry fields on meshes."
     )
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    for add in (_add_bake, _add_render, _add_strokes, _add_turntable, _add_field, _add_info):
+    for add in (
+        _add_bake,
+        _add_render,
+        _add_strokes,
+        _add_turntable,
+        _add_field,
+        _add_info,
+        _add_presets,
+    ):
         add(verbs)
     return parser
 
@@ -703,6 +753,11 @@ def _add_info(verbs: Any) -> None:
     )
 
 
+def _add_presets(verbs: Any) -> None:
+    verb = _verb(verbs, "presets", presets)
+    verb.add_argument("--json", action="store_true", help="as a list of objects")
+
+
 def _verb(verbs: Any, name: str, function: Callable) -> argparse.ArgumentParser:
     text = function.__doc__.splitlines()[0]
     verb = verbs.add_parser(name, help=text, description=text)
@@ -766,7 +821,9 @@ def _add_mesh(verb: argparse.ArgumentParser) -> None:
 
 def _add_look(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
-        "--preset", metavar="NAME", help=f"{', '.join(preset_names())}, or a .json file of your own"
+        "--preset",
+        metavar="NAME",
+        help=f"{', '.join(preset_names())}, one of your own, or a .json file; see `presets`",
     )
     verb.add_argument(
         "--set",

@@ -9,7 +9,9 @@ from pathlib import Path
 from .errors import RosyError
 
 
-def read_bytes(path: str | os.PathLike[str], *, text: bool = False) -> bytes:
+def read_bytes(
+    path: str | os.PathLike[str], *, text: bool = False, limit: int | None = None
+) -> bytes:
     """The contents of a file.
 
     Parameters
@@ -17,18 +19,24 @@ def read_bytes(path: str | os.PathLike[str], *, text: bool = False) -> bytes:
     path : path-like
     text : bool
         Whether to refuse a file that begins like a binary one, before the rest of it is read.
+    limit : int, optional
+        Of bytes; no more than one above it is read.
 
     Raises
     ------
     RosyError
-        If it is missing, a folder, may not be read, or is binary where text is wanted.
+        If it is missing, a folder, may not be read, is larger than the limit, or is binary where
+        text is wanted.
     """
     try:
         with open(path, "rb") as file:
             head = file.read(4096)
             if text and b"\0" in head:
                 raise RosyError(f"{path}: holds binary data, text is wanted")
-            return head + file.read()
+            data = head + file.read(-1 if limit is None else max(limit + 1 - len(head), 0))
+        if limit is not None and len(data) > limit:
+            raise RosyError(f"{path}: is too large: {limit:,} bytes at most")
+        return data
     except RosyError:
         raise
     except (OSError, ValueError) as reason:

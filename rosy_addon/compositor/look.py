@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import reprlib
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -203,21 +204,22 @@ class Look:
 
 
 def _check_setting(name: str, value: Any, default: Any, rules: Any) -> None:
+    said = reprlib.repr(value)  # one short line, whatever a file holds
     if "colour" in rules:
         if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
-            raise RosyError(f"setting '{name}' is {value!r}, not a colour like #08080d")
+            raise RosyError(f"setting '{name}' is {said}, not a colour like #08080d")
     elif "options" in rules:
-        if value not in rules["options"]:
+        if not isinstance(value, str) or value not in rules["options"]:
             wanted = ", ".join(rules["options"])
-            raise RosyError(f"setting '{name}' is {value!r}, not one of {wanted}")
+            raise RosyError(f"setting '{name}' is {said}, not one of {wanted}")
     elif "low" in rules:
         whole = isinstance(default, int)
         kind = int if whole else (int, float)
         if isinstance(value, bool) or not isinstance(value, kind):
-            raise RosyError(f"setting '{name}' is {value!r}, not a {'whole ' * whole}number")
+            raise RosyError(f"setting '{name}' is {said}, not a {'whole ' * whole}number")
         if not rules["low"] <= value <= rules["high"]:
             raise RosyError(
-                f"setting '{name}' is {value}, not from {rules['low']} to {rules['high']}"
+                f"setting '{name}' is {said}, not from {rules['low']} to {rules['high']}"
             )
     elif not isinstance(value, bool):
-        raise RosyError(f"setting '{name}' is {value!r}, not true or false")
+        raise RosyError(f"setting '{name}' is {said}, not true or false")

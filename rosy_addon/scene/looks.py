@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from typing import Any
 
@@ -27,6 +28,18 @@ def apply_look(settings: Any, look: Look) -> None:
     for entry in fields(Look):
         value = getattr(look, entry.name)
         setattr(group, entry.name, from_hex(value) if "colour" in entry.metadata else value)
+
+
+def is_look_of(settings: Any, look: Look) -> bool:
+    """Whether the properties hold a look, as far as Blender can tell numbers and colours apart."""
+    held = look_of(settings)
+    return all(_alike(getattr(held, each.name), getattr(look, each.name)) for each in fields(Look))
+
+
+def _alike(one: Any, other: Any) -> bool:
+    if isinstance(one, str):
+        return one == other.lower()
+    return math.isclose(one, other, rel_tol=1e-6)
 
 
 def _exact(value: Any, entry: Any) -> Any:

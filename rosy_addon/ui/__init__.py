@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from . import panels, preferences, properties
+from . import panels, preferences, properties, shelf
 
 MODULES = (preferences, panels)
 
 
 def register() -> None:
     """Add properties, panels and preferences to Blender."""
+    shelf.register()
     properties.register()
     for module in MODULES:
         for cls in module.CLASSES:
@@ -25,3 +26,4 @@ def unregister() -> None:
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)
     properties.unregister()
+    shelf.unregister()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import fields
 from typing import Any
 
@@ -9,11 +10,10 @@ import bpy
 
 from .. import live
 from ..compositor.look import Look
-from ..compositor.presets import load_preset, preset_names
 from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
-from . import overlay, status
+from . import overlay, shelf, status
 from .generators import settings_of_generator
 
 #: Settings of a look, in the groups in which a user looks for them.
@@ -66,6 +66,10 @@ OUTPUT = (
 #: Where a property's own name does not fit beside its value in a sidebar of usual width.
 SHORT_NAMES = {"magnitude_range": "Top Value", "undefined": "Skip Bad Vectors"}
 
+
+#: Height of the picture of a preset, in the panel and where one is chosen: 128 pixels, half of what
+#: it has, if the screen's pixels are of usual size.
+PICTURE = 6.4
 
 #: What an empty setting of the generator stands for.
 IF_EMPTY = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
@@ -264,17 +268,60 @@ class VIEW3D_PT_rosy_look(_Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.menu("VIEW3D_MT_rosy_presets", icon="PRESET")
+        settings = context.scene.rosy
+        column = self.layout.column(align=True)
+        column.template_icon_view(
+            settings, "preset", show_labels=True, scale=PICTURE, scale_popup=PICTURE
+        )
+        entry, changed = shelf.chosen(settings), shelf.is_changed(settings)
+        row = column.row(align=True)
+        name = settings.preset_name if entry is None else entry.preset.name
+        row.label(text=f"{name}, changed" if changed else name)
+        row.operator("rosy.preset_save", text="", icon="ADD")
+        row.menu("VIEW3D_MT_rosy_presets", text="", icon="DOWNARROW_HLT")
+        if entry is not None:
+            lines = column.column(align=True)
+            lines.scale_y, lines.active = 0.8, False
+            for line in _lines(entry.preset.description, context):
+                lines.label(text=line)
 
 
 class VIEW3D_MT_rosy_presets(bpy.types.Menu):
-    """Looks that come with RoSy."""
+    """What can be done with presets."""
 
     bl_label = "Presets"
 
     def draw(self, context: bpy.types.Context) -> None:
-        for name in preset_names():
-            self.layout.operator("rosy.preset_apply", text=load_preset(name).name).preset = name
+        layout, settings = self.layout, context.scene.rosy
+        entry = shelf.chosen(settings)
+        row = layout.row()
+        row.enabled = entry is not None and shelf.is_changed(settings)
+        again = row.operator("rosy.preset_apply", text="Take the Look Again", icon="LOOP_BACK")
+        again.preset = settings.preset_name
+        layout.separator()
+        layout.operator("rosy.preset_save", text="Save Look as Preset...", icon="ADD")
+        column = layout.column()
+        column.enabled = entry is not None and entry.own
+        for verb, text, icon in (
+            ("rename", "Rename...", "GREASEPENCIL"),
+            ("remove", "Delete...", "TRASH"),
+        ):
+            operator = column.operator(f"rosy.preset_{verb}", text=text, icon=icon)
+            operator.preset = settings.preset_name
+        layout.separator()
+        layout.operator("rosy.preset_import", text="Import...", icon="IMPORT")
+        row = layout.row()
+        row.enabled = entry is not None
+        export = row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
+        export.preset = settings.preset_name
+        for fault in shelf.faults():
+            layout.label(text=fault, icon="ERROR")
+
+
+def _lines(words: str, context: bpy.types.Context) -> list[str]:
+    """A sentence in lines that fit into the sidebar."""
+    letter = 6.5 * context.preferences.system.ui_scale  # pixels, of most letters
+    return textwrap.wrap(words, max(int(context.region.width / letter) - 6, 12))
 
 
 def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...]) -> type:

@@ -7,11 +7,8 @@ from dataclasses import fields
 import bpy
 
 from ..compositor.look import Look
-from ..compositor.presets import load_preset, preset_names
-from .properties import apply_look
-
-#: The extension's own name in Blender: this file is two packages below it.
-EXTENSION = __package__.rsplit(".", 2)[0]
+from ..scene.folders import EXTENSION
+from . import shelf
 
 
 class ROSY_AP_preferences(bpy.types.AddonPreferences):
@@ -23,7 +20,7 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         name="Preset",
         description="Look that a scene starts from, by name or as the path of one's own preset; "
         "empty: RoSy's own",
-        search=lambda self, context, typed: preset_names(),
+        search=lambda self, context, typed: shelf.names(),
         search_options={"SUGGESTION"},
     )
     directory: bpy.props.StringProperty(
@@ -55,7 +52,7 @@ def start_scene(context: bpy.types.Context) -> None:
     wished = extension.preferences
     untouched = not any(settings.look.is_property_set(entry.name) for entry in fields(Look))
     if wished.preset and untouched:
-        apply_look(settings, load_preset(wished.preset).look)
+        shelf.apply_preset(settings, wished.preset)
     if wished.directory and not settings.is_property_set("directory"):
         settings.directory = wished.directory
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from dataclasses import fields
 from typing import Any
 
@@ -9,11 +10,13 @@ import bpy
 
 from ..compositor.colour import from_hex
 from ..compositor.look import Look
+from ..compositor.presets import DEFAULT
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.painter import DEVICES
 from ..scene.attributes import DEFAULT_DEGREE, DEFAULT_NAME
 from ..scene.capabilities import folder_options, has_properties
 from ..scene.looks import apply_look, look_of
+from . import shelf
 
 __all__ = ["apply_look", "ensure_registered", "look_of", "register", "unregister"]
 
@@ -96,6 +99,19 @@ class RosyScene(bpy.types.PropertyGroup):
     """How the fields of a scene are drawn, and what was baked."""
 
     look: bpy.props.PointerProperty(type=RosyLook)
+    preset: bpy.props.EnumProperty(
+        name="Preset",
+        description="Look to start from",
+        items=shelf.items,
+        get=shelf.get_chosen,
+        set=shelf.set_chosen,
+        options={"SKIP_SAVE"},
+    )
+    preset_name: bpy.props.StringProperty(
+        description="What the preset is called by that the look was taken from",
+        default=DEFAULT,
+        options={"HIDDEN"},
+    )
     camera: bpy.props.EnumProperty(
         name="Camera", description="From where the fields are drawn", items=CAMERAS
     )
@@ -197,7 +213,14 @@ def unregister() -> None:
 def ensure_registered() -> None:
     """Add the properties unless they are there, as they are while the extension is on.
 
-    For the command line and scripts that run without the extension.
+    For the command line and scripts that run without the extension. As Python ends they go again:
+    Blender's Python module cannot let go of them after that.
     """
     if not has_properties():
         register()
+        atexit.register(_unregister_if_there)
+
+
+def _unregister_if_there() -> None:
+    if has_properties():
+        unregister()

@@ -101,7 +101,7 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         shots = folder / "shots"
         shots.mkdir()
         environment["ROSY_SHOTS"] = str(shots)
-        for script in ("window.py", "window_live.py"):
+        for script in ("window.py", "window_presets.py", "window_live.py"):
             said = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(said)
             patience = 900 if "ROSY_LIVE_MANY" in environment else 420

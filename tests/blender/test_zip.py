@@ -23,5 +23,9 @@ def test_contents():
         "toml",
         "json",
         "glsl",
+        "png",
     }
+    pictures = {name for name in names if name.endswith(".png")}
+    looks = {name for name in names if name.startswith("presets/") and name.endswith(".json")}
+    assert pictures == {name.replace(".json", ".png") for name in looks}
     assert os.path.getsize(path) < 1_000_000

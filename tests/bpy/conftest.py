@@ -28,7 +28,7 @@ else:
     sys.path.insert(0, str(Path(__file__).resolve().parent))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     _import_extension()
-    importlib.import_module("rosy.rosy_addon.ui.properties").register()
+    importlib.import_module("rosy.rosy_addon.ui.properties").ensure_registered()
 
 
 @pytest.fixture

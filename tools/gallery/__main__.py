@@ -20,6 +20,7 @@ PAGES = {
 }
 #: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
 OTHERS = (
+    "preset-pictures",
     "hero",
     "looks-page",
     "hatching-page",

@@ -1,0 +1,45 @@
+"""Write a preset to a file that can be passed on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ..rosy_addon.compositor.presets import load_preset, write_preset
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.scene.folders import presets_folder
+from ..rosy_addon.ui import shelf
+from .shelved import ANY_PRESET, preset_of
+
+
+class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
+    """Write a preset to a file that others can import; its picture is drawn again there"""
+
+    bl_idname = "rosy.preset_export"
+    bl_label = "Export Preset"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".json"
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+    preset: bpy.props.StringProperty(
+        search=lambda self, context, typed: shelf.names(), **ANY_PRESET
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = f"{Path(preset_of(self, context)).stem}.json"
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        try:
+            write_preset(path, load_preset(preset_of(self, context), presets_folder()))
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Wrote {path}")
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_preset_export,)

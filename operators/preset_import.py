@@ -1,0 +1,39 @@
+"""Add a preset that somebody passed on to the user's own."""
+
+from __future__ import annotations
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ..rosy_addon.compositor.presets import read_preset, save_preset
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.scene.folders import presets_folder
+
+
+class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
+    """Add a preset from a file to your own, and draw its picture"""
+
+    bl_idname = "rosy.preset_import"
+    bl_label = "Import Preset"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".json"
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+    replace: bpy.props.BoolProperty(
+        name="Replace the One There",
+        description="Let it take the place of a preset of yours that is called the same",
+        options={"SKIP_SAVE"},
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            preset = read_preset(bpy.path.abspath(self.filepath))
+            save_preset(preset, presets_folder(), replace=self.replace)
+        except RosyError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Added preset '{preset.name}' to your own")
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_preset_import,)

@@ -1,0 +1,30 @@
+"""The pictures of the presets that come with RoSy, which lie beside them and are in the zip."""
+
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.presets import picture_path, preset_files, read_preset
+from rosy_addon.compositor.preview import draw_preview
+
+from .sheet import display
+
+#: Of a picture of few hues; and between tones of a channel, where many hues blend. Neither is to
+#: be seen, and both make the files a third as large.
+COLOURS, TONE = 64, 8
+
+
+def write() -> None:
+    """Draw them all."""
+    for path in preset_files().values():
+        _small(read_preset(path).look).save(picture_path(path), optimize=True)
+
+
+def _small(look: Look) -> Image.Image:
+    shown = display(draw_preview(look))
+    if look.noise == "colour":
+        return Image.fromarray(np.minimum(np.rint(shown / TONE) * TONE, 255).astype(np.uint8))
+    few = Image.Quantize.MEDIANCUT
+    return Image.fromarray(shown).quantize(COLOURS, few, kmeans=2, dither=Image.Dither.NONE)

@@ -64,6 +64,8 @@ class ROSY_OT_strokes(Ticking, bpy.types.Operator):
         self.report(
             {"INFO"}, f"{len(result.drawn.strokes):,} strokes from '{result.camera}': {where}"
         )
+        for note in result.notes:
+            self.report({"WARNING"}, note)
 
     def _objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         found = rosy_objects(context.view_layer)

@@ -34,12 +34,15 @@ class Sketch:
         The object in the scene.
     path : Path or None
         The file.
+    notes : tuple of str
+        What the user should know.
     """
 
     camera: str
     drawn: Drawn
     thing: bpy.types.Object | None = None
     path: Path | None = None
+    notes: tuple[str, ...] = ()
 
 
 def sketching(
@@ -113,7 +116,7 @@ def sketching(
         write_svg(path, drawn.strokes, view, pen)
         return Sketch(view.name, drawn, path=path)
     thing = put_strokes(scene, kind, drawn, view, pen, _only_owner(reading))
-    return Sketch(view.name, drawn, thing)
+    return Sketch(view.name, drawn, thing, notes=tuple(_notes(scene, thing, manner)))
 
 
 def sketch(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None, **more) -> Sketch:
@@ -141,3 +144,10 @@ def svg_path(path: Path | str) -> Path:
 def _only_owner(reading: Reading) -> bpy.types.Object | None:
     """The object that strokes are to move with: the one that is drawn on, if there is but one."""
     return reading.owners[0] if len(reading.owners) == 1 else None
+
+
+def _notes(scene: bpy.types.Scene, thing: bpy.types.Object, manner: Manner) -> list[str]:
+    told = any(layer.use_pass_z for layer in scene.view_layers)
+    if not manner.hidden or thing.type == "CURVES" or told:
+        return []
+    return ["renders show Grease Pencil through surfaces, unless the view layer has the pass Z"]

@@ -34,9 +34,8 @@ NEAREST = 0.02
 #: full width counts for there.
 TOLERANCE, WIDTH_COUNTS = 0.08, 2.0
 
-#: Full widths of a pen by which lines lie in front of the surface, as the camera sees it: at a
-#: slant, a ribbon that faces the camera would else be half inside.
-LIFT = 2.0
+#: Steepness up to which lines are lifted farther off the surface.
+STEEPEST = 12.0
 
 
 def _setting(default: Any, text: str, **rules: Any) -> Any:
@@ -114,10 +113,13 @@ class Drawn:
         Families of all bodies by their names; the kinds of outline come last.
     body : (S,) int32 ndarray
         Of which body each stroke is, counted among all that were given.
+    hidden : bool
+        Whether those that the camera does not see are among them.
     """
 
     strokes: Strokes
     body: np.ndarray
+    hidden: bool = False
 
 
 def draw(bodies: Sequence[Body], camera: Camera, manner: Manner | None = None, **more) -> Drawn:
@@ -177,7 +179,7 @@ def drawing(
         raise RosyError(f"camera '{camera.name}' sees none of the strokes")
     counts = [len(one.names) for one in parts]
     body = np.repeat(np.array(owners, dtype=np.int32), counts)[strokes.family]
-    return Drawn(_by_name(strokes), body)
+    return Drawn(_by_name(strokes), body, manner.hidden)
 
 
 def _on_body(body: Body, camera: Camera, manner: Manner, lights: Sequence[Lamp]) -> Work[Strokes]:
@@ -250,7 +252,8 @@ def as_lines(drawn: Drawn, camera: Camera, pen: Pen) -> Lines:
     """Strokes as they are drawn with a pen whose width is in pixels of a camera."""
     strokes = thinned(drawn.strokes, camera)
     radius = pen.width / 2 * pixel_size(strokes.points, camera) * strokes.width
-    points = lifted(strokes, camera, LIFT * pen.width)
+    # Strokes that go on behind the silhouette have no side of their own to come forward on.
+    points = (raised if drawn.hidden else lifted)(strokes, camera, pen.width)
     return Lines(strokes, drawn.body, points, radius, pen.inks(strokes.names))
 
 
@@ -275,24 +278,31 @@ def thinned(strokes: Strokes, camera: Camera) -> Strokes:
     )
 
 
-def lifted(strokes: Strokes, camera: Camera, pixels: float) -> np.ndarray:
-    """(n, 3) float64: the points moved off the surface, along the rays of a camera.
+def raised(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
+    """(n, 3) float64: the points moved off the surface along its normals, by a width in pixels."""
+    return strokes.points + width * pixel_size(strokes.points, camera)[:, None] * strokes.normal
 
-    In the picture they stay where they are. Those on a side that the camera sees come nearer to
-    it, the others go away from it; outlines come nearer.
+
+def lifted(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
+    """(n, 3) float64: the points moved toward a camera that sees them.
+
+    In the picture they stay where they are. Ribbons of that width that face the camera are then in
+    front of the surface: the more slanted it is, the farther they have to come, and yet they are
+    hardly higher above it.
 
     Parameters
     ----------
     strokes : Strokes
     camera : Camera
-    pixels : float
-        How far, in pixels' lengths at a point's depth.
+    width : float
+        In pixels' lengths at a point's depth.
     """
     if camera.is_perspective:
         eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
         toward = unit(eye - strokes.points)
     else:
         toward = np.broadcast_to(camera.view[2, :3], strokes.points.shape)
-    away = (dot(strokes.normal, toward) < 0) & strokes.member.any(axis=1)
-    length = pixels * pixel_size(strokes.points, camera) * np.where(away, -1, 1)
+    facing = np.abs(dot(strokes.normal, toward))
+    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / STEEPEST)
+    length = width * (1 + steepness) * pixel_size(strokes.points, camera)
     return strokes.points + length[:, None] * toward

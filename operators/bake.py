@@ -48,11 +48,11 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
         scene = context.scene
         chosen = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
         if chosen == "VIEW":
-            return [_view_camera(context)]
+            return [view_camera(context)]
         return scene_cameras(scene) if chosen == "ALL" else [render_camera(scene)]
 
 
-def _view_camera(context: bpy.types.Context) -> Camera:
+def view_camera(context: bpy.types.Context) -> Camera:
     area = context.area
     if area is None or area.type != "VIEW_3D":
         raise RosyError("the current view can only be baked from a 3D view")

@@ -28,6 +28,7 @@ from .compositor.presets import (
     preset_names,
     read_preset,
 )
+from .compositor.shading import lights_of
 from .errors import RosyError
 from .field.analysis import angle_errors, error_facts, field_energy
 from .field.convert import Conversion, convert
@@ -47,15 +48,8 @@ from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
 from .projection.project import project
-from .strokes.crossings import with_gaps
-from .strokes.density import by_curvature, by_tone, headlight, pixel_spacing
-from .strokes.families import label_families
-from .strokes.ground import lay_ground
-from .strokes.outline import outline
-from .strokes.seen import seen
-from .strokes.strokes import Strokes
+from .strokes.draw import Manner, draw
 from .strokes.svg import Pen, write_svg
-from .strokes.trace import trace
 from .turntable import Encoder, check_film, has_ffmpeg, pictures, write_film
 
 #: Exit statuses: done, something the user can put right, stopped by Ctrl-C.
@@ -147,22 +141,17 @@ def strokes(options: argparse.Namespace) -> None:
     surface, field = _mesh_and_field(options)
     matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
     camera = _camera(options, surface.vertices @ matrix[:3, :3].T, 1)
-    body = Body(surface, matrix, field)
-    spacing = pixel_spacing(body, camera, options.spacing)
-    if options.tone:
-        spacing = by_tone(spacing, headlight(body, camera))
-    if options.curvature:
-        spacing = by_curvature(surface, spacing, options.curvature)
-    drawn = trace(body, spacing, cross_creases=options.cross_creases)
-    drawn = label_families(drawn, lay_ground(body), camera.view[0, :3])
-    if options.gaps:
-        drawn = with_gaps(drawn, options.gaps, weave=True)
-    if options.taper:
-        drawn = drawn.tapered(options.taper, 0.15)
-    if options.outline:
-        drawn = Strokes.joined(drawn, outline(body, camera))
-    drawn = seen(drawn, [body], camera, hide=not options.hidden)
-    write_svg(options.output, drawn, camera, pen)
+    manner = _manner(options)
+    drawn = draw([Body(surface, matrix, field)], camera, manner, lights=lights_of(manner, ()))
+    write_svg(options.output, drawn.strokes, camera, pen)
+
+
+def _manner(options: argparse.Namespace) -> Manner:
+    """How strokes are laid, by the options that are named as its fields."""
+    wished = {entry.name: getattr(options, entry.name, entry.default) for entry in fields(Manner)}
+    if options.distance is None:
+        return Manner(**{**wished, "unit": "pixels", "distance": Manner.distance})
+    return Manner(**{**wished, "unit": "length"})
 
 
 def _encoder(path: Path) -> Encoder | None:
@@ -637,7 +626,19 @@ def _add_strokes(verbs: Any) -> None:
         help="pixels between strokes of a family, where the surface faces the camera (%(default)g)",
     )
     verb.add_argument(
-        "--tone", action="store_true", help="nearer where a light at the camera leaves it darker"
+        "--distance",
+        type=_number(1e-6, 1e6),
+        metavar="UNITS",
+        help="between strokes of a family in units of the mesh, instead of pixels",
+    )
+    verb.add_argument(
+        "--tone", action="store_true", help="nearer where a light leaves the surface darker"
+    )
+    verb.add_argument(
+        "--light",
+        choices=("headlight", "lamp"),
+        default="headlight",
+        help="the light of --tone: at the camera, or a lamp over the left shoulder (%(default)s)",
     )
     verb.add_argument(
         "--curvature",

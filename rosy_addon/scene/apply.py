@@ -234,7 +234,7 @@ def apply_picture(
     check_appliable(owners, settings)
     name = shot.camera.name
     matrices = _object_matrices(reading, shot.camera)
-    with _all_or_nothing() as made:
+    with all_or_nothing() as made:
         image = new_image(
             f"RoSy {name}", shot.picture, as_float=settings.as_float, folder=settings.folder
         )
@@ -259,7 +259,7 @@ def apply_picture(
 
 
 @contextmanager
-def _all_or_nothing() -> Iterator[list[bpy.types.ID]]:
+def all_or_nothing() -> Iterator[list[bpy.types.ID]]:
     """A list for datablocks that are made: marked as RoSy's in the end, or deleted on an error."""
     made: list[bpy.types.ID] = []
     try:
@@ -268,7 +268,7 @@ def _all_or_nothing() -> Iterator[list[bpy.types.ID]]:
             datablock[MADE] = True
     except BaseException:
         for datablock in reversed(made):
-            _delete(datablock)
+            delete_made(datablock)
         raise
 
 
@@ -304,7 +304,7 @@ def apply_strip(
     The pictures fill the frame of the camera that renders, each at its own frame: any machine that
     has the files shows them, with or without RoSy.
     """
-    with _all_or_nothing() as made:
+    with all_or_nothing() as made:
         image = load_strip(strip.path, settings.as_float)
         made.append(image)
         image.name = f"RoSy {strip.name}"
@@ -391,8 +391,8 @@ def remove(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = 
         if objects is None or not records[index].objects:
             image, material = records[index].image, records[index].material
             records.remove(index)
-            materials += _delete(material)
-            images += _delete(image)
+            materials += delete_made(material)
+            images += delete_made(image)
     return Removed(len(chosen), images, materials, groups)
 
 
@@ -453,10 +453,10 @@ def _take_off(thing: bpy.types.Object) -> int:
     groups = {modifier.node_group for modifier in own}
     for modifier in own:
         thing.modifiers.remove(modifier)
-    return sum(_delete(group) for group in groups if not group.users)
+    return sum(delete_made(group) for group in groups if not group.users)
 
 
-def _delete(datablock: bpy.types.ID | None) -> int:
+def delete_made(datablock: bpy.types.ID | None) -> int:
     """Delete a datablock that RoSy made; 1 if it was one."""
     if datablock is None or not datablock.get(MADE, True):
         return 0
@@ -500,7 +500,7 @@ def _record_of(
     for before, after in zip(old, (material, image), strict=True):
         if before is not None:
             before.user_remap(after)
-            _delete(before)
+            delete_made(before)
             after.name = f"RoSy {name}"
     return record
 

@@ -27,3 +27,8 @@ def folder_options() -> set[str]:
     """
     known = "is_path_supports_blend_relative" in bpy.types.Property.bl_rna.properties
     return {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if known else {"ANIMATABLE"}
+
+
+def has_drawings() -> bool:
+    """Whether a frame of Grease Pencil holds a drawing with attributes, as from 4.3 on."""
+    return hasattr(bpy.types, "GreasePencilDrawing")

@@ -19,7 +19,7 @@ def look_of(settings: Any) -> Look:
         ``scene.rosy``, or its ``look``.
     """
     group = getattr(settings, "look", settings)
-    return Look(**{entry.name: _exact(getattr(group, entry.name), entry) for entry in fields(Look)})
+    return Look(**{entry.name: exact(getattr(group, entry.name), entry) for entry in fields(Look)})
 
 
 def apply_look(settings: Any, look: Look) -> None:
@@ -42,7 +42,7 @@ def _alike(one: Any, other: Any) -> bool:
     return math.isclose(one, other, rel_tol=1e-6)
 
 
-def _exact(value: Any, entry: Any) -> Any:
+def exact(value: Any, entry: Any) -> Any:
     """What was meant by what Blender keeps: the decimal number by one in single precision."""
     if "colour" in entry.metadata:
         return to_hex(value)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +19,29 @@ from .strokes import Strokes
 
 #: Spacings are at most and at least so many times what was asked for.
 LIGHTEST, DARKEST = 3.0, 0.5
+
+#: Share of each channel in what is seen of a linear colour (Rec. 709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+class Lamp(Protocol):
+    """A light in the space of a camera.
+
+    Attributes
+    ----------
+    kind : {"sun", "point"}
+    vector : (3,) ndarray
+        The unit direction to a sun, the position of a point.
+    colour : (3,) ndarray
+        Linear.
+    strength : float
+        What a white surface facing it sends out; of a point, at a distance of 1.
+    """
+
+    kind: str
+    vector: np.ndarray
+    colour: np.ndarray
+    strength: float
 
 
 def pixel_spacing(body: Body, camera: Camera, pixels: float) -> np.ndarray:
@@ -83,6 +108,32 @@ def by_curvature(surface: Surface, spacing: np.ndarray | float, amount: float = 
 def headlight(body: Body, camera: Camera) -> np.ndarray:
     """(V,) tones of a matt surface lit from the camera: 1 where it faces it."""
     return lambert(body, _toward(body, camera))
+
+
+def lit(body: Body, camera: Camera, lights: Sequence[Lamp]) -> np.ndarray:
+    """(V,) tones of a matt surface under several lights, 1 at most; `headlight` without any.
+
+    Nothing casts shadows.
+
+    Parameters
+    ----------
+    body : Body
+    camera : Camera
+        In whose space the lights are.
+    lights : sequence of Lamp
+    """
+    if not lights:
+        return headlight(body, camera)
+    turned = camera.view[:3, :3]
+    tone = np.zeros(len(body.surface.vertices))
+    for light in lights:
+        strength = light.strength * float(LUMINANCE @ light.colour)
+        if light.kind == "sun":
+            tone += strength * lambert(body, turned.T @ light.vector)
+            continue
+        way = turned.T @ (light.vector - camera.view[:3, 3]) - _in_world(body)
+        tone += strength / np.maximum(dot(way, way), 1e-12) * lambert(body, way)
+    return np.minimum(tone, 1)
 
 
 def lambert(body: Body, light: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import RosyError
 from ..files import write_bytes
 from ..projection.camera import Camera
+from .outline import KINDS
 from .seen import on_screen
 from .strokes import Strokes
 
@@ -44,6 +45,8 @@ class Pen:
         What the width of the frame is on paper; pixels if not given.
     plotter : bool
         Lines of constant width, in an order in which a pen travels little.
+    outline : str or None
+        Colour of silhouettes, creases and borders; the next of the others if not given.
     """
 
     width: float = 1.0
@@ -51,6 +54,22 @@ class Pen:
     paper: str | None = "#ffffff"
     millimetres: float | None = None
     plotter: bool = False
+    outline: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.width > 0 or not self.colours:
+            raise RosyError("a pen has a width above 0, and a colour")
+        if self.millimetres is not None and not self.millimetres > 0:
+            raise RosyError("a page has a width above 0")
+
+    def inks(self, names: Sequence[str]) -> list[str]:
+        """A colour for each of the families of strokes, by `Strokes.names`."""
+        return [
+            self.colours[place % len(self.colours)]
+            if self.outline is None or name not in KINDS
+            else self.outline
+            for place, name in enumerate(names)
+        ]
 
 
 def write_svg(
@@ -81,21 +100,12 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
     str
         SVG 1.1. Each family is a group that Inkscape takes for a layer, and so is the paper. Each
         stroke is one path.
-
-    Raises
-    ------
-    RosyError
-        If the pen has no width or no colour.
     """
     pen = pen or Pen()
-    if not pen.width > 0 or not pen.colours:
-        raise RosyError("a pen has a width above 0, and a colour")
     pixels, _ = on_screen(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
     if pen.millimetres is not None:
-        if not pen.millimetres > 0:
-            raise RosyError("a page has a width above 0")
         height = pen.millimetres * camera.height / camera.width
         size = f'width="{pen.millimetres:g}mm" height="{height:g}mm"'
     lines = [
@@ -113,12 +123,13 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
             f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>',
             "</g>",
         ]
-    for family, name in enumerate(strokes.names):
+    for family, (name, colour) in enumerate(
+        zip(strokes.names, pen.inks(strokes.names), strict=True)
+    ):
         own = strokes.chosen(strokes.family == family)
         if not len(own):
             continue
         flat = pixels[np.repeat(strokes.family == family, np.diff(strokes.start))]
-        colour = pen.colours[family % len(pen.colours)]
         lines.append(
             f'<g id="layer{family + 1}" inkscape:groupmode="layer" inkscape:label={quoteattr(name)} '
             f'fill="none" stroke={quoteattr(colour)} stroke-width="{pen.width:.3g}" '

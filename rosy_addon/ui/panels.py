@@ -13,6 +13,7 @@ from ..compositor.look import Look
 from ..scene.apply import FAITHFUL, Bake, bakes
 from ..scene.attributes import has_field
 from ..scene.bodies import rosy_objects
+from ..scene.strokes import stroke_objects
 from . import overlay, shelf, status
 from .generators import settings_of_generator
 
@@ -367,6 +368,78 @@ def _matters(settings: Any, name: str) -> bool:
     return True
 
 
+class VIEW3D_PT_rosy_strokes(_Sidebar, bpy.types.Panel):
+    """Lines along the field, as objects of the scene or as a file."""
+
+    bl_label = "Strokes"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.rosy.strokes
+        column = layout.column()
+        column.prop(settings, "kind")
+        column.prop(settings, "camera")
+        column.prop(settings, "selected")
+        column.separator()
+        column.prop(settings, "unit")
+        column.prop(settings, "spacing" if settings.unit == "pixels" else "distance")
+        column.prop(settings, "width")
+        column.prop(settings, "outline")
+        column.prop(settings, "hidden")
+        for title, names in STROKE_GROUPS.items():
+            header, body = layout.panel(f"rosy_strokes_{title.lower()}", default_closed=True)
+            header.label(text=title)
+            if body is not None:
+                _draw_stroke_settings(body, settings, names)
+        if settings.kind == "SVG":
+            _draw_stroke_settings(layout, settings, ("filepath", "page", "paper", "plotter"))
+        if status.now is not None:
+            _draw_progress(layout)
+            return
+        made = stroke_objects(context.scene)
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("rosy.strokes", icon="GREASEPENCIL")
+        if made:
+            layout.operator("rosy.strokes_remove", icon="TRASH")
+            for thing in made:
+                layout.label(text=thing.name, icon=STROKE_ICONS[thing.type])
+
+
+#: Of objects of strokes, by type; Grease Pencil had another name before Blender 4.3.
+STROKE_ICONS = {
+    "GREASEPENCIL": "OUTLINER_OB_GREASEPENCIL",
+    "GPENCIL": "OUTLINER_OB_GREASEPENCIL",
+    "CURVES": "OUTLINER_OB_CURVES",
+}
+
+#: Settings of strokes that are folded away.
+STROKE_GROUPS = {
+    "Density": ("tone", "light", "curvature"),
+    "Ends": ("taper", "gaps", "cross_creases"),
+    "Inks": ("inks", "ink_colour", "outline_colour"),
+}
+
+
+def _draw_stroke_settings(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, names: tuple[str, ...]
+) -> None:
+    column = layout.column()
+    unused = {
+        "light": not settings.tone,
+        "outline_colour": settings.inks == "ONE" or not settings.outline,
+        "ink_colour": settings.inks != "ONE",
+        "paper": settings.plotter,
+    }
+    for name in names:
+        row = column.row()
+        row.active = not unused.get(name, False)
+        row.prop(settings, name)
+
+
 CLASSES = (
     VIEW3D_MT_rosy_presets,
     VIEW3D_PT_rosy,
@@ -377,4 +450,5 @@ CLASSES = (
     ),
     _settings_panel("Output", "VIEW3D_PT_rosy", "output", OUTPUT),
     _settings_panel("Advanced", "VIEW3D_PT_rosy", "advanced", (*OTHERS, "undefined")),
+    VIEW3D_PT_rosy_strokes,
 )

@@ -16,6 +16,7 @@ from ..gpu.painter import DEVICES
 from ..scene.attributes import DEFAULT_DEGREE, DEFAULT_NAME
 from ..scene.capabilities import folder_options, has_properties
 from ..scene.looks import apply_look, look_of
+from ..strokes.draw import Manner
 from . import shelf
 
 __all__ = ["apply_look", "ensure_registered", "look_of", "register", "unregister"]
@@ -38,14 +39,28 @@ STORES = [
     ("PACKED", "In the Blend File", "Packed into the .blend file"),
     ("SAVED", "In a Folder", "Saved to a folder as .png or .exr"),
 ]
+STROKE_KINDS = [
+    ("PENCIL", "Grease Pencil", "An object with a layer for each family of strokes"),
+    ("CURVES", "Curves", "An object of curves, with attributes for Geometry Nodes"),
+    ("SVG", "SVG File", "A file with a layer for each family, for other programs and plotters"),
+]
+INKS = [
+    ("ONE", "One", "All strokes in one ink"),
+    ("FAMILIES", "By Family", "An ink of its own for each family of strokes"),
+]
+#: Where strokes can be drawn from: one place at a time.
+STROKE_CAMERAS = [item for item in CAMERAS if item[0] != "ALL"]
+#: What numbers of settings are, in Blender's words.
+SUBTYPES = {"angle": "ANGLE", "length": "DISTANCE", "pixels": "PIXEL"}
+COLOUR = {"subtype": "COLOR_GAMMA", "size": 3, "min": 0, "max": 1, "default": (0.0, 0.0, 0.0)}
 FORMATS = [
     ("BYTE", "8 Bit sRGB", "As on the screen, a .png file: small, and what most programs read"),
     ("FLOAT", "Float", "Linear values, an .exr file"),
 ]
 
 
-def _look_property(entry: Any) -> Any:
-    """A property for a setting of a look, by what its metadata says."""
+def _setting_property(entry: Any) -> Any:
+    """A property for a setting of a look or of strokes, by what its metadata says."""
     rules = entry.metadata
     what = {
         "name": entry.name.replace("_", " ").title(),
@@ -66,13 +81,13 @@ def _look_property(entry: Any) -> Any:
     what |= {"min": rules["low"], "max": rules["high"]}
     if isinstance(entry.default, int):
         return bpy.props.IntProperty(**what)
-    return bpy.props.FloatProperty(subtype="ANGLE" if "unit" in rules else "NONE", **what)
+    return bpy.props.FloatProperty(subtype=SUBTYPES.get(rules.get("unit"), "NONE"), **what)
 
 
 class RosyLook(bpy.types.PropertyGroup):
     """How fields are drawn; one property for each setting of a `Look`."""
 
-    __annotations__ = {entry.name: _look_property(entry) for entry in fields(Look)}
+    __annotations__ = {entry.name: _setting_property(entry) for entry in fields(Look)}
 
 
 class RosyBakedObject(bpy.types.PropertyGroup):
@@ -93,6 +108,69 @@ class RosyBake(bpy.types.PropertyGroup):
     look: bpy.props.StringProperty(description="The scene's look at the time, as JSON")
     camera_state: bpy.props.StringProperty(description="Digest of the camera; empty for a view")
     objects: bpy.props.CollectionProperty(type=RosyBakedObject)
+
+
+class RosyMadeStrokes(bpy.types.PropertyGroup):
+    """An object of strokes that RoSy has made. Its name is the camera's."""
+
+    kind: bpy.props.StringProperty()
+    thing: bpy.props.PointerProperty(type=bpy.types.Object)
+
+
+class RosyStrokes(bpy.types.PropertyGroup):
+    """How strokes are drawn: a property for each setting of a `Manner`, and the ink."""
+
+    __annotations__ = {entry.name: _setting_property(entry) for entry in fields(Manner)} | {
+        "kind": bpy.props.EnumProperty(
+            name="Make", description="What the strokes are made into", items=STROKE_KINDS
+        ),
+        "camera": bpy.props.EnumProperty(
+            name="Camera", description="From where strokes are seen", items=STROKE_CAMERAS
+        ),
+        "selected": bpy.props.BoolProperty(
+            name="Selected Only",
+            description="Draw on the selected objects alone; the others hide what is behind them",
+        ),
+        "width": bpy.props.FloatProperty(
+            name="Width",
+            description="Of a stroke where it is widest, in pixels of the picture",
+            subtype="PIXEL",
+            min=0.01,
+            max=1000,
+            soft_max=20,
+            default=1.2,
+        ),
+        "inks": bpy.props.EnumProperty(
+            name="Inks", description="What families are drawn with", items=INKS
+        ),
+        "ink_colour": bpy.props.FloatVectorProperty(
+            name="Ink", description="Colour of the ink", **COLOUR
+        ),
+        "outline_colour": bpy.props.FloatVectorProperty(
+            name="Outline Ink", description="Colour of silhouettes, creases and borders", **COLOUR
+        ),
+        "filepath": bpy.props.StringProperty(
+            name="File",
+            description="The .svg file that is written",
+            subtype="FILE_PATH",
+            default="//strokes.svg",
+            options=folder_options(),
+        ),
+        "paper": bpy.props.BoolProperty(
+            name="White Paper", description="Lay the strokes on white paper", default=True
+        ),
+        "plotter": bpy.props.BoolProperty(
+            name="For a Plotter",
+            description="Lines of one width, in an order in which a pen travels little, no paper",
+        ),
+        "page": bpy.props.FloatProperty(
+            name="Page Width",
+            description="Of the whole picture, in millimetres; 0 counts in pixels",
+            min=0,
+            max=1e5,
+        ),
+        "made": bpy.props.CollectionProperty(type=RosyMadeStrokes),
+    }
 
 
 class RosyScene(bpy.types.PropertyGroup):
@@ -161,6 +239,7 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Take vectors that are not finite for undefined, instead of refusing the field",
     )
     bakes: bpy.props.CollectionProperty(type=RosyBake)
+    strokes: bpy.props.PointerProperty(type=RosyStrokes)
 
 
 class RosyMesh(bpy.types.PropertyGroup):
@@ -190,7 +269,16 @@ class RosyObject(bpy.types.PropertyGroup):
     )
 
 
-CLASSES = (RosyLook, RosyBakedObject, RosyBake, RosyScene, RosyMesh, RosyObject)
+CLASSES = (
+    RosyLook,
+    RosyBakedObject,
+    RosyBake,
+    RosyMadeStrokes,
+    RosyStrokes,
+    RosyScene,
+    RosyMesh,
+    RosyObject,
+)
 PLACES = ((bpy.types.Scene, RosyScene), (bpy.types.Mesh, RosyMesh), (bpy.types.Object, RosyObject))
 
 

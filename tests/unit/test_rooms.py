@@ -26,13 +26,14 @@ MAY_IMPORT = {
     "compositor": BASE | {"field", "projection"},
     "strokes": BASE | {"field", "projection"},
     "gpu": BASE | {"field", "projection", "compositor"},
-    "scene": BASE | {"field", "projection", "compositor", "reuse"},
+    "scene": BASE | {"field", "projection", "compositor", "strokes", "reuse"},
     "bake": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse"},
     "animation": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse", "bake"},
     "live": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse", "bake"},
+    "sketch": BASE | {"projection", "compositor", "strokes", "scene", "reuse", "bake"},
     "jobs": BASE,
     "turntable": BASE | {"field", "projection", "compositor"},
-    "ui": BASE | {"field", "projection", "compositor", "scene", "gpu", "bake", "live"},
+    "ui": BASE | {"field", "projection", "compositor", "strokes", "scene", "gpu", "bake", "live"},
     "cli": BASE
     | {
         "field",
@@ -46,6 +47,7 @@ MAY_IMPORT = {
         "jobs",
         "turntable",
         "strokes",
+        "sketch",
     },
     "__main__": {"cli"},
     "__init__": set(),
@@ -86,7 +88,7 @@ def test_imports_run_one_way(path):
     rooms = {name.split(".")[0] for name in inside} - {room}
     assert rooms <= MAY_IMPORT[room]
     allowed = set(sys.stdlib_module_names) | {"numpy"}
-    if room in ("scene", "ui", "bake", "live", "cli", "animation"):
+    if room in ("scene", "ui", "bake", "sketch", "live", "cli", "animation"):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in DRAWN_WITH and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}

@@ -62,7 +62,7 @@ def side_gaps(ground: Ground, strokes: Strokes, most: int = 20_000) -> Gaps:
     step[strokes.start[:-1]] = 0
     fine = strokes.densified(np.ceil(step / (FINE * strokes.spacing)).clip(1, 1000))
     way = _ways(fine)
-    grid = Nearby(REACH / 2 * float(np.median(fine.spacing)), len(fine.points))
+    grid = Nearby(REACH * float(np.median(fine.spacing)), len(fine.points))
     grid.add(fine.points)
     own = np.flatnonzero(np.isfinite(fine.weights[:, 0]))
     point = np.flatnonzero(np.isfinite(strokes.weights[:, 0]))
@@ -79,7 +79,7 @@ def _measured(
     ground: Ground, fine: Strokes, way: np.ndarray, arc: np.ndarray, grid: Nearby, own: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     stroke = fine.stroke
-    query, other = grid.around(fine.points[own], REACH * fine.spacing[own], fine.points)
+    query, other = grid.around(fine.points[own], REACH * fine.spacing[own])
     mine = own[query]
     away = stroke[mine] != stroke[other]
     away |= np.abs(arc[mine] - arc[other]) > OWN * fine.spacing[mine]

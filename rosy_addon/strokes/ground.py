@@ -113,14 +113,14 @@ class Ground:
     ) -> np.ndarray:
         """(n,) bool: whether unit members (n, 3) at two places are on the same of the lines.
 
-        Given with the normals there; both are carried to the mean normal.
+        Given with the normals there: one is carried to the other.
         """
-        middle = unit(here + there)
-        one, other = carry(one, here, middle), carry(other, there, middle)
-        along, across = dot(one, other), dot(np.cross(one, other), middle)
+        carried = dot(one, other) - dot(one, there) * dot(here, other) / np.maximum(
+            1 + dot(here, there), 1e-12
+        )
         if self.directed:
-            return np.abs(np.arctan2(across, along)) < np.pi / self.degree
-        return np.arctan2(np.abs(across), np.abs(along)) < np.pi / (2 * self.lines)
+            return carried > np.cos(np.pi / self.degree)
+        return np.abs(carried) > np.cos(np.pi / (2 * self.lines))
 
     def ways(self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray) -> np.ndarray:
         """(n,) complex: the unit direction that belongs to a member: itself, of a RoSy."""

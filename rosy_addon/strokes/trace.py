@@ -22,6 +22,9 @@ PROBES = 0.35
 #: Spacings between seeds that are sown at once: at first so many, then half as many each time.
 WIDEST, NARROWEST = 96.0, 6.0
 
+#: Share of the heads that are not waited for when new seeds are sown.
+STRAGGLERS = 0.1
+
 #: At first strokes are to be longer than the shortest by so much; what is left of the gaps in the
 #: end is filled with strokes that are nearer by so much than the nearest.
 LONG, TIGHT = 2.0, 0.85
@@ -79,23 +82,23 @@ def growing(growth: Growth) -> Work[None]:
     growth.rules = replace(rules, shortest=LONG * rules.shortest)
     while len(walkers):
         growth.sow(walkers.take(scattered(growth, walkers, apart)))
-        yield from _until_grown(growth, label)
+        yield from _until_grown(growth, label, STRAGGLERS)
         if apart <= NARROWEST:
             break
         apart /= 4
         walkers = walkers.take(empty(growth, walkers))
     growth.reopen(rules)
-    yield from _until_grown(growth, label)
+    yield from _until_grown(growth, label, STRAGGLERS)
     last = replace(rules, nearest=TIGHT * rules.nearest, farthest=np.inf)
     growth.resume(last)
-    while len(growth.heads.stroke):
-        growth.step()
+    yield from _until_grown(growth, label, STRAGGLERS)
     growth.reopen(last)
     yield from _until_grown(growth, label)
 
 
-def _until_grown(growth: Growth, label: str) -> Work[None]:
-    rounds = 0
+def _until_grown(growth: Growth, label: str, stragglers: float = 0.0) -> Work[None]:
+    """Step and sow, until but a share of the heads are left of as many as there were at most."""
+    rounds, most = 0, 0
     while True:
         if rounds % PAUSE == 0 or len(growth.heads.stroke) < FEW:
             sown = growth.sow_beside()
@@ -106,7 +109,11 @@ def _until_grown(growth: Growth, label: str) -> Work[None]:
                     return
             share = growth.samples.count / max(growth.expected, 1)
             yield Progress(min(share, 0.99), label)
-        if len(growth.heads.stroke):
+        heads = len(growth.heads.stroke)
+        most = max(most, heads)
+        if heads < stragglers * most:
+            return
+        if heads:
             growth.step()
         rounds += 1
 

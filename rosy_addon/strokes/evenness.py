@@ -89,11 +89,12 @@ def _measured(
     delta = fine.points[other] - fine.points[mine]
     height = dot(delta, normal)
     same = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
+    one, two = mine[same], other[same]
     same[same] = ground.same_line(
-        fine.member[mine[same]],
-        fine.normal[mine[same]],
-        fine.member[other[same]],
-        fine.normal[other[same]],
+        ground.upright(fine.triangle[one], fine.member[one], fine.normal[one]),
+        fine.normal[one],
+        ground.upright(fine.triangle[two], fine.member[two], fine.normal[two]),
+        fine.normal[two],
     )
     query, other, mine, normal, delta, height = (
         values[same] for values in (query, other, mine, normal, delta, height)

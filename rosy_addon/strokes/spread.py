@@ -228,15 +228,13 @@ class Growth:
         member = np.where(member == 0, walkers.member, member)
         way = ground.ways(triangle, weights, member)
         place = ground.place(triangle, weights)
-        along = ground.in_space(triangle, way)
-        frame = [
-            place,
-            ground.shading_normal(triangle, weights),
-            along,
-            along if way is member else ground.in_space(triangle, member),
-        ]
+        normal = ground.shading_normal(triangle, weights)
+        along = ground.upright(triangle, ground.in_space(triangle, way), normal)
+        also = along
+        if way is not member:
+            also = ground.upright(triangle, ground.in_space(triangle, member), normal)
         number = self.samples.add(
-            frame=np.stack(frame, axis=1),
+            frame=np.stack([place, normal, along, also], axis=1),
             spacing=self._spacing_at(walkers),
             stroke=stroke,
             arc=arc,

@@ -10,6 +10,7 @@ from ..errors import RosyError
 from ..field.frames import dot
 from ..progress import Progress, Work, drain
 from ..projection.gbuffer import Body
+from .apart import kept_apart
 from .families import label_families
 from .ground import lay_ground, nearest_member, on_corners
 from .spread import FEW, PAUSE, Growth, Rules
@@ -69,8 +70,10 @@ def tracing(
     if not (np.isfinite(corners).all() and (corners > 0).all()):
         raise RosyError(f"{body.surface.name}: the spacing of strokes is to be above 0")
     growth = Growth(ground, corners, rules or Rules())
+    rules = growth.rules
     yield from growing(growth)
-    return collect(growth)
+    drawn = kept_apart(ground, collect(growth), rules.shortest)
+    return label_families(drawn, ground)
 
 
 def growing(growth: Growth) -> Work[None]:
@@ -171,7 +174,7 @@ def scattered(growth: Growth, walkers: Walkers, apart: float) -> np.ndarray:
 
 
 def collect(growth: Growth) -> Strokes:
-    """The strokes that grew, as arrays."""
+    """The strokes that grew, as arrays; their families are not numbered."""
     ground, s = growth.ground, growth.samples
     stroke, sign, triangle, begin, weights, way = (
         np.concatenate(column) for column in zip(*growth.pieces, strict=True)
@@ -208,7 +211,7 @@ def collect(growth: Growth) -> Strokes:
     points = ground.place(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(number, minlength=len(used)))])
     spacing = np.einsum("nk,nk->n", weights, growth.spacing[triangle])
-    made = Strokes(
+    return Strokes(
         points=points,
         start=start,
         family=np.zeros(len(used), dtype=np.int32),
@@ -223,4 +226,3 @@ def collect(growth: Growth) -> Strokes:
         opacity=np.ones(len(points)),
         closed=np.zeros(len(used), dtype=bool),
     )
-    return label_families(made, ground)

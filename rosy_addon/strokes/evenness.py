@@ -62,7 +62,7 @@ def side_gaps(ground: Ground, strokes: Strokes, most: int = 20_000) -> Gaps:
     step[strokes.start[:-1]] = 0
     fine = strokes.densified(np.ceil(step / (FINE * strokes.spacing)).clip(1, 1000))
     way = _ways(fine)
-    grid = Nearby(REACH / 2 * float(np.median(fine.spacing)), len(fine.points))
+    grid = Nearby(REACH * float(np.median(fine.spacing)), len(fine.points))
     grid.add(fine.points)
     own = np.flatnonzero(np.isfinite(fine.weights[:, 0]))
     point = np.flatnonzero(np.isfinite(strokes.weights[:, 0]))
@@ -79,7 +79,7 @@ def _measured(
     ground: Ground, fine: Strokes, way: np.ndarray, arc: np.ndarray, grid: Nearby, own: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     stroke = fine.stroke
-    query, other = grid.around(fine.points[own], REACH * fine.spacing[own], fine.points)
+    query, other = grid.around(fine.points[own], REACH * fine.spacing[own])
     mine = own[query]
     away = stroke[mine] != stroke[other]
     away |= np.abs(arc[mine] - arc[other]) > OWN * fine.spacing[mine]
@@ -89,11 +89,12 @@ def _measured(
     delta = fine.points[other] - fine.points[mine]
     height = dot(delta, normal)
     same = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
+    one, two = mine[same], other[same]
     same[same] = ground.same_line(
-        fine.member[mine[same]],
-        fine.normal[mine[same]],
-        fine.member[other[same]],
-        fine.normal[other[same]],
+        ground.upright(fine.triangle[one], fine.member[one], fine.normal[one]),
+        fine.normal[one],
+        ground.upright(fine.triangle[two], fine.member[two], fine.normal[two]),
+        fine.normal[two],
     )
     query, other, mine, normal, delta, height = (
         values[same] for values in (query, other, mine, normal, delta, height)

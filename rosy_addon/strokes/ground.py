@@ -95,6 +95,15 @@ class Ground:
         """(n, 3) points of barycentric coordinates."""
         return np.einsum("nk,nki->ni", weights, self.points[triangle])
 
+    def weights(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """(n, 3) barycentric coordinates of points in the planes of triangles."""
+        delta = points - self.points[triangle, 0]
+        flat = dot(delta, self.x[triangle]) + 1j * dot(delta, self.y[triangle])
+        weights = (self.gradient[triangle] * flat.conj()[:, None]).real
+        weights[:, 0] += 1
+        weights = np.maximum(weights, 0)
+        return weights / weights.sum(axis=1, keepdims=True)
+
     def shading_normal(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """(n, 3) unit interpolated normals."""
         return unit(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
@@ -103,24 +112,34 @@ class Ground:
         """(n, 3) vectors of tangents that are complex numbers in the frames of triangles."""
         return tangent.real[:, None] * self.x[triangle] + tangent.imag[:, None] * self.y[triangle]
 
+    def upright(self, triangle: np.ndarray, tangent: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """(n, 3) tangents of triangles, carried to shading normals."""
+        return carry(tangent, self.normal[triangle], normal)
+
     def members(self, triangle: np.ndarray, weights: np.ndarray, near: np.ndarray) -> np.ndarray:
         """(n,) complex: the unit member nearest to a tangent; 0 where the field has none."""
         z = np.einsum("nk,nk->n", weights, self.z[triangle])
         return nearest_member(near, z, self.degree)
 
     def same_line(
-        self, one: np.ndarray, here: np.ndarray, other: np.ndarray, there: np.ndarray
+        self,
+        one: np.ndarray,
+        here: np.ndarray,
+        other: np.ndarray,
+        there: np.ndarray,
+        slack: float = 0.0,
     ) -> np.ndarray:
         """(n,) bool: whether unit members (n, 3) at two places are on the same of the lines.
 
-        Given with the normals there; both are carried to the mean normal.
+        Given with the normals there, which they are perpendicular to; one is carried to the other.
+        They may be apart by half of what is between two lines, and by `slack` radians.
         """
-        middle = unit(here + there)
-        one, other = carry(one, here, middle), carry(other, there, middle)
-        along, across = dot(one, other), dot(np.cross(one, other), middle)
+        carried = dot(one, other) - dot(one, there) * dot(here, other) / np.maximum(
+            1 + dot(here, there), 1e-12
+        )
         if self.directed:
-            return np.abs(np.arctan2(across, along)) < np.pi / self.degree
-        return np.arctan2(np.abs(across), np.abs(along)) < np.pi / (2 * self.lines)
+            return carried > np.cos(np.pi / self.degree + slack)
+        return np.abs(carried) > np.cos(np.pi / (2 * self.lines) + slack)
 
     def ways(self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray) -> np.ndarray:
         """(n,) complex: the unit direction that belongs to a member: itself, of a RoSy."""

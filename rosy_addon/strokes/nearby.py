@@ -2,79 +2,127 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 #: Numbers that cells are hashed with.
 _PRIMES = np.array([73856093, 19349663, 83492791], dtype=np.int64)
 
 #: A query looks at so many rings of cells around its own, at most.
-MOST_RINGS = 5
+MOST_RINGS = 4
+
+#: Points of a block: those of a cell are a chain of blocks.
+SIZE = 8
+
+#: Queries that are answered at once: what they look at then stays in the cache.
+AT_ONCE = 1 << 11
+
+
+class Strip(NamedTuple):
+    """Which points within the radius of a query are asked for.
+
+    Attributes
+    ----------
+    way : (n, 3) ndarray
+        Unit, of each query.
+    near : float
+        All are that are within this share of the radius.
+    abeam : float
+        Of the others, those not farther ahead or behind than this share of it.
+    """
+
+    way: np.ndarray
+    near: float = 0.6
+    abeam: float = 0.25
 
 
 class Nearby:
-    """Points in cells of a grid, each cell a chain.
+    """Points in cells of a grid.
 
     Parameters
     ----------
     cell : float
-        Its side.
+        Its side: about the radius of most queries.
     expected : int
         About how many points there will be: for the size of the table.
     """
 
     def __init__(self, cell: float, expected: int) -> None:
         self.cell = cell
-        bits = int(np.clip(np.ceil(np.log2(max(expected, 2))) + 2, 10, 24))
+        bits = int(np.clip(np.ceil(np.log2(max(expected, 2))), 10, 22))
         self.mask = np.int64((1 << bits) - 1)
-        self.head = np.full(1 << bits, -1, dtype=np.int32)
-        self.following = np.full(1024, -1, dtype=np.int32)
+        # Of each cell the block that was added last, and how much of it is in use.
+        self.last = np.full(1 << bits, -1, dtype=np.int32)
+        self.filled = np.full(1 << bits, SIZE, dtype=np.int8)
+        self.blocks = 0
+        self.following = np.empty(128, dtype=np.int32)
+        self.number = np.empty((128, SIZE), dtype=np.int32)
+        # No comparison with nan is true.
+        self.place = np.full((128, 3, SIZE), np.nan)
         self.count = 0
+        self.slot = np.empty(1024, dtype=np.int32)
 
     def add(self, points: np.ndarray) -> np.ndarray:
         """Add (n, 3) points; their numbers, (n,) int32, count on from those before."""
         first = self.count
         self.count += len(points)
-        while self.count > len(self.following):
-            self.following = np.concatenate([self.following, np.full_like(self.following, -1)])
+        self.slot = _grown(self.slot, self.count, 0)
         number = np.arange(first, self.count, dtype=np.int32)
         key = self._key(self._cells(points))
         order = np.argsort(key, kind="stable")
-        key, sorted_number = key[order], number[order]
-        begins = np.ones(len(key), dtype=bool)
-        begins[1:] = key[1:] != key[:-1]
-        # Each points at the one before in its cell, the first at what was there.
-        before = np.empty(len(key), dtype=np.int32)
-        before[1:] = sorted_number[:-1]
-        before[begins] = self.head[key[begins]]
-        self.following[sorted_number] = before
-        ends = np.ones(len(key), dtype=bool)
-        ends[:-1] = begins[1:]
-        self.head[key[ends]] = sorted_number[ends]
+        key = key[order]
+        new = np.ones(len(key), dtype=bool)
+        new[1:] = key[1:] != key[:-1]
+        begin = np.flatnonzero(new)
+        group = np.cumsum(new) - 1
+        key = key[begin]
+        size = np.diff(np.append(begin, len(points)))
+        last, filled = self.last[key], self.filled[key].astype(np.int64)
+        # Each cell fills up its last block, and goes on with fresh ones.
+        position = filled[group] + np.arange(len(points)) - begin[group]
+        fresh = (filled + size - 1) // SIZE
+        base = self.blocks + np.cumsum(fresh) - fresh
+        ordinal = position // SIZE
+        block = np.where(ordinal == 0, last[group], base[group] + ordinal - 1)
+        self._chain(base, fresh, last)
+        grows = fresh > 0
+        self.last[key[grows]] = (base + fresh - 1)[grows]
+        self.filled[key] = filled + size - SIZE * fresh
+        slot = position % SIZE
+        self.number[block, slot] = number[order]
+        self.place[block, :, slot] = points[order]
+        self.slot[number[order]] = block * SIZE + slot
         return number
 
+    def _chain(self, base: np.ndarray, fresh: np.ndarray, last: np.ndarray) -> None:
+        """Put blocks before those that cells had last."""
+        first = self.blocks
+        self.blocks += int(fresh.sum())
+        self.following = _grown(self.following, self.blocks, -1)
+        self.number = _grown(self.number, self.blocks, -1)
+        self.place = _grown(self.place, self.blocks, np.nan)
+        self.following[first : self.blocks] = np.arange(first, self.blocks) - 1
+        grows = fresh > 0
+        self.following[base[grows]] = last[grows]
+
+    def forget(self, number: np.ndarray) -> None:
+        """Take points out again."""
+        block, slot = np.divmod(self.slot[number], SIZE)
+        self.place[block, :, slot] = np.nan
+
     def around(
-        self,
-        points: np.ndarray,
-        radius: np.ndarray,
-        places: np.ndarray,
-        way: np.ndarray | None = None,
-        near: float = 0.6,
-        abeam: float = 0.25,
+        self, points: np.ndarray, radius: np.ndarray, strip: Strip | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of a query and a point within its radius.
-
-        With unit ways only those that are within a share `near` of the radius, or not farther ahead
-        or behind than a share `abeam` of it.
 
         Parameters
         ----------
         points : (n, 3) ndarray
         radius : (n,) ndarray
             Cut to `MOST_RINGS` cells.
-        places : (count, 3) ndarray
-            All points that were added.
-        way : (n, 3) ndarray, optional
-        near, abeam : float
+        strip : Strip, optional
+            Not all of those.
 
         Returns
         -------
@@ -83,17 +131,13 @@ class Nearby:
             Some may come twice.
         """
         rings = np.clip(np.ceil(radius / self.cell), 1, MOST_RINGS).astype(np.int64)
-        pairs = [
-            self._pairs(
-                points,
-                radius,
-                places,
-                np.flatnonzero(rings == count),
-                int(count),
-                None if way is None else (way, near, abeam),
-            )
-            for count in np.unique(rings)
-        ]
+        pairs = []
+        for count in range(1, int(rings.max(initial=0)) + 1):
+            chosen = np.flatnonzero(rings == count)
+            offset = _ring_offsets(count)
+            for start in range(0, len(chosen), AT_ONCE):
+                part = chosen[start : start + AT_ONCE]
+                pairs += self._pairs(points, radius * radius, part, offset, strip)
         if not pairs:
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
         return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -101,48 +145,40 @@ class Nearby:
     def _pairs(
         self,
         points: np.ndarray,
-        radius: np.ndarray,
-        places: np.ndarray,
+        square: np.ndarray,
         chosen: np.ndarray,
-        rings: int,
-        strip: tuple[np.ndarray, float, float] | None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        side = np.arange(-rings, rings + 1)
-        offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
-        offset_key = (offset * _PRIMES).astype(np.int64)
+        offset: np.ndarray,
+        strip: Strip | None,
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Block by block of all cells around some queries."""
         parts = self._cells(points[chosen]) * _PRIMES
-        key = parts[:, 0, None] + offset_key[:, 0]
-        key ^= parts[:, 1, None] + offset_key[:, 1]
-        key ^= parts[:, 2, None] + offset_key[:, 2]
+        key = parts[:, 0, None] + offset[:, 0]
+        key ^= parts[:, 1, None] + offset[:, 1]
+        key ^= parts[:, 2, None] + offset[:, 2]
         key &= self.mask
-        current = self.head.take(key).ravel()
-        occupied = np.flatnonzero(current >= 0)
-        current = current[occupied]
+        block = self.last.take(key).ravel()
+        occupied = np.flatnonzero(block >= 0)
+        block = block[occupied]
         query = chosen[occupied // len(offset)]
-        square = radius * radius
-        queries, found = [], []
-        while len(current):
-            apart = places.take(current, axis=0)
-            apart -= points.take(query, axis=0)
-            distance = np.einsum("ni,ni->n", apart, apart)
-            limit = square.take(query)
-            near = np.flatnonzero(distance <= limit)
+        pairs = []
+        while len(block):
+            apart = self.place.take(block, axis=0)
+            apart -= points.take(query, axis=0)[:, :, None]
+            distance = np.einsum("nij,nij->nj", apart, apart)
+            limit = square.take(query)[:, None]
+            near = distance <= limit
             if strip is not None:
-                way, share, beam = strip
-                some = query.take(near)
-                along = np.einsum("ni,ni->n", apart.take(near, axis=0), way.take(some, axis=0))
-                limit = limit.take(near)
-                near = near[
-                    (distance.take(near) <= share**2 * limit) | (along * along <= beam**2 * limit)
-                ]
-            queries.append(query.take(near))
-            found.append(current.take(near))
-            current = self.following.take(current)
-            more = np.flatnonzero(current >= 0)
-            current, query = current.take(more), query.take(more)
-        if not queries:
-            return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
-        return np.concatenate(queries), np.concatenate(found)
+                along = np.einsum("nij,ni->nj", apart, strip.way.take(query, axis=0))
+                near &= (distance <= strip.near**2 * limit) | (
+                    along * along <= strip.abeam**2 * limit
+                )
+            hit = np.flatnonzero(near)
+            row = hit // SIZE
+            pairs.append((query.take(row), self.number.take(block.take(row) * SIZE + hit % SIZE)))
+            block = self.following.take(block)
+            more = np.flatnonzero(block >= 0)
+            block, query = block.take(more), query.take(more)
+        return pairs
 
     def _cells(self, points: np.ndarray) -> np.ndarray:
         return np.floor(points / self.cell).astype(np.int64)
@@ -150,3 +186,17 @@ class Nearby:
     def _key(self, cells: np.ndarray) -> np.ndarray:
         parts = cells * _PRIMES
         return (parts[:, 0] ^ parts[:, 1] ^ parts[:, 2]) & self.mask
+
+
+def _ring_offsets(rings: int) -> np.ndarray:
+    """(cells, 3) int64: what is added to the parts of a key for each of the cells around."""
+    side = np.arange(-rings, rings + 1)
+    offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
+    return offset * _PRIMES
+
+
+def _grown(values: np.ndarray, count: int, fill: float) -> np.ndarray:
+    """The same with room for so many rows at least."""
+    while count > len(values):
+        values = np.concatenate([values, np.full_like(values, fill)])
+    return values

@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import dot
 from .ground import Ground
-from .nearby import Nearby
+from .nearby import Nearby, Strip
 from .walk import Path, Walkers, go_straight, walk
 
 #: Share of the spacing from one sample of a stroke to the next.
@@ -109,6 +109,24 @@ class _Table:
         return np.arange(first, self.count)
 
 
+class _Samples(_Table):
+    """Samples of strokes; what they are compared by lies in a row."""
+
+    frame: np.ndarray
+
+    @property
+    def place(self) -> np.ndarray:
+        return self.frame[:, 0]
+
+    @property
+    def normal(self) -> np.ndarray:
+        return self.frame[:, 1]
+
+    @property
+    def way(self) -> np.ndarray:
+        return self.frame[:, 2]
+
+
 @dataclass(eq=False)
 class _Heads:
     """The growing ends of strokes."""
@@ -151,11 +169,9 @@ class Growth:
 
     def __init__(self, ground: Ground, spacing: np.ndarray, rules: Rules) -> None:
         self.ground, self.spacing, self.rules = ground, spacing, rules
-        self.samples = _Table(
-            place=((3,), float),
-            normal=((3,), float),
-            member=((3,), float),
-            way=((3,), float),
+        self.samples = _Samples(
+            # Place, normal, way and member.
+            frame=((4, 3), float),
             spacing=((), float),
             stroke=((), np.int32),
             arc=((), float),
@@ -187,7 +203,7 @@ class Growth:
         expected = float((ground.area / local**2).sum()) * ground.lines / STEP
         if not expected < 5e7:
             raise RosyError("the strokes would be too many: ask for a wider spacing")
-        self.nearby = Nearby(REACH / 2 * float(np.median(local)), int(expected))
+        self.nearby = Nearby(1.01 * REACH * float(np.median(local)), int(expected))
         self.expected = expected
         self.heads = _Heads(
             Walkers(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, complex), np.empty(0)),
@@ -212,11 +228,13 @@ class Growth:
         member = np.where(member == 0, walkers.member, member)
         way = ground.ways(triangle, weights, member)
         place = ground.place(triangle, weights)
+        normal = ground.shading_normal(triangle, weights)
+        along = ground.upright(triangle, ground.in_space(triangle, way), normal)
+        also = along
+        if way is not member:
+            also = ground.upright(triangle, ground.in_space(triangle, member), normal)
         number = self.samples.add(
-            place=place,
-            normal=ground.shading_normal(triangle, weights),
-            member=ground.in_space(triangle, member),
-            way=ground.in_space(triangle, way),
+            frame=np.stack([place, normal, along, also], axis=1),
             spacing=self._spacing_at(walkers),
             stroke=stroke,
             arc=arc,
@@ -230,34 +248,39 @@ class Growth:
         self.nearby.add(place)
         return number
 
+    def _forget(self, number: np.ndarray) -> None:
+        self.samples.alive[number] = False
+        self.nearby.forget(number)
+
     def _beside(self, number: np.ndarray, nearest: float, farthest: float) -> _Beside:
         """Judge samples against all others that are near."""
         s = self.samples
         query, other = self.nearby.around(
-            s.place[number], REACH * s.spacing[number], s.place, s.way[number]
+            s.place[number], REACH * s.spacing[number], Strip(s.way[number])
         )
         own = number[query]
-        keep = np.flatnonzero(s.alive.take(other) & (other != own))
+        apart = np.abs(s.arc.take(own) - s.arc.take(other))
+        keep = s.stroke.take(own) != s.stroke.take(other)
+        keep = np.flatnonzero(keep | (apart > OWN * s.spacing.take(own)))
         query, own, other = query.take(keep), own.take(keep), other.take(keep)
-        normal, there = s.normal.take(own, axis=0), s.normal.take(other, axis=0)
-        facing = dot(normal, there)
-        normal += there
-        delta = s.place.take(own, axis=0) - s.place.take(other, axis=0)
+        here, there = s.frame.take(own, axis=0), s.frame.take(other, axis=0)
+        facing = dot(here[:, 1], there[:, 1])
+        keep = facing > FACING
+        keep &= self.ground.same_line(here[:, 3], here[:, 1], there[:, 3], there[:, 1])
+        delta = here[:, 0] - there[:, 0]
+        normal = here[:, 1] + there[:, 1]
         size = np.maximum(2 + 2 * facing, 1e-9)
         height = dot(delta, normal)
-        keep = (facing > FACING) & (height * height <= HEIGHT**2 * dot(delta, delta) * size)
-        apart = np.abs(s.arc.take(own) - s.arc.take(other))
-        keep &= (s.stroke.take(own) != s.stroke.take(other)) | (apart > OWN * s.spacing.take(own))
-        keep = np.flatnonzero(keep)
-        keep = keep[self._match(own.take(keep), other.take(keep))]
+        keep = np.flatnonzero(keep & (height * height <= HEIGHT**2 * dot(delta, delta) * size))
         query, own, other, facing = (values.take(keep) for values in (query, own, other, facing))
+        here, there = here.take(keep, axis=0), there.take(keep, axis=0)
         flat = delta.take(keep, axis=0)
         flat -= (height / size).take(keep)[:, None] * normal.take(keep, axis=0)
         # The surface bends between the two: from the chord to the arc.
         flat *= (1 + (1 - facing) / 12)[:, None]
         square = dot(flat, flat)
         spacing = (s.spacing[own] + s.spacing[other]) / 2
-        along = dot(flat, s.way[other])
+        along = dot(flat, there[:, 2])
         across = np.sqrt(np.maximum(square - along * along, 0))
         ahead = np.abs(along)
         beyond = np.maximum(ahead - STEP / 2 * spacing, 0) * (max(nearest, 1e-3) / HEAD_ON)
@@ -269,12 +292,13 @@ class Growth:
         closed = np.zeros(len(number), dtype=bool)
         closed[query[(s.stroke[own] == s.stroke[other]) & (distance < 0.2 * spacing)]] = True
 
-        abeam = np.abs(dot(flat, s.way[own])) <= ABEAM * spacing
-        abeam &= across < REACH * spacing
-        query, own, other, flat = query[abeam], own[abeam], other[abeam], flat[abeam]
-        share = (across / spacing)[abeam]
-        own_side = (dot(flat, np.cross(s.normal[own], s.way[own])) > 0).astype(np.intp)
-        other_side = (dot(flat, np.cross(s.normal[other], s.way[other])) < 0).astype(np.intp)
+        abeam = np.abs(dot(flat, here[:, 2])) <= ABEAM * spacing
+        abeam = np.flatnonzero(abeam & (across < REACH * spacing))
+        query, other = query.take(abeam), other.take(abeam)
+        here, there, flat = (values.take(abeam, axis=0) for values in (here, there, flat))
+        share = (across / spacing).take(abeam)
+        own_side = (_triple(flat, here) > 0).astype(np.intp)
+        other_side = (_triple(flat, there) < 0).astype(np.intp)
         gap = np.full((len(number), 2), np.inf)
         np.minimum.at(gap, (query, own_side), share)
         gave_way = ~refused & ((gap > farthest) & (gap < COVERED)).any(axis=1)
@@ -290,11 +314,6 @@ class Growth:
             own_side[covering],
             other_side[covering],
         )
-
-    def _match(self, own: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """Whether the members of pairs of samples are on the same line."""
-        s = self.samples
-        return self.ground.same_line(s.member[own], s.normal[own], s.member[other], s.normal[other])
 
     def _cover(self, number: np.ndarray, beside: _Beside) -> None:
         """Sides on which there is somebody, of both."""
@@ -327,7 +346,7 @@ class Growth:
         which = np.flatnonzero(moved)
         number = self._add(now.take(which), heads.stroke[which], arc[which])
         beside = self._beside(number, rules.nearest, rules.farthest)
-        self.samples.alive[number[beside.refused]] = False
+        self._forget(number[beside.refused])
         self._cover(number, beside)
         refused = np.zeros(len(ended), dtype=bool)
         refused[which[beside.refused]] = True
@@ -403,13 +422,14 @@ class Growth:
         number = first + np.flatnonzero(gone)
         beside = s.beside[number].ravel() - 1
         self.doubtful.append(beside[beside >= 0])
-        s.alive[number] = False
+        self._forget(number)
 
     def resume(self, rules: Rules) -> None:
         """Have strokes that gave way go on, by other rules."""
         self.rules = rules
         t, s = self.strokes, self.samples
-        stroke, end = np.nonzero(t.gave_way[: t.count] & t.alive[: t.count, None])
+        done = np.stack([t.low_done[: t.count], t.high_done[: t.count]], axis=1)
+        stroke, end = np.nonzero(t.gave_way[: t.count] & t.alive[: t.count, None] & done)
         number = t.ends[stroke, end]
         heads = Walkers(
             s.triangle[number],
@@ -417,9 +437,10 @@ class Growth:
             s.own_member[number],
             np.where(end > 0, 1.0, -1.0),
         )
-        self.heads = _Heads(heads, stroke.astype(np.int32), s.arc[number], np.ones(len(stroke)))
+        # Whoever waited for those that had ended waits no more.
+        t.parent[stroke[t.heads[stroke] == 0]] = -1
         np.add.at(t.heads, stroke, 1)
-        t.parent[stroke] = -1
+        self._join(_Heads(heads, stroke.astype(np.int32), s.arc[number], np.ones(len(stroke))))
 
     def reopen(self, rules: Rules) -> None:
         """Look again, by other rules, where no stroke came to stay."""
@@ -462,7 +483,7 @@ class Growth:
         self.strokes.seed[stroke] = number
         self.strokes.ends[stroke] = number[:, None]
         beside = self._beside(number, self.rules.nearest, self.rules.farthest)
-        self.samples.alive[number[beside.refused]] = False
+        self._forget(number[beside.refused])
         self.strokes.alive[stroke[beside.refused]] = False
         self._cover(number, beside)
         fits = ~beside.refused
@@ -472,13 +493,18 @@ class Growth:
         for sign in (1.0, -1.0):
             ahead = walkers.take(some)
             ahead.sign = np.full(len(some), sign)
-            self.heads = _Heads(
-                Walkers.joined(self.heads.walkers, ahead),
-                np.concatenate([self.heads.stroke, stroke[some].astype(np.int32)]),
-                np.concatenate([self.heads.arc, np.zeros(len(some))]),
-                np.concatenate([self.heads.pace, np.ones(len(some))]),
-            )
+            own = stroke[some].astype(np.int32)
+            self._join(_Heads(ahead, own, np.zeros(len(some)), np.ones(len(some))))
         return fits
+
+    def _join(self, heads: _Heads) -> None:
+        mine = self.heads
+        self.heads = _Heads(
+            Walkers.joined(mine.walkers, heads.walkers),
+            np.concatenate([mine.stroke, heads.stroke]),
+            np.concatenate([mine.arc, heads.arc]),
+            np.concatenate([mine.pace, heads.pace]),
+        )
 
     def sow_beside(self) -> int:
         """Begin strokes beside those that are there, one at a time for each side of each."""
@@ -582,6 +608,11 @@ class Growth:
             return self._add(walkers, np.full(len(walkers), -1, np.int32), np.zeros(len(walkers)))
         finally:
             self.nearby = nearby
+
+
+def _triple(flat: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """(n,) how far to the left of frames vectors point."""
+    return dot(flat, np.cross(frame[:, 1], frame[:, 2]))
 
 
 class _Nowhere:

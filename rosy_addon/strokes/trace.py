@@ -10,6 +10,7 @@ from ..errors import RosyError
 from ..field.frames import dot
 from ..progress import Progress, Work, drain
 from ..projection.gbuffer import Body
+from .apart import kept_apart
 from .families import label_families
 from .ground import lay_ground, nearest_member, on_corners
 from .spread import FEW, PAUSE, Growth, Rules
@@ -21,6 +22,9 @@ PROBES = 0.35
 
 #: Spacings between seeds that are sown at once: at first so many, then half as many each time.
 WIDEST, NARROWEST = 96.0, 6.0
+
+#: Share of the heads that are not waited for when new seeds are sown.
+STRAGGLERS = 0.1
 
 #: At first strokes are to be longer than the shortest by so much; what is left of the gaps in the
 #: end is filled with strokes that are nearer by so much than the nearest.
@@ -66,8 +70,10 @@ def tracing(
     if not (np.isfinite(corners).all() and (corners > 0).all()):
         raise RosyError(f"{body.surface.name}: the spacing of strokes is to be above 0")
     growth = Growth(ground, corners, rules or Rules())
+    rules = growth.rules
     yield from growing(growth)
-    return collect(growth)
+    drawn = kept_apart(ground, collect(growth), rules.shortest)
+    return label_families(drawn, ground)
 
 
 def growing(growth: Growth) -> Work[None]:
@@ -79,23 +85,23 @@ def growing(growth: Growth) -> Work[None]:
     growth.rules = replace(rules, shortest=LONG * rules.shortest)
     while len(walkers):
         growth.sow(walkers.take(scattered(growth, walkers, apart)))
-        yield from _until_grown(growth, label)
+        yield from _until_grown(growth, label, STRAGGLERS)
         if apart <= NARROWEST:
             break
         apart /= 4
         walkers = walkers.take(empty(growth, walkers))
     growth.reopen(rules)
-    yield from _until_grown(growth, label)
+    yield from _until_grown(growth, label, STRAGGLERS)
     last = replace(rules, nearest=TIGHT * rules.nearest, farthest=np.inf)
     growth.resume(last)
-    while len(growth.heads.stroke):
-        growth.step()
+    yield from _until_grown(growth, label, STRAGGLERS)
     growth.reopen(last)
     yield from _until_grown(growth, label)
 
 
-def _until_grown(growth: Growth, label: str) -> Work[None]:
-    rounds = 0
+def _until_grown(growth: Growth, label: str, stragglers: float = 0.0) -> Work[None]:
+    """Step and sow, until but a share of the heads are left of as many as there were at most."""
+    rounds, most = 0, 0
     while True:
         if rounds % PAUSE == 0 or len(growth.heads.stroke) < FEW:
             sown = growth.sow_beside()
@@ -106,7 +112,11 @@ def _until_grown(growth: Growth, label: str) -> Work[None]:
                     return
             share = growth.samples.count / max(growth.expected, 1)
             yield Progress(min(share, 0.99), label)
-        if len(growth.heads.stroke):
+        heads = len(growth.heads.stroke)
+        most = max(most, heads)
+        if heads < stragglers * most:
+            return
+        if heads:
             growth.step()
         rounds += 1
 
@@ -164,7 +174,7 @@ def scattered(growth: Growth, walkers: Walkers, apart: float) -> np.ndarray:
 
 
 def collect(growth: Growth) -> Strokes:
-    """The strokes that grew, as arrays."""
+    """The strokes that grew, as arrays; their families are not numbered."""
     ground, s = growth.ground, growth.samples
     stroke, sign, triangle, begin, weights, way = (
         np.concatenate(column) for column in zip(*growth.pieces, strict=True)
@@ -201,7 +211,7 @@ def collect(growth: Growth) -> Strokes:
     points = ground.place(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(number, minlength=len(used)))])
     spacing = np.einsum("nk,nk->n", weights, growth.spacing[triangle])
-    made = Strokes(
+    return Strokes(
         points=points,
         start=start,
         family=np.zeros(len(used), dtype=np.int32),
@@ -216,4 +226,3 @@ def collect(growth: Growth) -> Strokes:
         opacity=np.ones(len(points)),
         closed=np.zeros(len(used), dtype=bool),
     )
-    return label_families(made, ground)

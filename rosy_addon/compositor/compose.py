@@ -23,8 +23,9 @@ from .look import Look
 from .members import members_images
 from .noise import MEAN, image_noise
 from .picture import Layers, Picture
-from .shading import Light, diffuse
+from .shading import Light
 from .sheets import sheets_images
+from .tone import Rendered, tone_of
 
 #: The ways to compose, by their names in a look.
 METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
@@ -38,6 +39,12 @@ AFTERWARDS = (
     "gain",
     "shading",
     "light",
+    "shadows",
+    "tone",
+    "tone_lit",
+    "tone_black",
+    "tone_white",
+    "tone_gamma",
     "colour_map",
     "hue",
     "ink",
@@ -50,7 +57,12 @@ AFTERWARDS = (
 )
 
 
-def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
+def composing(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    rendered: Rendered | None = None,
+) -> Work[Picture]:
     """Draw the fields of a G-buffer.
 
     Parameters
@@ -60,16 +72,23 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     look : Look
     lights : sequence of Light
         For a look lit by the scene.
+    rendered : Rendered, optional
+        For a look whose tone is that of a picture.
 
     Returns
     -------
     Picture
+
+    Raises
+    ------
+    RosyError
+        If the tone is to come from what is not there.
     """
     camera = gbuffer.camera
     finer = scaled_look(look)
     colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
-    light = diffuse(gbuffer, look, lights)
+    light = tone_of(gbuffer, look, lights, rendered)
     degree_of = np.asarray(gbuffer.degrees)[gbuffer.body]
     layers = []
     degrees = np.unique(degree_of).tolist()
@@ -96,9 +115,14 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     return Picture(rgba, tuple(layers))
 
 
-def compose(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Picture:
+def compose(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    rendered: Rendered | None = None,
+) -> Picture:
     """`composing`, run to its end."""
-    return drain(composing(gbuffer, look, lights))
+    return drain(composing(gbuffer, look, lights, rendered))
 
 
 def compose_planar(

@@ -14,14 +14,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from .colour import from_hex, to_linear
+from .colour import LUMINANCE, from_hex, to_linear
 from .flow import Flow, all_members
 from .images import Images
 from .look import Look
 from .noise import MEAN, image_noise
-
-#: Of linear light (Rec. 709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 #: Darkness over which a family that joins in comes to its full share.
 JOINING = 0.35

@@ -67,12 +67,8 @@ def light_cameras(
 
 def bounds_of(body: Body) -> np.ndarray:
     """(8, 3) corners of the box around a body, in world space."""
-    used = body.surface.vertices[np.unique(body.surface.triangle_vertex)]
-    ends = np.stack([used.min(axis=0), used.max(axis=0)])
-    which = np.indices((2, 2, 2)).reshape(3, 8)
-    corners = np.stack([ends[which[axis], axis] for axis in range(3)], axis=1)
     matrix = np.asarray(body.matrix, dtype=np.float64)
-    return corners @ matrix[:3, :3].T + matrix[:3, 3]
+    return body.surface.bounds @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _sun_camera(direction: np.ndarray, casting: np.ndarray, shown: np.ndarray, side: int) -> Camera:

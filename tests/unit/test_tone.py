@@ -380,12 +380,14 @@ def test_shadows_of_rays():
     camera = eye(128, place=(2.5, -6, 2.5), at=(0, 0, -0.4), fov=0.75)
     gbuffer = project(bodies, camera)
     assert gbuffer.front.all()
-    direction = np.array([0.5, -0.5, 0.7]) / np.linalg.norm([0.5, -0.5, 0.7])
+    direction = np.array([0.6, 0.3, 0.7]) / np.linalg.norm([0.6, 0.3, 0.7])
     light = sun_from(camera, direction)
     share = reached(gbuffer, light_cameras(bodies, camera, "sun", light.vector))
     origin = places(gbuffer).astype(float) + 1e-3 * gbuffer.plane_normal @ camera.view[:3, :3]
     met = meets(origin, direction, points[ring.triangle_vertex])
     assert 0.1 < met.mean() < 0.7
-    # Where light grazes the ring it is a matter of taste, and there is none of it anyway.
-    grazing = np.abs(gbuffer.plane_normal @ light.vector) < 0.1
-    assert ((share > 0.5) == ~met)[~grazing].mean() > 0.995
+    # Light that grazes gives none, and borders are soft.
+    sure = np.abs(gbuffer.plane_normal @ light.vector) > 0.1
+    sure &= (share < 0.01) | (share > 0.99)
+    assert sure.mean() > 0.9
+    assert ((share > 0.5) == ~met)[sure].mean() > 0.995

@@ -61,7 +61,7 @@ def light_cameras(
     shown = np.concatenate([bounds_of(body) for body in bodies if body.field is not None])
     vector = np.asarray(vector, dtype=np.float64)
     if kind == "sun":
-        return [_sun_camera(turn @ vector, casting, shown, side)]
+        return [sun_camera(turn @ vector, casting, shown, side)]
     return _point_cameras(turn @ (vector - camera.view[:3, 3]), casting, shown, side)
 
 
@@ -71,7 +71,18 @@ def bounds_of(body: Body) -> np.ndarray:
     return body.surface.bounds @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def _sun_camera(direction: np.ndarray, casting: np.ndarray, shown: np.ndarray, side: int) -> Camera:
+def sun_camera(direction: np.ndarray, casting: np.ndarray, shown: np.ndarray, side: int) -> Camera:
+    """What a sun sees of points.
+
+    Parameters
+    ----------
+    direction : (3,) ndarray
+        To it, world space.
+    casting, shown : (n, 3) ndarray
+        Of what may cast shadows, and of what they may fall on.
+    side : int
+        Pixels.
+    """
     direction = unit(direction)
     up = np.eye(3)[np.argmin(np.abs(direction))]
     view = look_at(direction, (0, 0, 0), up)

@@ -30,7 +30,7 @@ from .attributes import (
 )
 from .bodies import is_included, own_modifiers, prepared
 from .meshes import evaluated_mesh, mesh_surface
-from .tones import ToneWish, read_tone
+from .tones import ToneWish, image_key, read_tone
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ class Follower:
         self.errors: dict[str, str] = {}
         self._kept = Kept()
         self._learned: dict[str, _Learned] = {}
-        self._read: dict[tuple[str, int], _Read] = {}
+        self._read: dict[tuple[str, int, tuple], _Read] = {}
         self._unknown: set[str] = set()
         self._bodies: dict[tuple, tuple[Body, int]] = {}
         self._count = 0
@@ -191,7 +191,7 @@ class Follower:
     ) -> _Read | None:
         """An evaluated object's surface and field; None if they cannot be had now."""
         name = owner.name
-        key = name, thing.data.as_pointer()
+        key = name, thing.data.as_pointer(), image_key(owner, self._wish)
         if key in self._read:
             return self._read[key]
         if name in self.errors or name in self._unknown:

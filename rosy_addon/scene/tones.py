@@ -92,6 +92,14 @@ def read_tone(
     return kept.find_or_make(key, lambda: SurfaceTone(values, image))
 
 
+def image_key(owner: bpy.types.Object, wish: ToneWish | None) -> tuple[str, ...]:
+    """What is chosen on an object for a wish: another one is read anew."""
+    if wish is None or wish.kind != "image" or not has_properties():
+        return ()
+    image = owner.rosy.tone_image
+    return ("" if image is None else image.name_full, owner.rosy.tone_uv_map)
+
+
 def check_tones(
     wish: ToneWish | None, found: Sequence[tuple[SurfaceTone | None, bpy.types.Object]]
 ) -> None:
@@ -175,14 +183,19 @@ def image_luminance(image: bpy.types.Image) -> np.ndarray:
     return luminance(rgba)
 
 
-def rendered_path(scene: bpy.types.Scene) -> Path | None:
-    """The file of the picture that a scene's tone may come from, of its frame; None if none is named.
+def rendered_path(scene: bpy.types.Scene) -> Path:
+    """The file of the picture that a scene's tone is to come from, at its frame.
 
     A row of # stands for the number of the frame.
+
+    Raises
+    ------
+    RosyError
+        If none is named.
     """
     named = scene.rosy.tone_picture
     if not named:
-        return None
+        raise RosyError("the tone is to come from a picture: choose its file under Look > Tone")
     numbered = re.sub("#+", lambda row: f"{scene.frame_current:0{len(row[0])}d}", named)
     return Path(bpy.path.abspath(numbered))
 
@@ -192,6 +205,7 @@ def read_rendered(
     depsgraph: bpy.types.Depsgraph,
     camera: bpy.types.Object,
     look: Look,
+    shown: np.ndarray | None = None,
 ) -> Rendered | None:
     """The picture that the tone of a look is to come from; None if it does not come from one.
 
@@ -203,6 +217,8 @@ def read_rendered(
     camera : bpy.types.Object
         Through which it was made.
     look : Look
+    shown : (H, W) ndarray, optional
+        The luminance of the picture, if it has been read.
 
     Raises
     ------
@@ -212,13 +228,11 @@ def read_rendered(
     if look.tone != "picture":
         return None
     path = rendered_path(scene)
-    if path is None:
-        raise RosyError("the tone is to come from a picture: choose its file under Look > Tone")
     view = camera_of_object(scene, depsgraph, camera, *picture_size(scene))
-    return Rendered(_file_luminance(path), view, str(path))
+    return Rendered(file_luminance(path) if shown is None else shown, view, str(path))
 
 
-def _file_luminance(path: Path) -> np.ndarray:
+def file_luminance(path: Path) -> np.ndarray:
     """(H, W) float32 of a picture that Blender can read."""
     try:
         image = bpy.data.images.load(str(path), check_existing=False)

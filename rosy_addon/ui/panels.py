@@ -322,6 +322,8 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
             row = column.row()
             row.active = _matters(settings, name)
             _draw_setting(row, inside, name)
+        if "tone" in names:
+            column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 
     members = {
         "__doc__": f"{label}: settings of the picture.",

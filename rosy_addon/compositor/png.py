@@ -85,21 +85,25 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         If it is no such file, broken, interlaced or of fewer bits a channel.
     """
     chunks = _chunks(path, read_bytes(path))
+    broken = RosyError(f"{path}: is broken, or no .png file as it should be")
     try:
         width, height, bits, kind, _, _, interlaced = struct.unpack(">IIBBBBB", chunks[b"IHDR"])
-        depth = bits // 8
-        if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
-            raise RosyError(
-                f"{path}: only pictures of 8 or 16 bits a channel that are not interlaced are read"
-            )
-        size = _CHANNELS[kind] * depth
+    except (KeyError, struct.error):
+        raise broken from None
+    if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
+        raise RosyError(
+            f"{path}: only pictures of 8 or 16 bits a channel that are not interlaced are read"
+        )
+    depth = bits // 8
+    size = _CHANNELS[kind] * depth
+    try:
         rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), dtype=np.uint8)
         rows = rows.reshape(height, 1 + width * size)
         values = _unfiltered(rows[:, 1:].reshape(height, width, size), rows[:, 0])
         if kind == _PALETTE:
             values = _from_palette(values, chunks)
-    except (KeyError, ValueError, IndexError, struct.error, zlib.error):
-        raise RosyError(f"{path}: is broken, or no .png file as it should be") from None
+    except (KeyError, ValueError, IndexError, zlib.error):
+        raise broken from None
     if depth == 2:
         values = values.reshape(height, width, -1).view(">u2")
     return _as_rgba(values[::-1].astype(np.float32) / np.float32(256**depth - 1))

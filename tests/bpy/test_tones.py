@@ -70,8 +70,6 @@ def tone_of(wish, name="Plane"):
 @pytest.mark.parametrize("domain", ["POINT", "FACE", "CORNER"])
 @pytest.mark.parametrize("kind", ["FLOAT", "FLOAT_COLOR", "BYTE_COLOR"])
 def test_attributes_of_all_domains(wall, domain, kind):
-    if kind == "BYTE_COLOR" and domain == "FACE":
-        pytest.skip("vertex colours are on points or corners")
     mesh = wall.data
     count = {"POINT": len(mesh.vertices), "FACE": 4, "CORNER": len(mesh.loops)}[domain]
     numbers = (np.arange(count) + 0.5) / count

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from shapes import from_quads, grid_of_quads, icosphere, plane
 
-from rosy_addon.compositor.colour import from_hex, to_linear
+from rosy_addon.compositor.colour import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.presets import load_preset, preset_names
@@ -98,6 +98,25 @@ def test_presets_reproduce_a_ramp_on_the_surface(name):
         off.append(blurred(gbuffer, left_of(compose(fine, look).rgba, look)) - wanted)
     assert np.abs(off).mean() <= 0.04
     assert abs(np.mean(off)) <= 0.015
+
+
+def contrast(look, tone):
+    """The deviation of what is on screen of a wall of one tone."""
+    surface = plane(1, 1, 4.0)
+    own = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
+    thing = Body(surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), own)
+    camera = above(160, scale=3.0).scaled(look.supersampling)
+    rgba = compose(project([thing], camera), replace(look, tone="attribute")).rgba
+    left = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
+    return to_display(left).std()
+
+
+@pytest.mark.parametrize("name", HATCHED)
+def test_lines_are_as_legible_in_the_dark_as_in_the_light(name):
+    assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.1
+    # Not so those that the light is multiplied with.
+    soft = replace(PRESETS[name], ink="soft")
+    assert contrast(soft, 0.1) < 0.6 * contrast(soft, 0.9)
 
 
 def test_attributes_are_interpolated_over_triangles():

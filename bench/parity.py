@@ -105,6 +105,7 @@ def drawn_twice(
     camera: Any,
     look: Any,
     lights: Sequence[Any] = (),
+    rendered: Any = None,
 ) -> Pair:
     """Draw a picture on the card and with numpy, by brute force: with no averages shared.
 
@@ -118,13 +119,15 @@ def drawn_twice(
         Of `look.supersampling` times the size of the picture each way.
     look : Look
     lights : sequence of Light
+    rendered : Rendered, optional
     """
     side = look.supersampling
-    picture = card.draw(card.place(bodies, look.display), camera, look, lights)
+    placed = card.place(bodies, look.display)
+    picture = card.draw(placed, camera, look, lights, rendered=rendered)
     found = card.read(picture, camera.width // side, camera.height // side)
     images = card.gbuffer(camera)
     gbuffer = rosy.project(bodies, camera, look.display)
-    expected = rosy.compose(gbuffer, replace(look, method="brute"), lights).rgba
+    expected = rosy.compose(gbuffer, replace(look, method="brute"), lights, rendered).rgba
     return Pair(gbuffer, {name: np.array(image) for name, image in images.items()}, found, expected)
 
 

@@ -15,6 +15,7 @@ from ..rosy_addon.projection.camera import check_size
 from ..rosy_addon.scene.bodies import read_scene
 from ..rosy_addon.scene.looks import look_of
 from ..rosy_addon.scene.movie import encode
+from ..rosy_addon.scene.tones import tone_wish
 from ..rosy_addon.turntable import check_film, has_ffmpeg, pictures, write_film
 from .meshes import has_field_selected, is_idle, selected_meshes, with_ending
 
@@ -66,7 +67,8 @@ class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
             check_film(path)
             look = look_of(context.scene.rosy)
             look = replace(look, supersampling=max(look.supersampling, 2))
-            body = read_scene(context.evaluated_depsgraph_get(), [thing]).bodies[0]
+            wish = tone_wish(context.scene, look)
+            body = read_scene(context.evaluated_depsgraph_get(), [thing], wish=wish).bodies[0]
             view = -25.0, degrees(self.elevation)
             size = check_size(self.width, self.height)
             manager.progress_begin(0, self.pictures)

@@ -19,6 +19,7 @@ import bpy
 from .bake import Source, camera_view, scene_depsgraph, undefined_of
 from .compositor.look import Look
 from .compositor.shading import Light
+from .compositor.tone import Rendered
 from .errors import RosyError
 from .files import read_bytes, write_bytes
 from .gpu.painter import find_card, painting
@@ -31,6 +32,7 @@ from .scene.cameras import frame_camera
 from .scene.images import check_folder, frame_path, write_frame
 from .scene.lights import read_lights
 from .scene.looks import look_of
+from .scene.tones import read_rendered, tone_wish
 
 #: How the note of a frame ends; it begins as the picture's name.
 NOTE = ".rosy.txt"
@@ -169,7 +171,11 @@ def _frame(
     )[0]
     depsgraph = scene_depsgraph(scene)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
-    reading = read_scene(depsgraph, objects, undefined_of(scene), kept)
+    wish = tone_wish(scene, look)
+    reading = read_scene(depsgraph, objects, undefined_of(scene), kept, wish)
+    rendered = None
+    if look.tone == "picture":
+        rendered = read_rendered(scene, depsgraph, frame_camera(scene, frame), look)
     results = {}
     for number, source in enumerate(sources):
         start, stop = number / len(sources), (number + 1) / len(sources)
@@ -178,12 +184,14 @@ def _frame(
         lights = read_lights(depsgraph, view.view)
         path = frame_path(settings.folder, name, frame, settings.as_float)
         note = path.with_name(path.name + NOTE)
-        drawn_from = _inputs(reading, look, view, lights, settings, by_card=card is not None)
+        drawn_from = _inputs(
+            reading, look, view, lights, settings, rendered, by_card=card is not None
+        )
         inputs = f"{FORMAT}\n{drawn_from.hex()}\n".encode()
         was_there = path.is_file() and note.is_file() and read_bytes(note) == inputs
         if not was_there:
             fine = view.scaled(look.supersampling)
-            work = painting(card, reading.bodies, fine, look, lights)
+            work = painting(card, reading.bodies, fine, look, lights, rendered=rendered)
             picture = yield from part(work, start, stop)
             note.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
@@ -199,6 +207,7 @@ def _inputs(
     view: Camera,
     lights: Sequence[Light],
     settings: Settings,
+    rendered: Rendered | None,
     *,
     by_card: bool,
 ) -> bytes:
@@ -209,12 +218,16 @@ def _inputs(
     if look.light == "scene":
         for light in lights:
             parts += vars(light).values()
+    if rendered is not None:
+        parts += [rendered.luminance, rendered.camera.view, rendered.camera.projection]
     for body in reading.bodies:
         surface, field = body.surface, body.field
         parts += [body.matrix, surface.vertices, surface.triangles, surface.corner_vertex]
         if field is not None:
             parts += [surface.corner_normal, surface.corner_fan, surface.rest]
             parts += [field.degree, field.vectors, field.deviations, field.families]
+        if body.tone is not None:
+            parts += [body.tone.values, body.tone.image]
     return digest(*parts)
 
 

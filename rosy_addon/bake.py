@@ -18,6 +18,7 @@ from .scene.bodies import read_scene
 from .scene.cameras import camera_of_object, picture_size, render_camera
 from .scene.lights import read_lights
 from .scene.looks import look_of
+from .scene.tones import read_rendered, tone_wish
 
 __all__ = ["Baked", "bake", "baking"]
 
@@ -70,7 +71,7 @@ def baking(
     ------
     RosyError
         If there is nothing to draw or it cannot be drawn; see `read_scene`, `camera_of_object`,
-        `painting` and `check_appliable`.
+        `read_rendered`, `painting` and `check_appliable`.
     """
     look = look_of(scene.rosy) if look is None else look
     settings = settings_of(scene) if settings is None else settings
@@ -79,14 +80,20 @@ def baking(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     views = [camera_view(scene, depsgraph, source, size) for source in sources]
     fine = [view.scaled(look.supersampling) for view in views]
-    reading = read_scene(depsgraph, objects, undefined_of(scene), KEPT)
+    wish = tone_wish(scene, look)
+    reading = read_scene(depsgraph, objects, undefined_of(scene), KEPT, wish)
+    rendered = None
+    if look.tone == "picture":
+        rendered = read_rendered(scene, depsgraph, render_camera(scene), look)
     lights = [read_lights(depsgraph, view.view) for view in views]
     check_appliable(reading.owners, settings)
     card = find_card(settings.device, look)
     shots = []
     for number, source in enumerate(sources):
         start, stop = (0.05 + 0.9 * done / len(sources) for done in (number, number + 1))
-        work = painting(card, reading.bodies, fine[number], look, lights[number], _projecting)
+        work = painting(
+            card, reading.bodies, fine[number], look, lights[number], _projecting, rendered
+        )
         picture = yield from part(work, start, stop)
         shots.append(Shot(picture, views[number], _camera_object(scene, source)))
     KEPT.trim()

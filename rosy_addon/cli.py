@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from .compositor.colour import LUMINANCE, luminance, to_linear
 from .compositor.compose import compose
 from .compositor.look import Look
-from .compositor.png import write_png
+from .compositor.png import read_png, write_png
 from .compositor.presets import (
     FOLDER,
     find_preset,
@@ -29,11 +30,13 @@ from .compositor.presets import (
     read_preset,
 )
 from .compositor.shading import lights_of
+from .compositor.tone import Rendered
 from .errors import RosyError
 from .field.analysis import angle_errors, error_facts, field_energy
 from .field.convert import Conversion, convert
 from .field.fieldfile import READ, WRITTEN, load_field, write_field
 from .field.formats.obj import read_uv
+from .field.formats.ply import read_vertex_values
 from .field.formats.sings import SINGULARITIES, read_sings
 from .field.formats.strokes import read_strokes
 from .field.generate import KINDS, MAGNITUDES, Recipe, generate
@@ -48,6 +51,7 @@ from .progress import Work
 from .projection.camera import Camera, check_size, orbit_camera
 from .projection.gbuffer import Body
 from .projection.project import project
+from .projection.tone import SurfaceTone
 from .strokes.draw import Manner, draw
 from .strokes.svg import Pen, write_svg
 from .turntable import Encoder, check_film, has_ffmpeg, pictures, write_film
@@ -58,6 +62,9 @@ DONE, WRONG, STOPPED = 0, 2, 130
 #: Looking down a little from the front left, as portraits are taken.
 DEFAULT_VIEW = (-25.0, 20.0)
 DEFAULT_SIZE, DEFAULT_FILM_SIZE = (1024, 1024), (512, 512)
+
+#: What colours of vertices are called, as in Blender.
+COLOUR = "Color"
 
 #: What points up in files of each kind, as Blender's importers take it.
 UP = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
@@ -102,12 +109,18 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
 def render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file."""
     check_writable(options.output)
-    look = _look(options, Look(supersampling=2))  # for smooth edges: nothing draws over them later
+    look = _toned(
+        options, _look(options, Look(supersampling=2))
+    )  # for smooth edges: nothing draws over them later
     surface, field = _mesh_and_field(options)
     matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
     camera = _camera(options, surface.vertices @ matrix[:3, :3].T, look.supersampling)
-    body = Body(surface, matrix, field)
-    picture = compose(project([body], camera, look.display), look)
+    body = Body(surface, matrix, field, _surface_tone(options, surface))
+    rendered = None
+    if options.tone_picture is not None:
+        shown = luminance(read_png(options.tone_picture))
+        rendered = Rendered(shown, camera, str(options.tone_picture))
+    picture = compose(project([body], camera, look.display), look, rendered=rendered)
     write_png(options.output, picture.rgba)
 
 
@@ -118,9 +131,10 @@ def turntable(options: argparse.Namespace) -> None:
     if options.pictures < 2 or not options.rate > 0:
         raise RosyError("a film has 2 pictures or more, and a rate above 0")
     encode = _encoder(options.output)
-    look = _look(options, Look(supersampling=2))
+    look = _toned(options, _look(options, Look(supersampling=2)))
     surface, field = _mesh_and_field(options)
-    body = Body(surface, UPRIGHT[options.up or UP[options.mesh.suffix.lower()]], field)
+    matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
+    body = Body(surface, matrix, field, _surface_tone(options, surface))
     size = check_size(*options.size)
     frames = pictures(body, look, options.pictures, size, options.view, not options.ortho)
     write_film(options.output, _counted(frames, options.pictures), options.rate, encode)
@@ -481,6 +495,47 @@ def _look(options: argparse.Namespace, default: Look) -> Look:
     return look.with_settings(dict(_setting(text) for text in options.set))
 
 
+def _toned(options: argparse.Namespace, look: Look) -> Look:
+    """The look with its tone from where the command line says."""
+    given = [
+        kind
+        for kind in ("attribute", "image", "picture")
+        if getattr(options, f"tone_{kind}", None) is not None
+    ]
+    if len(given) > 1:
+        raise RosyError(f"give --tone-{given[0]} or --tone-{given[1]}, not both")
+    return replace(look, tone=given[0]) if given else look
+
+
+def _surface_tone(options: argparse.Namespace, surface: Surface) -> SurfaceTone | None:
+    """The tone that the mesh is to have of its own, if it is to have any."""
+    if options.tone_attribute is not None:
+        values = _vertex_tone(options.mesh, options.tone_attribute)
+        return SurfaceTone(values[surface.corner_vertex, None].astype(np.float32))
+    if options.tone_image is not None:
+        uv = read_uv(options.mesh) if options.mesh.suffix.lower() == ".obj" else None
+        if uv is None:
+            raise RosyError(f"{options.mesh}: has no UV map; those of .obj files are read")
+        return SurfaceTone(uv.astype(np.float32), luminance(read_png(options.tone_image)))
+    return None
+
+
+def _vertex_tone(mesh: Path, name: str) -> np.ndarray:
+    """(V,) a number for each vertex of a .ply file: a property, or the luminance of the colour."""
+    if mesh.suffix.lower() != ".ply":
+        raise RosyError(f"{mesh}: has no attributes; those of vertices of .ply files are read")
+    values = read_vertex_values(mesh)
+    rgb = [values.get(channel) for channel in ("red", "green", "blue")]
+    if name == COLOUR and all(channel is not None for channel in rgb):
+        return to_linear(np.stack(rgb, axis=1)) @ LUMINANCE
+    if name not in values:
+        there = ", ".join(f"'{key}'" for key in values) or "nothing but places"
+        raise RosyError(f"{mesh}: vertices have no '{name}', only {there}")
+    if not np.isfinite(values[name]).all():
+        raise RosyError(f"{mesh}: vertices have values of '{name}' that are not finite")
+    return values[name]
+
+
 def _setting(text: str) -> tuple[str, Any]:
     """A name and a value of NAME=VALUE, the value of the kind that the setting has."""
     name, equals, value = text.partition("=")
@@ -611,6 +666,27 @@ def _add_render(verbs: Any) -> None:
     verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
     _add_view(verb, DEFAULT_SIZE)
     _add_look(verb)
+    _add_tone(verb)
+    verb.add_argument(
+        "--tone-picture",
+        type=Path,
+        metavar="PICTURE.png",
+        help="tone from a picture of the same mesh from the same view",
+    )
+
+
+def _add_tone(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "--tone-attribute",
+        metavar="NAME",
+        help=f"tone from a property of the vertices of a .ply file, or from their colour, '{COLOUR}'",
+    )
+    verb.add_argument(
+        "--tone-image",
+        type=Path,
+        metavar="IMAGE.png",
+        help="tone from an image on the UV map of an .obj file",
+    )
 
 
 def _add_strokes(verbs: Any) -> None:
@@ -718,6 +794,7 @@ def _add_turntable(verbs: Any) -> None:
     )
     _add_view(verb, DEFAULT_FILM_SIZE)
     _add_look(verb)
+    _add_tone(verb)
 
 
 def _add_field(verbs: Any) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import blf
@@ -20,16 +21,18 @@ import numpy as np
 from .bake import undefined_of
 from .compositor.look import Look
 from .compositor.shading import Light
+from .compositor.tone import Rendered
 from .errors import DeviceError, RosyError
 from .gpu.card import NO_PLANES, Card
 from .gpu.device import blender_device
 from .gpu.processor import Processor
 from .progress import Work, drain
 from .projection.camera import Camera
-from .scene.cameras import camera_of_view
+from .scene.cameras import camera_of_view, render_camera
 from .scene.following import Followed, Follower
 from .scene.lights import read_lights
 from .scene.looks import look_of
+from .scene.tones import check_tones, file_luminance, read_rendered, rendered_path, tone_wish
 
 #: Seconds that a redraw may take while things move, and a slice of the picture that is made after.
 BUDGET, SLICE = 0.06, 0.08
@@ -49,8 +52,11 @@ TOLD = 10.0
 #: The picture is a little transparent over what is being edited.
 OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
 
+#: Methods that Blender is asked to call later.
+TIMERS = ("_watch", "_wake", "_learn", "_fetch")
+
 #: Changes of these may change a picture.
-CONCERNED = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY")
+CONCERNED = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
 
 
 @dataclass(eq=False)
@@ -90,11 +96,12 @@ class _View:
 
 @dataclass(eq=False)
 class _Layer:
-    """A view layer of a scene: its objects as they were read last."""
+    """A view layer of a scene: its objects as they were read last, and what was asked for then."""
 
     follower: Follower = field(default_factory=Follower)
     found: list[Followed] = field(default_factory=list)
     stale: bool = True
+    asked: Hashable = None
 
 
 class Live:
@@ -113,6 +120,9 @@ class Live:
         self._layers: dict[tuple[str, str], _Layer] = {}
         self._busy = False
         self._refining: _View | None = None
+        #: Pictures that tones come from, or why they cannot be read, by file and its time.
+        self._files: dict[Hashable, np.ndarray | RosyError | None] = {}
+        self._rendered: tuple[Hashable, Rendered | None] = None, None
         #: Seconds that a million pixels take.
         self._cost = 0.0
         self._drawing = [
@@ -131,7 +141,7 @@ class Live:
             where.append(handler)
             self._handlers.append((where, handler))
         # Blender knows timers by the object; a method is another one each time it is looked up.
-        self._timers = {name: getattr(self, name) for name in ("_watch", "_wake", "_learn")}
+        self._timers = {name: getattr(self, name) for name in TIMERS}
         self._after(1.0, "_watch")
 
     # --- switching -------------------------------------------------------------------------------
@@ -179,6 +189,8 @@ class Live:
             if changed.id_type not in CONCERNED:
                 continue
             concerned = True
+            if changed.id_type == "IMAGE":
+                moved |= {t.name for t in bpy.data.objects if t.rosy.tone_image == changed}
             if not update.is_updated_geometry:
                 continue
             if changed.id_type == "MESH":
@@ -234,6 +246,15 @@ class Live:
             self._busy = False
         redraw(self.spaces)
 
+    def _fetch(self) -> None:
+        """Read the pictures that tones come from: Blender may not load files while it draws."""
+        for stamp in [stamp for stamp, found in self._files.items() if found is None]:
+            try:
+                self._files[stamp] = file_luminance(stamp[0])
+            except RosyError as error:
+                self._files[stamp] = error
+        redraw(self.spaces)
+
     # --- drawing ---------------------------------------------------------------------------------
 
     def _draw(self) -> None:
@@ -266,12 +287,18 @@ class Live:
         region: bpy.types.Region,
     ) -> None:
         depsgraph = context.evaluated_depsgraph_get()
-        layer = self._read(context, depsgraph)
         look = look_of(context.scene.rosy)
+        layer = self._read(context, depsgraph, look)
         camera = camera_of_view(region, context.region_data)
         seen = [entry for entry in layer.found if _is_visible(entry.shown_by, depsgraph, space)]
         if all(entry.body.field is None for entry in seen):
             return
+        drawn = [entry for entry in seen if entry.body.field is not None]
+        wish = tone_wish(context.scene, look)
+        check_tones(wish, [(entry.body.tone, entry.owner) for entry in drawn])
+        rendered = self._picture(context.scene, depsgraph, look)
+        if look.tone == "picture" and rendered is None:
+            return  # until it has been fetched
         placed = self.maker.place([entry.body for entry in seen], look.display)
         planes = _planes(context.region_data)
         lights = read_lights(depsgraph, camera.view) if look.light == "scene" else []
@@ -284,21 +311,49 @@ class Live:
             look,
             planes.tobytes(),
             _key_of(lights),
+            rendered,
         )
-        self._make(view, wanted, placed, camera, look, lights, planes)
+        self._make(view, wanted, placed, camera, look, lights, planes, rendered)
         if view.shown is not None:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
             self.maker.show(view.shown, placed, camera, planes, opacity)
 
-    def _read(self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph) -> _Layer:
+    def _picture(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, look: Look
+    ) -> Rendered | None:
+        """The picture that the tone comes from, the same as long as it is the same; None if it does
+        not come from one, or that has yet to be fetched."""
+        if look.tone != "picture":
+            return None
+        path = rendered_path(scene)
+        stamp = path, _time_of(path)
+        if stamp not in self._files:
+            self._files = {stamp: None}
+            self._after(0.0, "_fetch")
+        found = self._files[stamp]
+        if isinstance(found, RosyError):
+            raise found
+        if found is None:
+            return None
+        made = read_rendered(scene, depsgraph, render_camera(scene), look, found)
+        key = stamp, made.camera.view.tobytes(), made.camera.projection.tobytes()
+        if self._rendered[0] != key:
+            self._rendered = key, made
+        return self._rendered[1]
+
+    def _read(
+        self, context: bpy.types.Context, depsgraph: bpy.types.Depsgraph, look: Look
+    ) -> _Layer:
         key = context.scene.name, context.view_layer.name
         layer = self._layers.setdefault(key, _Layer())
-        if layer.stale:
+        others = self.maker.sees_others or look.shadows
+        asked = others, tone_wish(context.scene, look)
+        if layer.stale or layer.asked != asked:
             layer.found = layer.follower.read(
-                depsgraph, undefined_of(context.scene), others=self.maker.sees_others
+                depsgraph, undefined_of(context.scene), others=others, wish=asked[1]
             )
-            layer.stale = False
+            layer.stale, layer.asked = False, asked
             if layer.follower.is_behind:
                 self._after(0.0, "_learn")
         return layer
@@ -312,6 +367,7 @@ class Live:
         look: Look,
         lights: list[Light],
         planes: np.ndarray,
+        rendered: Rendered | None,
     ) -> None:
         """Bring a view's picture up to date, as far as there is time for it."""
         now = time.monotonic()
@@ -324,7 +380,9 @@ class Live:
 
         def drawing(coarseness: int) -> Work[Any]:
             name = id(view), coarseness
-            return self._drawing_of(placed, camera, look, lights, planes, name, coarseness)
+            return self._drawing_of(
+                placed, camera, look, lights, planes, name, coarseness, rendered
+            )
 
         if self._cost * amount <= BUDGET:
             self._finish(view, wanted, drawing(fine), fine, amount)
@@ -345,13 +403,14 @@ class Live:
         planes: np.ndarray,
         name: Hashable,
         coarseness: int,
+        rendered: Rendered | None,
     ) -> Work[Any]:
         if coarseness > 1:
             look = look.with_settings(_coarser(look, coarseness))
             width, height = camera.width // coarseness, camera.height // coarseness
             camera = camera.resized(max(width, 1), max(height, 1))
         fine = camera.scaled(look.supersampling)
-        return self.maker.drawing(placed, fine, look, lights, planes, name)
+        return self.maker.drawing(placed, fine, look, lights, planes, name, rendered)
 
     def _finish(
         self, view: _View, wanted: Hashable, work: Work[Any], coarseness: int, amount: float
@@ -432,6 +491,14 @@ def _planes(region_3d: bpy.types.RegionView3D) -> np.ndarray:
     planes = np.array([tuple(plane) for plane in region_3d.clip_planes], dtype=np.float64)
     planes[~planes.any(axis=1)] = NO_PLANES[0]
     return planes
+
+
+def _time_of(path: Path) -> float | None:
+    """When a file was written last; None if it is not there."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return None
 
 
 def _coarser(look: Look, coarseness: int) -> dict[str, Any]:

@@ -16,6 +16,9 @@ _MAPS = {
     "grey": "111111 ffffff",
 }
 
+#: Of linear light (Rec. 709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
 
 def map_colours(values: np.ndarray, name: str) -> np.ndarray:
     """Colours of values from 0 to 1.
@@ -63,3 +66,8 @@ def to_display(linear: np.ndarray) -> np.ndarray:
     linear = np.clip(linear, 0, 1).astype(np.float32, copy=False)
     curve = np.float32(1.055) * linear ** np.float32(1 / 2.4) - np.float32(0.055)
     return np.where(linear <= 0.0031308, linear * np.float32(12.92), curve)
+
+
+def luminance(rgba: np.ndarray) -> np.ndarray:
+    """(H, W) float32 luminance of a (H, W, 4) linear picture, not premultiplied, on white."""
+    return rgba[..., 3] * (rgba[..., :3] @ LUMINANCE - 1) + 1

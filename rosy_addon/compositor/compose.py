@@ -24,8 +24,9 @@ from .members import members_images
 from .noise import MEAN, image_noise
 from .paper import paper_tooth
 from .picture import Layers, Picture
-from .shading import Light, diffuse
+from .shading import Light
 from .sheets import sheets_images
+from .tone import Rendered, tone_of
 from .waver import SWAY, swayed, waver
 
 #: The ways to compose, by their names in a look.
@@ -40,6 +41,12 @@ AFTERWARDS = (
     "gain",
     "shading",
     "light",
+    "shadows",
+    "tone",
+    "tone_lit",
+    "tone_black",
+    "tone_white",
+    "tone_gamma",
     "colour_map",
     "hue",
     "ink",
@@ -56,7 +63,12 @@ AFTERWARDS = (
 )
 
 
-def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Work[Picture]:
+def composing(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    rendered: Rendered | None = None,
+) -> Work[Picture]:
     """Draw the fields of a G-buffer.
 
     Parameters
@@ -66,16 +78,23 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     look : Look
     lights : sequence of Light
         For a look lit by the scene.
+    rendered : Rendered, optional
+        For a look whose tone is that of a picture.
 
     Returns
     -------
     Picture
+
+    Raises
+    ------
+    RosyError
+        If the tone is to come from what is not there.
     """
     camera = gbuffer.camera
     finer = scaled_look(look)
     colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
-    light = diffuse(gbuffer, look, lights)
+    light = tone_of(gbuffer, look, lights, rendered)
     degree_of = np.asarray(gbuffer.degrees)[gbuffer.body]
     layers = []
     degrees = np.unique(degree_of).tolist()
@@ -98,9 +117,14 @@ def composing(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Wor
     return Picture(rgba, tuple(layers))
 
 
-def compose(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> Picture:
+def compose(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    rendered: Rendered | None = None,
+) -> Picture:
     """`composing`, run to its end."""
-    return drain(composing(gbuffer, look, lights))
+    return drain(composing(gbuffer, look, lights, rendered))
 
 
 def compose_planar(

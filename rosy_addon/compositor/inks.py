@@ -11,11 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .colour import from_hex, to_linear
+from .colour import LUMINANCE, from_hex, to_linear
 from .look import Look
-
-#: Of linear light (Rec. 709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 #: Inks that are told apart; there are never more families of lines than members of a field.
 INKS = 12

@@ -152,6 +152,27 @@ class Look:
         lamp="A lamp over the left shoulder, as draughtsmen like it",
         scene="The lights of the scene",
     )
+    shadows: bool = _switch(
+        False, "Let things cast shadows in that light; the eye's own light casts none"
+    )
+    tone: str = _choice(
+        "light",
+        "Where it is to be light and where dark",
+        light="Where the light falls",
+        attribute="As painted or computed: a number or a colour on the mesh",
+        image="As an image says that lies on the mesh by its UV map",
+        picture="As in a picture of the scene through its camera, such as a render",
+    )
+    tone_lit: bool = _switch(
+        False, "Let the light fall on such a tone as well, instead of taking it as it is"
+    )
+    tone_black: float = _number(0.0, -1e6, 1e6, "What of the tone is black")
+    tone_white: float = _number(
+        1.0, -1e6, 1e6, "What of the tone is white; below that of black, light and dark change over"
+    )
+    tone_gamma: float = _number(
+        1.0, 0.05, 20.0, "Of the tones between: above 1 they get lighter, below darker"
+    )
     ink: str = _choice(
         "soft",
         "What streaks are made of",

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..field.frames import dot, unit
 from ..projection.gbuffer import GBuffer
+from ..projection.shadows import light_cameras, reached
 from .look import Look
 
 
@@ -50,9 +51,9 @@ def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.nd
     ----------
     gbuffer : GBuffer
     look : Look
-        Its `light` and `shading`, the strength: 0 leaves all pixels at 1.
+        Its `light`, `shadows`, and `shading`, the strength: 0 leaves all pixels at 1.
     lights : sequence of Light
-        For the light "scene". They cast no shadows.
+        For the light "scene".
 
     Returns
     -------
@@ -67,7 +68,10 @@ def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.nd
     else:
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
         for source in lights_of(look, lights):
-            light += _lambert(gbuffer, source)[:, None] * source.colour
+            given = _lambert(gbuffer, source)
+            if look.shadows:
+                given = given * _reaching(gbuffer, source)
+            light += given[:, None] * source.colour
     return (1 - look.shading + look.shading * light).astype(np.float32)
 
 
@@ -79,3 +83,12 @@ def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
     way = vector - gbuffer.position
     squared = np.maximum(dot(way, way), 1e-12)
     return light.strength * np.maximum(dot(gbuffer.normal, unit(way)), 0) / squared
+
+
+def _reaching(gbuffer: GBuffer, light: Light) -> np.ndarray:
+    """(P,) the share of a light that nothing keeps from a pixel, found once for all looks."""
+    key = "reached", light.kind, np.asarray(light.vector, dtype=np.float64).tobytes()
+    if key not in gbuffer.made:
+        cameras = light_cameras(gbuffer.bodies, gbuffer.camera, light.kind, light.vector)
+        gbuffer.made[key] = reached(gbuffer, cameras)
+    return gbuffer.made[key]

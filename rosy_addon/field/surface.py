@@ -67,6 +67,16 @@ class Surface:
         return float(np.ptp(self.vertices, axis=0).max())
 
     @cached_property
+    def bounds(self) -> np.ndarray:
+        """(8, 3) float64: corners of the box around it; vertices of no face have no say."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.corner_vertex] = True
+        points = self.vertices[used]
+        ends = np.stack([points.min(axis=0), points.max(axis=0)])
+        which = np.indices((2, 2, 2)).reshape(3, 8)
+        return np.stack([ends[which[axis], axis] for axis in range(3)], axis=1)
+
+    @cached_property
     def corner_face(self) -> np.ndarray:
         """(C,) int32: the face of each corner."""
         return corner_faces(self.face_start)

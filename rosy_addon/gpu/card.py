@@ -25,20 +25,22 @@ from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
 from ..compositor.paper import TOOTH, paper_tooth
 from ..compositor.shading import Light, lights_of
+from ..compositor.tone import Rendered, curve_of
 from ..compositor.waver import EVENED, SWAY, SWELL, WAVELENGTH, WAVES, wave_table
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface
 from ..progress import Progress, Work, drain, part
 from ..projection.camera import Camera
 from ..projection.carried import Trait
 from ..projection.gbuffer import Body
 from ..projection.rest import growth
+from ..projection.shadows import OFFSET, WIDTH, light_cameras
 from ..projection.steps import OBLIQUE_TOLERANCE, STEEPEST, TOLERANCE
+from ..projection.tone import EDGEWISE, Pyramid
 from . import passes
 from .device import Device
 from .passes import GROUP
-from .shapes import ROW_BITS, Shape, placement, shape_of, shifting, traits_of
+from .shapes import ROW_BITS, Shape, atlas_of, placement, shape_of, shifting, traits_of
 
 #: The noise is made for whole tiles of so many pixels, so that a frame may grow a little.
 TILE = 256
@@ -52,6 +54,15 @@ IMAGES_LAST, SHAPES_LAST = 32, 2
 
 #: How the magnitude of the field drives a look, for the shader.
 DRIVES = {"none": 0, "colour": 1, "length": 2, "both": 3}
+
+#: Where tones come from, for the shader.
+TONES = {"light": 0, "attribute": 1, "image": 2, "picture": 3}
+
+#: What gives light, for the shader.
+SUN, POINT, EYE = 0, 1, 2
+
+#: The longest side of an image that tones are taken from, texels: a tone wants no more.
+LARGEST_IMAGE = 2048
 
 #: How much nearer to the eye than the surface its picture is shown, in normalised depth.
 NEARER = 2e-5
@@ -69,6 +80,7 @@ class Placed:
     moving: np.ndarray
     grown: float
     kind: Kind | None
+    body: Body | None = None
 
 
 @dataclass(eq=False)
@@ -79,7 +91,29 @@ class _OnCard:
     batch: Any
     records: Any
     owners: tuple[Any, ...]
+    image: Atlas | None = None
     used: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """An image of all sizes on the card (`shapes.atlas_of`).
+
+    Attributes
+    ----------
+    texture
+    size : (int, int)
+        Of the largest.
+    halved : int
+        How often that is halved.
+    left_out : int
+        How many larger ones there were.
+    """
+
+    texture: Any
+    size: tuple[int, int]
+    halved: int
+    left_out: int
 
 
 @dataclass(frozen=True)
@@ -161,7 +195,8 @@ class Card:
     def textures(self) -> int:
         """How many are kept."""
         records = sum(entry.records is not None for entry in self._shapes.values())
-        return records + len(self._images) + len(self._tables)
+        images = sum(entry.image is not None for entry in self._shapes.values())
+        return records + images + len(self._images) + len(self._tables)
 
     def release(self) -> None:
         """Let go of everything."""
@@ -189,23 +224,19 @@ class Card:
         linear, moving = placement(body.matrix)
         kind = None if body.field is None else kinds[body.field.degree]
         layers = () if kind is None else kind.layers
-        key = id(body.surface), id(body.field), linear.tobytes(), display, layers
+        key = id(body.surface), id(body.field), id(body.tone), linear.tobytes(), display, layers
         if key not in self._shapes:
-            self._shapes[key] = self._brought(body.surface, linear, body.field, display, layers)
+            self._shapes[key] = self._brought(body, linear, display, layers)
         entry = self._shapes[key]
         entry.used = self._drawn
         moving = moving @ shifting(entry.shape.centre)
-        return Placed(entry, body.field, moving, growth(body.matrix), kind)
+        return Placed(entry, body.field, moving, growth(body.matrix), kind, body)
 
     def _brought(
-        self,
-        surface: Surface,
-        linear: np.ndarray,
-        field: RosyField | None,
-        display: str,
-        layers: Sequence[Trait],
+        self, body: Body, linear: np.ndarray, display: str, layers: Sequence[Trait]
     ) -> _OnCard:
-        shape = shape_of(surface, linear, field, display, layers)
+        surface, field, tone = body.surface, body.field, body.tone
+        shape = shape_of(surface, linear, field, display, layers, tone)
         records = None
         if shape.records is not None:
             height, width = shape.records.shape[:2]
@@ -215,7 +246,16 @@ class Card:
                     "graphics card"
                 )
             records = self.device.texture(width, height, "RGBA32F", data=shape.records)
-        return _OnCard(shape, self.device.batch(shape.corners), records, (surface, field))
+        image = self._atlas(tone.pyramid) if shape.toned and tone.image is not None else None
+        batch = self.device.batch(shape.corners)
+        return _OnCard(shape, batch, records, (surface, field, tone), image)
+
+    def _atlas(self, pyramid: Pyramid) -> Atlas:
+        most = min(LARGEST_IMAGE, self.device.largest // 2)
+        texels, size, halved = atlas_of(pyramid, most)
+        height, width = texels.shape[:2]
+        texture = self.device.texture(width, height, "RGBA16F", data=texels)
+        return Atlas(texture, size, halved, len(pyramid.levels) - 1 - halved)
 
     def covered(self, placed: Sequence[Placed], camera: Camera) -> int:
         """How many pixels are looked at to draw bodies, at most."""
@@ -230,6 +270,7 @@ class Card:
         lights: Sequence[Light] = (),
         planes: np.ndarray | None = None,
         name: Hashable = None,
+        rendered: Rendered | None = None,
     ) -> Work[Any]:
         """A picture of bodies, in steps after each of which something else may be drawn.
 
@@ -246,6 +287,8 @@ class Card:
             World space; what is on their negative side is cut away.
         name : hashable
             Pictures of one name and size are drawn over each other.
+        rendered : Rendered, optional
+            For a look whose tone is that of a picture.
 
         Returns
         -------
@@ -268,11 +311,12 @@ class Card:
         else:
             noise = self._noise(camera.width, camera.height, look)
         gbuffer["wavering"] = self._wavering(placed, camera, look)
+        gbuffer["tones"] = self._tones(placed, camera, look, lights, rendered)
         for number, kind in enumerate(kinds):
             around = _around([_window(entry, camera) for entry in placed if entry.kind == kind])
             if _is_empty(around):
                 continue
-            work = self._composing(kind, around, camera, look, lights, gbuffer, noise, fine)
+            work = self._composing(kind, around, camera, look, gbuffer, noise, fine)
             start, stop = number / len(kinds), (number + 1) / len(kinds)
             yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
         if whole:
@@ -287,9 +331,10 @@ class Card:
         lights: Sequence[Light] = (),
         planes: np.ndarray | None = None,
         name: Hashable = None,
+        rendered: Rendered | None = None,
     ) -> Any:
         """`drawing`, run to its end."""
-        return drain(self.drawing(placed, camera, look, lights, planes, name))
+        return drain(self.drawing(placed, camera, look, lights, planes, name, rendered))
 
     def show(
         self,
@@ -498,7 +543,6 @@ class Card:
         window: tuple[int, int, int, int],
         camera: Camera,
         look: Look,
-        lights: Sequence[Light],
         gbuffer: dict[str, Any],
         noise: Any,
         picture: Any,
@@ -539,7 +583,6 @@ class Card:
             passes.TURNING, (*size, kind.lines), read, {"turning": turning}, covering
         )
         drives = DRIVES[look.magnitude]
-        lit_by = lights_of(look, lights)
         textures = {
             **gbuffer,
             "cells": cells,
@@ -551,12 +594,11 @@ class Card:
                 "colours", look.colour_map, lambda: colour_stops(look.colour_map)
             ),
             "palette": self._table("palette", None, lambda: PALETTE),
-            "lights": self._light_table(lit_by),
             "thresholds": self._thresholds(scaled_look(look)),
             "inks": self._inks(kind, look),
             "tooth": self._tooth(width, height, look),
         }
-        constants = {**covering, **_look_constants(kind, look, len(lit_by))}
+        constants = {**covering, **_look_constants(kind, look)}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
         # Whole groups: the last one of any other number would reach past what was prepared here.
         rows = max(MOST_STEPS // max(steps, 1) // GROUP[1], 1) * GROUP[1]
@@ -565,6 +607,124 @@ class Card:
             band = size[0], min(rows, top - start)
             self.device.compute(passes.WALK, band, textures, {"picture": picture}, constants)
             yield Progress((start + rows - bottom) / (top - bottom), "following streamlines")
+
+    def _tones(
+        self,
+        placed: Sequence[Placed],
+        camera: Camera,
+        look: Look,
+        lights: Sequence[Light],
+        rendered: Rendered | None,
+    ) -> Any:
+        """How light each pixel is to be: `tone.tone_of`."""
+        width, height = camera.width, camera.height
+        tones = self._image("tones", width, height)
+        shared = {
+            **_camera_constants(camera),
+            **_tone_constants(look, camera, rendered),
+        }
+        taken = None if rendered is None else self._taken(rendered)
+        lit = self._lit(placed, camera, look, lights)
+        for number, entry in enumerate(placed):
+            left, bottom, right, top = box = _window(entry, camera)
+            if entry.field is None or _is_empty(box):
+                continue
+            atlas = entry.shape.image if look.tone == "image" else taken
+            own = look.tone == "picture" or entry.shape.shape.toned
+            level = 0
+            if atlas is not None:
+                level = atlas.halved
+                if look.tone == "picture":
+                    wanted = round(rendered.level_for(camera)) - atlas.left_out
+                    level = min(max(wanted, 0), atlas.halved)
+            constants = {
+                **shared,
+                **_body_constants(number, entry, camera),
+                "corner": (left, bottom),
+                "origin_of_tone": TONES[look.tone] if own else 0,
+                "image_size": (1, 1) if atlas is None else atlas.size,
+                "image_level": level,
+            }
+            textures = {
+                "seen": self._image("seen", width, height),
+                "normals": self._image("normals", width, height),
+                "triangles": entry.shape.records,
+                "lit": lit,
+                "shown": lit if atlas is None else atlas.texture,
+            }
+            size = right - left, top - bottom
+            self.device.compute(passes.TONE, size, textures, {"tones": tones}, constants)
+        return tones
+
+    def _taken(self, rendered: Rendered) -> Atlas:
+        """A picture on the card."""
+        kept = self._tables.get("rendered")
+        if kept is None or kept[0] is not rendered:
+            kept = self._tables["rendered"] = rendered, self._atlas(rendered.pyramid)
+        return kept[1]
+
+    def _lit(
+        self,
+        placed: Sequence[Placed],
+        camera: Camera,
+        look: Look,
+        lights: Sequence[Light],
+    ) -> Any:
+        """The light of all lamps together: `shading.diffuse`, in full."""
+        width, height = camera.width, camera.height
+        around = _around([_window(entry, camera) for entry in placed if entry.field is not None])
+        left, bottom, right, top = around
+        size = right - left, top - bottom
+        images = [self._image(f"lit {number}", width, height) for number in range(2)]
+        normals = self._image("normals", width, height)
+        shared = {**_camera_constants(camera), "corner": (left, bottom)}
+        for number, light in enumerate(_light_constants(look, lights)):
+            if _is_empty(around):
+                break
+            reach = normals
+            if look.shadows and light["kind"] != EYE:
+                reach = self._reach(placed, camera, light, around)
+            constants = {
+                **shared,
+                **light,
+                "shadowed": int(reach is not normals),
+                "first_time": int(number == 0),
+            }
+            textures = {"normals": normals, "reach": reach, "lit_before": images[1]}
+            self.device.compute(passes.LIT, size, textures, {"lit": images[0]}, constants)
+            images.reverse()
+        return images[1]
+
+    def _reach(
+        self, placed: Sequence[Placed], camera: Camera, light: dict[str, Any], around: Box
+    ) -> Any:
+        """The share of a light that nothing keeps from the pixels: `shadows.reached`."""
+        width, height = camera.width, camera.height
+        left, bottom, right, top = around
+        kind = "sun" if light["kind"] == SUN else "point"
+        vector = np.array(light["source"][:3])
+        images = [self._image(f"reach {one}", width, height, "RGBA16F") for one in range(2)]
+        lamps = light_cameras([entry.body for entry in placed], camera, kind, vector)
+        for number, lamp in enumerate(lamps):
+            side = lamp.width
+            shadow = self._image("shadow", side, side)
+            batches = [(entry.shape.batch, _shadow_constants(entry, lamp)) for entry in placed]
+            self.device.draw(passes.SHADOW, batches, (shadow, self._depth(side, side)), {})
+            constants = {
+                **_camera_constants(camera),
+                **_lamp_constants(lamp, camera),
+                "corner": (left, bottom),
+                "first_time": int(number == 0),
+            }
+            textures = {
+                "normals": self._image("normals", width, height),
+                "shadow": shadow,
+                "reach_before": images[1],
+            }
+            size = right - left, top - bottom
+            self.device.compute(passes.REACH, size, textures, {"reach": images[0]}, constants)
+            images.reverse()
+        return images[1]
 
     def _averaged(self, fine: Any, camera: Camera, side: int, name: Hashable) -> Any:
         width, height = camera.width // side, camera.height // side
@@ -656,13 +816,6 @@ class Card:
             kept = self._tables["tooth"] = (key, width, height), texture
         return kept[1]
 
-    def _light_table(self, lights: Sequence[Light]) -> Any:
-        data = np.zeros((max(len(lights), 1), 2, 4), dtype=np.float32)
-        for row, light in zip(data, lights, strict=False):
-            row[0, :3], row[0, 3] = light.vector, light.kind != "sun"
-            row[1, :3] = np.asarray(light.colour) * light.strength
-        return self._values("lights", data.tobytes(), lambda: data)
-
     def _values(self, name: str, key: Any, make: Callable[[], np.ndarray]) -> Any:
         """(H, W, 4) numbers as a texture, made anew if its key is another."""
         if name not in self._tables or self._tables[name][0] != key:
@@ -712,7 +865,7 @@ def _to_pixels(camera: Camera) -> tuple[float, ...]:
     return tuple((across / (2 * camera.pixels_per_unit)).ravel())
 
 
-def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
+def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
     """What of a look is told to the shader that walks, lengths in the pixels of the fine frame."""
     finer = scaled_look(look)
     _, crossing = streak_statistics(*streaks_of(finer), kind.lines, tapered=look.taper)
@@ -733,9 +886,6 @@ def _look_constants(kind: Kind, look: Look, lights: int) -> dict[str, Any]:
         "sharpness": SHARPNESS / expected_deviation(finer),
         "magnitude_drives": DRIVES[look.magnitude],
         "largest_known": look.magnitude_range,
-        "shading": look.shading,
-        "headlight": int(look.light == "headlight"),
-        "light_count": lights,
         "paper_light": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
         "ink_floor": inks.floor,
@@ -770,6 +920,60 @@ def _ink_count(kind: Kind, look: Look) -> int:
 def has_tooth(look: Look) -> bool:
     """Whether ink catches on the tooth of the paper."""
     return look.ink == "hatch" and look.paper_grain > 0
+
+
+def _light_constants(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
+    """What gives light, as the shader takes it; something that gives none if nothing does."""
+    if look.light == "headlight":
+        return [{"kind": EYE, "source": (0.0,) * 4, "colour": (1.0,) * 4}]
+    found = [
+        {
+            "kind": SUN if light.kind == "sun" else POINT,
+            "source": (*np.asarray(light.vector, dtype=float), 0.0),
+            "colour": (*np.asarray(light.colour) * light.strength, 1.0),
+        }
+        for light in lights_of(look, lights)
+    ]
+    return found or [{"kind": EYE, "source": (0.0,) * 4, "colour": (0.0,) * 4}]
+
+
+def _tone_constants(look: Look, camera: Camera, rendered: Rendered | None) -> dict[str, Any]:
+    """What a look says about tones, as the shader takes it."""
+    scale, black = curve_of(look)
+    taken = np.zeros((4, 4)) if rendered is None else rendered.between(camera)
+    return {
+        "pixels_per_unit": camera.pixels_per_unit,
+        "shading": look.shading,
+        "tone_bends_light": int(look.tone == "light"),
+        "tone_lit": int(look.tone_lit),
+        "curve_black": black,
+        "curve_scale": scale,
+        "curve_power": 1 / look.tone_gamma,
+        **{f"taken_{axis}": tuple(taken[row]) for axis, row in zip("xyw", (0, 1, 3), strict=True)},
+        "EDGEWISE": EDGEWISE,
+    }
+
+
+def _shadow_constants(entry: Placed, lamp: Camera) -> dict[str, Any]:
+    """Where a body's corners lie in the view of a lamp, and how far away."""
+    clip = lamp.projection @ lamp.view @ entry.moving
+    constants = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
+    return {**constants, "ahead": tuple(-(lamp.view @ entry.moving)[2])}
+
+
+def _lamp_constants(lamp: Camera, camera: Camera) -> dict[str, Any]:
+    """From the space of a camera to the view of a lamp."""
+    turn, shift = camera.view[:3, :3], camera.view[:3, 3]
+    back = np.eye(4)
+    back[:3, :3], back[:3, 3] = turn.T, -turn.T @ shift
+    place = lamp.view @ back
+    return {
+        **{f"lamp_{axis}": tuple(row) for axis, row in zip("xyz", place[:3], strict=True)},
+        **{f"lens_{axis}": tuple(row) for axis, row in zip("xy", lamp.projection[:2], strict=True)},
+        "lamp_perspective": int(lamp.is_perspective),
+        "offset_of_pixel": OFFSET / lamp.pixels_per_unit,
+        "WIDTH": WIDTH,
+    }
 
 
 def _body_constants(number: int, entry: Placed, camera: Camera) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from ..compositor.compose import composing
 from ..compositor.look import Look
 from ..compositor.picture import Picture
 from ..compositor.shading import Light
+from ..compositor.tone import Rendered, check_tone
 from ..errors import DeviceError
 from ..progress import Work, part
 from ..projection.camera import Camera
@@ -62,6 +63,7 @@ def painting(
     look: Look,
     lights: Sequence[Light] = (),
     projecting: Projecting = projecting,
+    rendered: Rendered | None = None,
 ) -> Work[Picture]:
     """The picture of bodies.
 
@@ -76,6 +78,8 @@ def painting(
     lights : sequence of Light
     projecting : function
         The processor's first half.
+    rendered : Rendered, optional
+        For a look whose tone is that of a picture.
 
     Returns
     -------
@@ -85,14 +89,16 @@ def painting(
     Raises
     ------
     RosyError
-        As `project.projecting`; if the card does not take the shaders, or such a size.
+        As `project.projecting`; if the tone is to come from what is not there; if the card does not
+        take the shaders, or such a size.
     """
+    check_tone(look, [body.tone for body in bodies], rendered)
     if card is None:
         gbuffer = yield from part(projecting(bodies, camera, look.display), 0.0, 0.4)
-        return (yield from part(composing(gbuffer, look, lights), 0.4, 1.0))
+        return (yield from part(composing(gbuffer, look, lights, rendered), 0.4, 1.0))
     check_bodies(bodies, camera, look.display)
     placed = card.place(bodies, look.display)
-    texture = yield from card.drawing(placed, camera, look, lights)
+    texture = yield from card.drawing(placed, camera, look, lights, rendered=rendered)
     side = look.supersampling
     rgba = card.read(texture, camera.width // side, camera.height // side)
     if not rgba[..., 3].any():

@@ -216,18 +216,84 @@ TURNING = Compute(
     (*_WINDOW, *_COVERING[1:]),
 )
 
+#: What a light sees.
+SHADOW = Drawing("shadow", (), (("away", "float"),), "nearest", (*_CLIP, ("ahead", "vec4")))
+
+REACH = Compute(
+    "reach",
+    ("normals", "shadow", "reach_before"),
+    (("reach", "RGBA16F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("lamp_x", "vec4"),
+        ("lamp_y", "vec4"),
+        ("lamp_z", "vec4"),
+        ("lens_x", "vec4"),
+        ("lens_y", "vec4"),
+        ("lamp_perspective", "int"),
+        ("offset_of_pixel", "float"),
+        ("first_time", "int"),
+        ("WIDTH", "int"),
+    ),
+)
+
+LIT = Compute(
+    "lit",
+    ("normals", "reach", "lit_before"),
+    (("lit", "RGBA32F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("source", "vec4"),
+        ("colour", "vec4"),
+        ("kind", "int"),
+        ("shadowed", "int"),
+        ("first_time", "int"),
+    ),
+)
+
+TONE = Compute(
+    "tone",
+    ("seen", "triangles", "normals", "lit", "shown"),
+    (("tones", "RGBA32F"),),
+    (
+        *_WINDOW,
+        *_CAMERA,
+        ("place_x", "vec4"),
+        ("place_y", "vec4"),
+        ("place_z", "vec4"),
+        ("body", "float"),
+        ("texels", "int"),
+        ("row_bits", "int"),
+        ("pixels_per_unit", "float"),
+        ("shading", "float"),
+        ("origin_of_tone", "int"),
+        ("tone_bends_light", "int"),
+        ("tone_lit", "int"),
+        ("curve_black", "float"),
+        ("curve_scale", "float"),
+        ("curve_power", "float"),
+        ("image_size", "ivec2"),
+        ("image_level", "int"),
+        ("taken_x", "vec4"),
+        ("taken_y", "vec4"),
+        ("taken_w", "vec4"),
+        ("EDGEWISE", "float"),
+    ),
+)
+
 WALK = Compute(
     "walk",
     (
         "cells",
         "turning[]",
-        "normals",
+        "tones",
         "values_seen",
         "traits_seen[]",
         "largest",
         "colours",
         "palette",
-        "lights",
         "thresholds",
         "inks",
         "wavering",
@@ -236,7 +302,6 @@ WALK = Compute(
     (("picture", "RGBA32F"),),
     (
         *_WINDOW,
-        *_CAMERA,
         *_COVERING,
         *_GUIDE,
         ("walk_length", "int"),
@@ -252,9 +317,6 @@ WALK = Compute(
         ("sharpness", "float"),
         ("magnitude_drives", "int"),
         ("largest_known", "float"),
-        ("shading", "float"),
-        ("headlight", "int"),
-        ("light_count", "int"),
         ("paper_light", "vec4"),
         ("ink_count", "int"),
         ("ink_floor", "float"),
@@ -313,6 +375,10 @@ ALL = (
     SETTLE,
     FLOW,
     TURNING,
+    SHADOW,
+    REACH,
+    LIT,
+    TONE,
     WALK,
     LARGEST,
     AVERAGE,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..compositor.look import Look
 from ..compositor.shading import Light
+from ..compositor.tone import Rendered
 from ..errors import NothingInViewError
 from ..progress import Work
 from ..projection.camera import Camera
@@ -60,10 +61,11 @@ class Processor:
         lights: Sequence[Light] = (),
         planes: np.ndarray | None = None,
         name: Hashable = None,
+        rendered: Rendered | None = None,
     ) -> Work[Any]:
         """As `Card.drawing`, but that nothing is cut away."""
         try:
-            picture = yield from painting(None, placed, camera, look, lights)
+            picture = yield from painting(None, placed, camera, look, lights, rendered=rendered)
         except NothingInViewError:
             return None
         height, width = picture.rgba.shape[:2]

@@ -14,6 +14,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..progress import drain
 from ..projection.carried import SIMILAR, Carried, Trait, carrying, order_of
+from ..projection.tone import Pyramid, SurfaceTone
 
 #: Texels of a row of the texture of records, and their number's bits.
 ROW_BITS = 13
@@ -23,7 +24,7 @@ ROW = 1 << ROW_BITS
 MOST_TRIANGLES = 1 << 24
 
 #: Texels of a record: three places, three normals, two of the representation; a trait has two more,
-#: and the last one belongs to the places at rest.
+#: a tone of the surface's own two, and the last one belongs to the places at rest.
 PLACES, NORMALS, VALUES = 0, 3, 6
 
 
@@ -44,6 +45,8 @@ class Shape:
         Of a record.
     bounds : (8, 3) float64 ndarray
         Corners of the box around it.
+    toned : bool
+        Whether the records say what tone it has of its own.
     """
 
     corners: np.ndarray
@@ -51,11 +54,12 @@ class Shape:
     records: np.ndarray | None
     texels: int
     bounds: np.ndarray
+    toned: bool = False
 
     @property
     def traits(self) -> int:
         """How many its field has."""
-        return max(self.texels - texels_of(0), 0) // 2
+        return max(self.texels - texels_of(0, self.toned), 0) // 2
 
 
 def placement(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -107,6 +111,7 @@ def shape_of(
     field: RosyField | None,
     display: str,
     layers: Sequence[Trait] = (),
+    tone: SurfaceTone | None = None,
 ) -> Shape:
     """A surface and its field as a device takes them.
 
@@ -120,6 +125,8 @@ def shape_of(
     display : {"smooth", "flat"}
     layers : sequence of Trait
         What each layer of the image of traits holds: that of all fields of this degree.
+    tone : SurfaceTone, optional
+        Of the surface's own.
 
     Raises
     ------
@@ -149,10 +156,12 @@ def shape_of(
         carried = drain(carrying(surface, matrix, field, display))
         rest = surface.vertices if surface.rest is None else surface.rest
         rest = rest.take(surface.triangle_vertex, axis=0)
-        records = _records(corners, rest, carried, field.degree, layers)
+        values = None if tone is None else tone.values[surface.triangles]
+        records = _records(corners, rest, carried, field.degree, layers, values)
         texels = records.shape[1]
         records = _in_rows(records)
-    return Shape(corners.reshape(-1, 4), centre, records, texels, bounds - centre)
+    toned = field is not None and tone is not None
+    return Shape(corners.reshape(-1, 4), centre, records, texels, bounds - centre, toned)
 
 
 def _records(
@@ -161,15 +170,18 @@ def _records(
     carried: Carried,
     degree: int,
     layers: Sequence[Trait],
+    tone: np.ndarray | None,
 ) -> np.ndarray:
     """(T, texels, 4) float32.
 
     Texels 0 to 2 are the places of the corners, 3 to 5 the normals there, 6 and 7 the values of the
     representation there as `Carried.z` has them, with the power of the frame that they turn with;
-    then two texels a trait, with its power and its layer. The (T, 3, 3) places of the corners at
+    then two texels a trait, with its power and its layer. With (T, 3, 1 or 2) values of a tone there
+    are two texels for them, each corner's beside the next one's. The (T, 3, 3) places of the corners at
     rest have the fourth numbers of places (x) and normals (y), and the last texel (z).
     """
-    records = np.zeros((len(corners), texels_of(len(layers)), 4), dtype=np.float32)
+    texels = texels_of(len(layers), tone is not None)
+    records = np.zeros((len(corners), texels, 4), dtype=np.float32)
     records[:, PLACES:NORMALS, 3], records[:, NORMALS:VALUES, 3] = rest[..., 0], rest[..., 1]
     records[:, -1, :3] = rest[..., 2]
     records[:, PLACES:NORMALS, :3] = corners[:, :, :3]
@@ -180,12 +192,16 @@ def _records(
         usual = np.full_like(carried.z, 1 if trait == ("deviation", 0) else 0)
         values = carried.traits.get(trait, usual)
         _put_values(records, VALUES + 2 + 2 * layer, values, order_of(trait, degree), layer)
+    if tone is not None:
+        for corner in range(3):
+            texel, column = texels - 3 + corner // 2, corner % 2 * 2
+            records[:, texel, column : column + tone.shape[2]] = tone[:, corner]
     return records
 
 
-def texels_of(traits: int) -> int:
-    """Of a record with so many traits."""
-    return VALUES + 2 * (1 + traits) + 1
+def texels_of(traits: int, toned: bool = False) -> int:
+    """Of a record with so many traits, and with a tone or without."""
+    return VALUES + 2 * (1 + traits) + 2 * toned + 1
 
 
 def _put_values(records: np.ndarray, at: int, values: np.ndarray, order: int, layer: int) -> None:
@@ -208,3 +224,34 @@ def _box(points: np.ndarray) -> np.ndarray:
     ends = np.stack([points.min(axis=1), points.max(axis=1)])
     which = np.indices((2, 2, 2)).reshape(3, 8)
     return np.stack([ends[which[axis], axis] for axis in range(3)], axis=1)
+
+
+def atlas_of(pyramid: Pyramid, most: int) -> tuple[np.ndarray, tuple[int, int], int]:
+    """An image of all sizes as one: its halves are on its right, on top of each other.
+
+    Parameters
+    ----------
+    pyramid : Pyramid
+    most : int
+        Sizes with more pixels along a side are left out.
+
+    Returns
+    -------
+    texels : (h, w, 4) float32 ndarray
+        The values in the first channel.
+    size : (int, int)
+        Width and height of the largest.
+    halved : int
+        How often that is halved.
+    """
+    levels = [level for level in pyramid.levels if max(level.shape) <= most]
+    height, width = levels[0].shape
+    tall = max(height, sum(len(level) for level in levels[1:]))
+    wide = width + (levels[1].shape[1] if len(levels) > 1 else 0)
+    texels = np.zeros((tall, wide, 4), dtype=np.float32)
+    texels[:height, :width, 0] = levels[0]
+    low = 0
+    for level in levels[1:]:
+        texels[low : low + len(level), width : width + level.shape[1], 0] = level
+        low += len(level)
+    return texels, (width, height), len(levels) - 1

@@ -12,6 +12,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
 from .carried import Carried, Trait
+from .tone import SurfaceTone
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,8 @@ class Body:
         Object to world space.
     field : RosyField or None
         On the faces of `surface`; None for what only hides others.
+    tone : SurfaceTone or None
+        How light it is to be, if that is its own affair.
     carried : dict of str to Carried
         What does not depend on the camera, by the display it is for: kept from one to the next.
     """
@@ -33,6 +36,7 @@ class Body:
     surface: Surface
     matrix: np.ndarray
     field: RosyField | None = None
+    tone: SurfaceTone | None = None
     carried: dict[str, Carried] = dataclass_field(default_factory=dict, repr=False)
 
 

@@ -154,7 +154,7 @@ def _seen(bodies: Sequence[Body], camera: Camera) -> _Seen:
     NothingInViewError
         If there are none.
     """
-    fragments, first = _rasterised(bodies, camera)
+    fragments, first = rasterised(bodies, camera)
     if len(bodies) == 1:
         if not len(fragments.pixel):
             raise_nothing_in_view(bodies, camera)
@@ -171,7 +171,7 @@ def _seen(bodies: Sequence[Body], camera: Camera) -> _Seen:
     return _Seen(fragments, body, fragments.triangle - first[body], numbers)
 
 
-def _rasterised(bodies: Sequence[Body], camera: Camera) -> tuple[Fragments, np.ndarray]:
+def rasterised(bodies: Sequence[Body], camera: Camera) -> tuple[Fragments, np.ndarray]:
     """All bodies at once, and (B,) int32 the first triangle of each in the fragments' count."""
     clip = np.concatenate([_on_clip(body, camera) for body in bodies], axis=1)
     triangles, offset = [], 0
@@ -196,7 +196,7 @@ def raise_nothing_in_view(bodies: Sequence[Body], camera: Camera) -> None:
     NothingInViewError
     """
     shown = [body for body in bodies if body.field is not None]
-    fragments, _ = _rasterised(shown, camera)
+    fragments, _ = rasterised(shown, camera)
     names = ", ".join(body.surface.name for body in shown)
     why = "hidden behind other objects" if len(fragments.pixel) else "outside the frame"
     raise NothingInViewError(

@@ -168,7 +168,7 @@ def read_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     source = f"mesh '{mesh.name}', '{name}'"
     attribute = mesh.attributes.get(name)
     if attribute is not None:
-        domain, values = attribute.domain, _numbers(attribute, source)
+        domain, values = attribute.domain, attribute_numbers(attribute, source)
     else:
         owner = next(
             (o for o in bpy.data.objects if o.data == mesh and name in o.vertex_groups), None
@@ -190,8 +190,14 @@ def read_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     return mean_over_faces(values, surface.face_start)
 
 
-def _numbers(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
-    """(n,) float64."""
+def attribute_numbers(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
+    """(n,) float64: a number for each element of an attribute's domain; of a colour its luminance.
+
+    Raises
+    ------
+    RosyError
+        If it is not on faces, points or corners, or holds anything else.
+    """
     count, kind = len(attribute.data), attribute.data_type
     if attribute.domain not in ("FACE", "POINT", "CORNER"):
         raise RosyError(f"{source}: found {_kind(attribute)}; wanted on FACE, POINT or CORNER")

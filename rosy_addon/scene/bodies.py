@@ -13,6 +13,7 @@ from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import Body
+from ..projection.tone import SurfaceTone
 from ..reuse import Kept
 from .attributes import (
     FACE_NORMAL,
@@ -28,6 +29,7 @@ from .attributes import (
 )
 from .capabilities import has_properties, is_editable
 from .meshes import evaluated_mesh, mesh_surface
+from .tones import ToneWish, check_tones, read_tone
 
 #: Custom property on every datablock that RoSy made.
 MADE = "rosy_made"
@@ -94,6 +96,7 @@ def read_scene(
     objects: Sequence[bpy.types.Object] | None = None,
     undefined: str = "error",
     kept: Kept | None = None,
+    wish: ToneWish | None = None,
 ) -> Reading:
     """All that a camera could see, as arrays.
 
@@ -113,12 +116,14 @@ def read_scene(
         What to do about vectors that are not finite.
     kept : Kept, optional
         Where bodies that have not changed since an earlier reading are found.
+    wish : ToneWish, optional
+        The tones that those with a field are to have of their own.
 
     Raises
     ------
     RosyError
         If there are no objects with a field, one of them is nowhere to be seen, or its field cannot
-        be read or is lost on the way through its modifiers.
+        be read or is lost on the way through its modifiers; or if none has such a tone.
     """
     view_layer = depsgraph.view_layer
     objects = rosy_objects(view_layer) if objects is None else list(objects)
@@ -127,26 +132,38 @@ def read_scene(
     shown = set(_shown_objects(view_layer))
     kept = Kept() if kept is None else kept
     with prepared(depsgraph, objects, undefined, kept) as names:
-        reader = _Reader(names, undefined, kept)
+        reader = _Reader(names, undefined, kept, wish)
         for instance in depsgraph.object_instances:
             if _is_seen(instance, shown):
                 reader.add(instance)
     reader.check_found(objects)
+    check_tones(wish, [(body.tone, owner) for body, owner in reader.drawn])
     return Reading(
         [body for body, _ in reader.drawn] + reader.hiding, [owner for _, owner in reader.drawn]
     )
 
 
+#: A surface, its field and its tone.
+_Read = tuple[Surface, RosyField | None, SurfaceTone | None]
+
+
 class _Reader:
     """Collects bodies; one surface and one field an evaluated mesh, however many instances."""
 
-    def __init__(self, stored: dict[bpy.types.Object, Stored], undefined: str, kept: Kept) -> None:
+    def __init__(
+        self,
+        stored: dict[bpy.types.Object, Stored],
+        undefined: str,
+        kept: Kept,
+        wish: ToneWish | None,
+    ) -> None:
         self.stored = stored
         self.undefined = undefined
         self.kept = kept
+        self.wish = wish
         self.drawn: list[tuple[Body, bpy.types.Object]] = []
         self.hiding: list[Body] = []
-        self.read: dict[tuple, tuple[Surface, RosyField | None] | None] = {}
+        self.read: dict[tuple, _Read | None] = {}
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         thing = instance.object
@@ -157,28 +174,26 @@ class _Reader:
             self.read[key] = self._read(thing, stored)
         if self.read[key] is None:
             return
-        surface, field = self.read[key]
+        surface, field, tone = self.read[key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
-        place = "body", id(surface), id(field), matrix.tobytes()
-        body = self.kept.find_or_make(place, lambda: Body(surface, matrix, field))
+        place = "body", id(surface), id(field), id(tone), matrix.tobytes()
+        body = self.kept.find_or_make(place, lambda: Body(surface, matrix, field, tone))
         if field is None:
             self.hiding.append(body)
         else:
             self.drawn.append((body, owner))
 
-    def _read(
-        self, thing: bpy.types.Object, stored: Stored | None
-    ) -> tuple[Surface, RosyField | None] | None:
+    def _read(self, thing: bpy.types.Object, stored: Stored | None) -> _Read | None:
         with evaluated_mesh(thing) as mesh:
             if mesh is None:
                 return None
             if stored is None or any(name not in mesh.attributes for name in stored.names):
-                return mesh_surface(mesh, thing.name, plain=True, kept=self.kept), None
+                return mesh_surface(mesh, thing.name, plain=True, kept=self.kept), None, None
             owner = f"object '{thing.name}'"
             surface = mesh_surface(mesh, owner, rest=True, kept=self.kept)
-            return surface, read_carried_field(
-                mesh, stored, surface, self.undefined, owner, self.kept
-            )
+            field = read_carried_field(mesh, stored, surface, self.undefined, owner, self.kept)
+            tone = read_tone(mesh, thing.original, surface, self.wish, self.kept)
+            return surface, field, tone
 
     def check_found(self, objects: Sequence[bpy.types.Object]) -> None:
         found = {owner for _, owner in self.drawn}

@@ -17,6 +17,7 @@ from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import Body
+from ..projection.tone import SurfaceTone
 from ..reuse import Kept, digest
 from .attributes import (
     Stored,
@@ -29,6 +30,7 @@ from .attributes import (
 )
 from .bodies import is_included, own_modifiers, prepared
 from .meshes import evaluated_mesh, mesh_surface
+from .tones import ToneWish, image_key, read_tone
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,7 @@ class _Read:
 
     surface: Surface
     field: RosyField | None
+    tone: SurfaceTone | None = None
 
 
 class Follower:
@@ -82,10 +85,11 @@ class Follower:
         self.errors: dict[str, str] = {}
         self._kept = Kept()
         self._learned: dict[str, _Learned] = {}
-        self._read: dict[tuple[str, int], _Read] = {}
+        self._read: dict[tuple[str, int, tuple], _Read] = {}
         self._unknown: set[str] = set()
         self._bodies: dict[tuple, tuple[Body, int]] = {}
         self._count = 0
+        self._wish: ToneWish | None = None
 
     def forget(self, names: set[str] | None = None, *, faces: bool = True) -> None:
         """Read again: the objects of some names, or all.
@@ -103,7 +107,12 @@ class Follower:
                 del self._learned[name]
 
     def read(
-        self, depsgraph: bpy.types.Depsgraph, undefined: str = "error", *, others: bool = False
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        undefined: str = "error",
+        *,
+        others: bool = False,
+        wish: ToneWish | None = None,
     ) -> list[Followed]:
         """All instances of RoSy objects, as they are now.
 
@@ -117,7 +126,12 @@ class Follower:
             What to do about vectors that are not finite.
         others : bool
             Whether to read all that hides them as well.
+        wish : ToneWish, optional
+            The tones that they are to have of their own.
         """
+        if wish != self._wish:
+            self._read.clear()
+            self._wish = wish
         self.errors.clear()
         self._unknown.clear()
         found: list[Followed] = []
@@ -135,7 +149,7 @@ class Follower:
                 continue
             by = instance.parent.original if instance.is_instance and instance.parent else owner
             matrix = np.array(instance.matrix_world, dtype=np.float64)
-            place = id(read.surface), id(read.field), matrix.tobytes()
+            place = id(read.surface), id(read.field), id(read.tone), matrix.tobytes()
             if place not in bodies:
                 bodies[place] = self._body(place, read, matrix)
             found.append(Followed(bodies[place][0], owner, by, bodies[place][1]))
@@ -149,7 +163,7 @@ class Follower:
         if place in self._bodies:
             return self._bodies[place]
         self._count += 1
-        return Body(read.surface, matrix, read.field), self._count
+        return Body(read.surface, matrix, read.field, read.tone), self._count
 
     @property
     def is_behind(self) -> bool:
@@ -177,7 +191,7 @@ class Follower:
     ) -> _Read | None:
         """An evaluated object's surface and field; None if they cannot be had now."""
         name = owner.name
-        key = name, thing.data.as_pointer()
+        key = name, thing.data.as_pointer(), image_key(owner, self._wish)
         if key in self._read:
             return self._read[key]
         if name in self.errors or name in self._unknown:
@@ -207,18 +221,21 @@ class Follower:
             if mesh is None:
                 return None
             surface = mesh_surface(mesh, label, kept=self._kept)
+            tone = read_tone(mesh, owner, surface, self._wish, self._kept)
             if original.is_editmode:
-                return _Read(surface, self._edited(mesh, original, surface, undefined, label))
+                edited = self._edited(mesh, original, surface, undefined, label)
+                return _Read(surface, edited, tone)
             given = mesh_surface(original, label, kept=self._kept)
             if _same_faces(surface, given):
                 field = self._given(original, given, undefined, label)
                 deformed = bool(own_modifiers(owner) or original.shape_keys)
-                return _Read(_at_rest(surface, given.vertices) if deformed else surface, field)
+                placed = _at_rest(surface, given.vertices) if deformed else surface
+                return _Read(placed, field, tone)
         learned = self._learned.get(owner.name)
         if learned is None or learned.topology != _topology(surface):
             self._unknown.add(owner.name)
             return None
-        return _Read(_at_rest(surface, learned.rest), learned.field)
+        return _Read(_at_rest(surface, learned.rest), learned.field, tone)
 
     def _given(
         self, mesh: bpy.types.Mesh, surface: Surface, undefined: str, label: str

@@ -114,9 +114,7 @@ def _fine(strokes: Strokes) -> tuple[Strokes, np.ndarray]:
     return strokes.densified(pieces), np.repeat(np.arange(len(pieces)), pieces)
 
 
-def _too_near(
-    ground: Ground, fine: Strokes, bent: np.ndarray, length: np.ndarray
-) -> np.ndarray:
+def _too_near(ground: Ground, fine: Strokes, bent: np.ndarray, length: np.ndarray) -> np.ndarray:
     """(n,) bool: the points that are to go."""
     arc, stroke, spacing = fine.arc, fine.stroke, fine.spacing
     grid = Nearby(1.01 * LEAST * float(np.median(spacing)), len(stroke))

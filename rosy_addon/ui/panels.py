@@ -31,7 +31,18 @@ GROUPS = {
         "crease_angle",
     ),
     "Colour": ("noise", "hue", "magnitude", "magnitude_range", "colour_map"),
-    "Light": ("shading", "light"),
+    "Light": ("shading", "light", "shadows"),
+    "Tone": (
+        "tone",
+        "tone_attribute",
+        "tone_image",
+        "tone_uv_map",
+        "tone_picture",
+        "tone_lit",
+        "tone_black",
+        "tone_white",
+        "tone_gamma",
+    ),
     "Ink": (
         "ink",
         "ink_colour",
@@ -65,12 +76,29 @@ OUTPUT = (
 
 
 #: Where a property's own name does not fit beside its value in a sidebar of usual width.
-SHORT_NAMES = {"magnitude_range": "Top Value", "undefined": "Skip Bad Vectors"}
+SHORT_NAMES = {
+    "magnitude_range": "Top Value",
+    "undefined": "Skip Bad Vectors",
+    "tone_lit": "Light Falls on It",
+    "tone_black": "Black",
+    "tone_white": "White",
+    "tone_gamma": "Gamma",
+}
 
 
 #: Height of the picture of a preset, in the panel and where one is chosen: 128 pixels, half of what
 #: it has, if the screen's pixels are of usual size.
 PICTURE = 6.4
+#: Names of something that the active mesh has.
+CHOSEN_FROM = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
+
+#: Settings of where the tone comes from, and when they count.
+TONE_SOURCES = {
+    "tone_attribute": "attribute",
+    "tone_image": "image",
+    "tone_uv_map": "image",
+    "tone_picture": "picture",
+}
 
 #: What an empty setting of the generator stands for.
 IF_EMPTY = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
@@ -335,10 +363,14 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
         column = layout.column()
         settings = context.scene.rosy
         for name in names:
-            inside = settings.look if hasattr(settings.look, name) else settings
+            inside = _holder(context, name)
+            if inside is None:
+                continue
             row = column.row()
             row.active = _matters(settings, name)
-            row.prop(inside, name, text=SHORT_NAMES.get(name))
+            _draw_setting(row, inside, name)
+        if "tone" in names:
+            column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 
     members = {
         "__doc__": f"{label}: settings of the picture.",
@@ -350,6 +382,25 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
     return type(f"VIEW3D_PT_rosy_{group}", (_Sidebar, bpy.types.Panel), members)
 
 
+def _draw_setting(row: bpy.types.UILayout, holder: Any, name: str) -> None:
+    mesh = getattr(bpy.context.view_layer.objects.active, "data", None)
+    if name in CHOSEN_FROM and isinstance(mesh, bpy.types.Mesh):
+        row.prop_search(holder, name, mesh, CHOSEN_FROM[name], text=SHORT_NAMES.get(name))
+    elif name == "tone_image":
+        row.template_ID(holder, name, open="image.open", text="Image")
+    else:
+        row.prop(holder, name, text=SHORT_NAMES.get(name))
+
+
+def _holder(context: bpy.types.Context, name: str) -> Any:
+    """What has a setting: the look, the scene, or the active mesh; None if there is no such mesh."""
+    settings, thing = context.scene.rosy, context.view_layer.objects.active
+    for holder in (settings.look, settings):
+        if hasattr(holder, name):
+            return holder
+    return thing.rosy if thing is not None and thing.type == "MESH" else None
+
+
 def _matters(settings: Any, name: str) -> bool:
     """Whether a setting makes a difference beside the others as they are."""
     look = settings.look
@@ -357,8 +408,13 @@ def _matters(settings: Any, name: str) -> bool:
         return look.magnitude != "none" and (name, look.magnitude) != ("colour_map", "length")
     if name in {"weights", "view_plane"}:
         return look.method == "members"
-    if name == "light":
-        return look.shading > 0
+    if name in {"light", "shadows"}:
+        lit = look.shading > 0 and (look.tone == "light" or look.tone_lit)
+        return lit and (name == "light" or look.light != "headlight")
+    if name in TONE_SOURCES:
+        return look.tone == TONE_SOURCES[name]
+    if name == "tone_lit":
+        return look.tone != "light"
     if name == "directory":
         return settings.store == "SAVED"
     if name in GROUPS["Ink"] and name != "ink":

@@ -238,6 +238,18 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Leave Out Bad Vectors",
         description="Take vectors that are not finite for undefined, instead of refusing the field",
     )
+    tone_attribute: bpy.props.StringProperty(
+        name="Attribute",
+        description="On points, faces or corners of the meshes; their active colour if empty. Objects "
+        "without it have the light",
+    )
+    tone_picture: bpy.props.StringProperty(
+        name="Picture",
+        description="File of a picture through the scene's camera, such as a render; # stand for the "
+        "number of the frame",
+        subtype="FILE_PATH",
+        options=folder_options(),
+    )
     bakes: bpy.props.CollectionProperty(type=RosyBake)
     strokes: bpy.props.PointerProperty(type=RosyStrokes)
 
@@ -266,6 +278,14 @@ class RosyObject(bpy.types.PropertyGroup):
         name="Draw the Field",
         description="Whether the field of this object is drawn; if not, it only hides others",
         default=True,
+    )
+    tone_image: bpy.props.PointerProperty(
+        name="Image",
+        description="On this object, how light it is to be; objects without one have the light",
+        type=bpy.types.Image,
+    )
+    tone_uv_map: bpy.props.StringProperty(
+        name="UV Map", description="How the image lies on this object; its active one if empty"
     )
 
 

@@ -24,6 +24,7 @@ from rosy_addon.compositor.covering import sheets_around
 from rosy_addon.compositor.flow import surface_flow
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
+from rosy_addon.compositor.tone import Rendered
 from rosy_addon.field.directions import directions_field, tensor_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.representation import face_frames
@@ -36,6 +37,7 @@ from rosy_addon.gpu.device import SIZES, _aligned, _packed
 from rosy_addon.gpu.shapes import ROW, placement, shape_of, traits_of
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.tone import SurfaceTone
 
 AXIS = (0.3, 0.2, 1.0)
 
@@ -435,9 +437,11 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
     return orthographic_camera(at, *size, scale=2.6, shift=(0.06, -0.04))
 
 
-def alike(card, bodies, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98):
+def alike(
+    card, bodies, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, rendered=None
+):
     """Compare with numpy; the pictures."""
-    pair = drawn_twice(ROSY, card, bodies, camera, look, lights)
+    pair = drawn_twice(ROSY, card, bodies, camera, look, lights, rendered)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500
@@ -599,7 +603,7 @@ def test_subpixels(card, side):
     np.testing.assert_allclose(
         pair.card[border][:, :3].mean(), pair.numpy[border][:, :3].mean(), atol=0.01
     )
-    constants = card_module._look_constants(kinds_of([ball(2).field])[2], look, 0)
+    constants = card_module._look_constants(kinds_of([ball(2).field])[2], look)
     wanted = look.gain * averaging_gain(scaled_look(look))
     assert constants["gain"] == pytest.approx(wanted)
 
@@ -647,6 +651,93 @@ def test_lights_do_not_count_for_a_headlight(card):
         card.read(card.draw(drawn, camera, look, lights), *SIZE).copy() for lights in ((), [SUN])
     )
     np.testing.assert_array_equal(dark, lit)
+
+
+# --- tones -----------------------------------------------------------------------------------------
+
+TONED = {
+    "as it is": {},
+    "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
+    "bent": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
+    "turned over": {"tone_black": 1.0, "tone_white": 0.0},
+    "hatched": {"ink": "hatch", "grain": 3.0},
+}
+
+
+def toned(tone, surface=BALL, matrix=None):
+    """A ball with a tone of its own."""
+    return Body(surface, np.eye(4) if matrix is None else matrix, field_of(surface, 4), tone)
+
+
+def waves(surface=BALL):
+    """Numbers at corners."""
+    values = 0.5 + 0.4 * np.sin(3 * surface.vertices[surface.corner_vertex] @ (1.0, 0.3, 0.5))
+    return SurfaceTone(values[:, None].astype(np.float32))
+
+
+def chequered(side=200, repeat=2.0):
+    """An image on a map of the ball that is not continuous everywhere; some of it is very fine."""
+    x, y, z = BALL.vertices[BALL.corner_vertex].T
+    uv = np.stack([0.5 + 0.5 * x + 0.1 * z, 0.5 + 0.5 * z - 0.1 * y], axis=1) * repeat
+    row, column = np.indices((side, side + 30))
+    board = 0.2 + 0.6 * ((row // 11 + column // 13) % 2)
+    return SurfaceTone(uv.astype(np.float32), board.astype(np.float32))
+
+
+@pytest.mark.parametrize("name", TONED)
+@pytest.mark.parametrize("perspective", [True, False])
+def test_tones_of_attributes(card, name, perspective):
+    look = replace(LOOK, tone="attribute", **TONED[name])
+    alike(card, [toned(waves())], view(perspective=perspective), look)
+
+
+@pytest.mark.parametrize("name", TONED)
+@pytest.mark.parametrize("repeat", [0.5, 3.0])
+def test_tones_of_images(card, name, repeat):
+    look = replace(LOOK, tone="image", **TONED[name])
+    alike(card, [toned(chequered(repeat=repeat))], view(), look)
+
+
+@pytest.mark.parametrize("name", TONED)
+@pytest.mark.parametrize("finer", [1, 3])
+def test_tones_of_pictures(card, name, finer):
+    look = replace(LOOK, tone="picture", **TONED[name])
+    taken = view(azimuth=0.5)
+    shown = np.random.default_rng(1).random((18 * finer, 20 * finer)).astype(np.float32)
+    alike(card, [ball()], view(), look, rendered=Rendered(shown, taken))
+
+
+def test_bodies_without_a_tone_have_the_light(card):
+    bodies = [toned(waves(), matrix=placed(0.5 * np.eye(3), (-0.6, 0, 0)))]
+    bodies.append(ball(4, placed(0.5 * np.eye(3), (0.6, 0, 0))))
+    look = replace(LOOK, tone="attribute", tone_gamma=1.5, shading=0.8)
+    alike(card, bodies, view(), look)
+
+
+def test_tones_beside_traits(card):
+    """Of free directions: records have more in them."""
+    surface = icosphere(3)
+    thing = Body(surface, np.eye(4), conjugate_field(surface), waves(surface))
+    look = replace(LOOK, tone="attribute", anchor="surface")
+    alike(card, [thing], view(), look)
+
+
+@pytest.mark.parametrize(
+    "lights", [[SUN], [POINT], [SUN, POINT], [replace(POINT, vector=np.array([0.1, 1.3, -4.0]))]]
+)
+@pytest.mark.parametrize("ink", ["soft", "hatch"])
+def test_shadows(card, lights, ink):
+    """On the ground, on each other, and of what has no field; from one view of a light and from six."""
+    ground = plane(4, 4)
+    bodies = [
+        Body(ground, placed(2 * np.eye(3), (0, 0, -0.6)), field_of(ground, 4)),
+        ball(4, placed(0.5 * np.eye(3), (-0.5, 0.2, 0))),
+        Body(BALL, placed(0.3 * np.eye(3), (0.6, -0.3, 0.1)), None),
+    ]
+    look = replace(LOOK, light="scene", shading=0.9, shadows=True, ink=ink)
+    shaded = alike(card, bodies, view(), look, lights, agreement=0.995)
+    bare = drawn_twice(ROSY, card, bodies, view(), replace(look, shadows=False), lights)
+    assert shaded.card[..., :3].mean() < 0.98 * bare.card[..., :3].mean()
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ from conftest import ROOT
 from shapes import icosphere, torus
 
 from rosy_addon.cli import main
+from rosy_addon.compositor.colour import to_linear
+from rosy_addon.compositor.png import write_png
 from rosy_addon.field.surface import Surface
 
 
@@ -356,6 +358,100 @@ def test_the_uv_map_of_a_file(shared_data, tmp_path):
     assert done.returncode == 0, done.stderr
     facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
     assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15
+
+
+# --- tones ----------------------------------------------------------------------------------------
+
+HATCHED = ("--preset", "cross-hatch", "--size", "128x128", "--generate", "axis")
+
+
+def write_ply(path, surface: Surface, **columns):
+    """With more numbers of vertices: bytes where they are whole, floats where they are not."""
+    kinds = {
+        name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
+    }
+    head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"property {kind} {name}" for name, kind in kinds.items()]
+    head += [f"element face {surface.face_count}", "property list uchar int vertex_indices"]
+    head.append("end_header")
+    rows = zip(surface.vertices.tolist(), *(v.tolist() for v in columns.values()), strict=True)
+    lines = [" ".join(map(repr, [*place, *more])) for place, *more in rows]
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    lines += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(head + lines) + "\n")
+    return path
+
+
+def halves_of(path) -> tuple[float, float]:
+    """How light the left and the right half of what is drawn is, linear."""
+    rgba = pixels_of(path) / 255
+    whole = rgba[..., 3] == 1
+    left, right = whole.copy(), whole.copy()
+    left[:, 58:], right[:, :70] = False, False
+    light = to_linear(rgba[..., 1])
+    return float(light[left].mean()), float(light[right].mean())
+
+
+@pytest.fixture(scope="module")
+def painted(tmp_path_factory):
+    """A ball, from the front dark to the left and light to the right, by a colour and by a number."""
+    ball = icosphere(4)
+    right = ball.vertices[:, 0] > 0
+    grey = np.where(right, 230, 60)
+    colours = dict.fromkeys(("red", "green", "blue"), grey)
+    path = tmp_path_factory.mktemp("painted") / "ball.ply"
+    return write_ply(path, ball, **colours, cavity=np.where(right, 0.8, 0.1))
+
+
+def test_tones_of_vertices(painted, tmp_path):
+    out = tmp_path / "a.png"
+    for name, dark, light in (("cavity", 0.1, 0.8), ("Color", 0.045, 0.79), ("red", 0.235, 0.9)):
+        done = main(["render", str(painted), *HATCHED, "-o", str(out), "--view", "0,0",
+                     "--tone-attribute", name])  # fmt: skip
+        assert done == 0
+        left, right = halves_of(out)
+        assert left == pytest.approx(dark, abs=0.08) and right == pytest.approx(light, abs=0.08)
+    done = main(["turntable", str(painted), "-o", str(tmp_path / "a.gif"), "--size", "64x64",
+                 "--pictures", "2", "--generate", "axis", "--tone-attribute", "cavity"])  # fmt: skip
+    assert done == 0
+
+
+def test_tones_of_pictures_and_images(sphere, tmp_path):
+    shown = np.ones((64, 64, 4), dtype=np.float32)
+    shown[:, :32, :3], shown[:, 32:, :3] = 0.2, 0.85
+    write_png(tmp_path / "shot.png", shown)
+    out = tmp_path / "a.png"
+    words = [*HATCHED, "-o", str(out), "--view", "0,0"]
+    assert main(["render", str(sphere), *words, "--tone-picture", str(tmp_path / "shot.png")]) == 0
+    left, right = halves_of(out)
+    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
+    # A square across the view, the image upright on it.
+    square = tmp_path / "square.obj"
+    square.write_text(
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "f 1/1 2/2 3/3 4/4\n"
+    )
+    words = ["render", str(square), *words, "--axis", "1,0,0", "--degree", "2"]
+    assert main([*words, "--tone-image", str(tmp_path / "shot.png")]) == 0
+    left, right = halves_of(out)
+    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
+
+
+def test_tones_that_are_not_there(painted, sphere, tmp_path):
+    write_png(tmp_path / "wide.png", np.ones((16, 64, 4), dtype=np.float32))
+    out = ("-o", tmp_path / "a.png", "--size", "64x64")
+    for mesh, words, wanted in (
+        (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
+        (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
+        (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
+        (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
+        (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
+        (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
+        (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("not both",)),
+    ):
+        assert_refused(rosy("render", mesh, *out, *words), *wanted)
+        assert not (tmp_path / "a.png").exists()
 
 
 def test_a_field_that_follows_says_so(sphere, tmp_path):

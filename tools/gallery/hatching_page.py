@@ -6,13 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.presets import load_preset
-from rosy_addon.field.generate import curvature_field
+from rosy_addon.compositor.shading import Light
+from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.field.surface import Surface
+from rosy_addon.projection.camera import look_at, perspective_camera
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.occlusion import ambient_occlusion
+from rosy_addon.projection.project import project
+from rosy_addon.projection.tone import SurfaceTone
 
 from .figure_11 import smoothed_a_little
 from .looks_page import IMAGES
-from .shapes import suzanne
+from .shapes import plane, sphere, suzanne
 from .sheet import Panel, display, save, sheet
 from .solid import compose_view, view
 
@@ -61,3 +71,61 @@ def write() -> None:
         shown = compose_view(monkey, field, turned, camera)
         guided.append(Panel(display(shown.rgba), f"guiding angle {degrees} degrees"))
     save(sheet([guided]), IMAGES / "hatching-guide.png")
+    save(sheet(_tones(monkey, field)), IMAGES / "hatching-tone.png")
+
+
+def _tones(monkey: Surface, field: RosyField) -> list[list[Panel]]:
+    """One thing after another that tones come from, on Suzanne and on a ball that stand on a table."""
+    ball, table = sphere(), plane(24)
+    fields = field, smoothest_field(ball, 4), axis_field(table, 4, (1.0, 0.25, 0.0))
+    surfaces, places = (
+        (monkey, ball, table),
+        (_at(0, 0, 0.985), _at(1.55, -0.75, 0.5, 0.5), _at(0, 0, 0, 7.0)),
+    )
+    bare = [Body(*entry) for entry in zip(surfaces, places, fields, strict=True)]
+    hidden = [
+        replace(body, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]), carried={})
+        for number, body in enumerate(bare)
+    ]
+    mapped = [replace(body, tone=_banded(body.surface), carried={}) for body in bare]
+    mapped[2] = bare[2]
+    look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
+    return [
+        [
+            _tone_panel(bare, look, "light: scene, shadows"),
+            _tone_panel(hidden, replace(look, tone="attribute"), "tone: attribute, of occlusion"),
+        ],
+        [
+            _tone_panel(
+                hidden,
+                replace(look, tone="attribute", tone_lit=True, tone_gamma=1.3),
+                "the same, lit",
+            ),
+            _tone_panel(mapped, replace(look, tone="image", tone_lit=True), "tone: image, lit"),
+        ],
+    ]
+
+
+def _tone_panel(bodies: list[Body], look: Look, label: str) -> Panel:
+    side = look.supersampling * SIDE
+    camera = perspective_camera(
+        look_at((1.9, -6.0, 3.3), (0.45, -0.2, 0.75)), side, side, fov=np.radians(29)
+    )
+    toward = np.array([-0.55, -0.5, 0.75])
+    sun = Light("sun", camera.view[:3, :3] @ (toward / np.linalg.norm(toward)), np.ones(3), 1.25)
+    return Panel(display(compose(project(bodies, camera), look, [sun]).rgba), label)
+
+
+def _banded(surface: Surface) -> SurfaceTone:
+    """An image of dark and light bands, laid over a surface from below to above."""
+    rows = np.arange(512)[:, None] / 512
+    image = np.where(rows * 6 % 1 < 0.5, 0.45, 0.95) + np.zeros(512)
+    x, _, z = surface.vertices[surface.corner_vertex].T
+    uv = np.stack([x / 3 + 0.5, z / 2.4 + 0.5 + 0.04 * np.sin(5 * x)], axis=1)
+    return SurfaceTone(uv.astype(np.float32), image.astype(np.float32))
+
+
+def _at(x: float, y: float, z: float, scale: float = 1.0) -> np.ndarray:
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = x, y, z
+    return matrix

@@ -49,10 +49,7 @@ _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 def read_ply(path: Path) -> Polygons:
     """Read a .ply file of polygons."""
-    data = read_bytes(path)
-    order, elements, body = _header(path, data)
-    read = _text_elements if order == "" else _binary_elements
-    columns = read(path, data, body, order, elements)
+    columns, _ = _columns(path)
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
@@ -73,6 +70,33 @@ def read_ply(path: Path) -> Polygons:
     with np.errstate(invalid="ignore"):  # signalling NaN; refused with the other ones
         vertices = vertices.astype(np.float64)
     return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
+
+
+def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
+    """What the vertices of a .ply file have besides their places.
+
+    Returns
+    -------
+    dict of str to (V,) float64 ndarray
+        By property. Whole numbers are taken as the share of the largest that their type holds.
+    """
+    columns, elements = _columns(path)
+    found = {}
+    for entry in next((e.properties for e in elements if e.name == "vertex"), []):
+        if entry.name in "xyz" or entry.count_type is not None:
+            continue
+        kind = np.dtype(entry.type)
+        whole = np.iinfo(kind).max if kind.kind in "iu" else 1
+        found[entry.name] = columns["vertex"][entry.name].astype(np.float64) / whole
+    return found
+
+
+def _columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
+    """All values of a file by element and property, and what it says its elements are."""
+    data = read_bytes(path)
+    order, elements, body = _header(path, data)
+    read = _text_elements if order == "" else _binary_elements
+    return read(path, data, body, order, elements), elements
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:

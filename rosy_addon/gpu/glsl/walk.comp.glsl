@@ -122,26 +122,6 @@ float grey(vec3 mean)
   return channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
 }
 
-// What Lambert's law leaves (`shading.diffuse`). A light is two texels: where it is or, for a sun
-// (w = 0), the direction to it; and its colour times its strength.
-vec3 diffuse(vec3 normal, vec3 position, vec3 toward_eye)
-{
-  vec3 light = vec3(0.0);
-  if (headlight != 0) {
-    light = vec3(max(dot(normal, toward_eye), 0.0));
-  }
-  else {
-    for (int number = 0; number < light_count; ++number) {
-      vec4 source = texelFetch(lights, ivec2(0, number), 0);
-      vec3 colour = texelFetch(lights, ivec2(1, number), 0).xyz;
-      vec3 way = source.w == 0.0 ? source.xyz : source.xyz - position;
-      float squared = source.w == 0.0 ? 1.0 : max(dot(way, way), 1e-12);
-      light += colour * max(dot(normal, unit_or_zero(way)), 0.0) / squared;
-    }
-  }
-  return 1.0 - shading + shading * light;
-}
-
 float smooth_step(float x)
 {
   x = clamp(x, 0.0, 1.0);
@@ -239,11 +219,7 @@ void main()
     stored = angle_of(known);
     told = known == vec2(0.0) ? 1 : families;
   }
-  vec4 normal = texelFetch(normals, pixel, 0);
-  vec2 ray = pixel_ray(pixel, vec2(frame), across, shift);
-  float depth = abs(normal.w);
-  vec3 position = vec3(ray * (perspective != 0 ? depth : 1.0), -depth);
-  vec3 light = diffuse(normal.xyz, position, direction_to_eye(ray, perspective != 0));
+  vec3 light = texelFetch(tones, pixel, 0).xyz;
   // What light the ink is to leave, and between how many lines that is shared.
   float tone_here = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
   float left = light_ink != 0 ? 1.0 - tone_here : tone_here;

@@ -1,0 +1,345 @@
+"""Where tones come from in Blender: attributes, images, files, and occlusion."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.animation import bake_animation
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.compositor.colour import to_linear
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.progress import drain
+from rosy.rosy_addon.scene.apply import settings_of
+from rosy.rosy_addon.scene.bodies import read_scene
+from rosy.rosy_addon.scene.following import Follower
+from rosy.rosy_addon.scene.occlusion import OCCLUSION, storing_occlusion
+from rosy.rosy_addon.scene.tones import ToneWish, image_luminance, read_rendered, tone_wish
+from scenes import add_field, add_mesh, add_plane, link, pixels
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def add_attribute(mesh, name, domain, kind, values):
+    attribute = mesh.attributes.new(name, kind, domain)
+    key = "color" if "COLOR" in kind else "value"
+    attribute.data.foreach_set(key, np.asarray(values, dtype=np.float32).ravel())
+    mesh.update()
+
+
+def add_image(name="Board", values=((0.0, 1.0), (0.5, 0.25)), *, as_float=False, space=None):
+    """An image of grey values, rows from the bottom."""
+    values = np.asarray(values, dtype=np.float32)
+    height, width = values.shape
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
+    if space is not None:
+        image.colorspace_settings.name = space
+    rgba = np.ones((height, width, 4), dtype=np.float32)
+    rgba[..., :3] = values[..., None]
+    image.pixels.foreach_set(rgba.ravel())
+    return image
+
+
+def save_picture(path, values):
+    """A .png file of display values, rows from the bottom."""
+    image = add_image("aside", values)
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+
+
+@pytest.fixture
+def wall(scene, camera):
+    """A square across the view, of four faces."""
+    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
+
+
+def tone_of(wish, name="Plane"):
+    reading = read_scene(depsgraph(), wish=wish)
+    return reading.bodies[[owner.name for owner in reading.owners].index(name)].tone
+
+
+# --- attributes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("domain", ["POINT", "FACE", "CORNER"])
+@pytest.mark.parametrize("kind", ["FLOAT", "FLOAT_COLOR", "BYTE_COLOR"])
+def test_attributes_of_all_domains(wall, domain, kind):
+    mesh = wall.data
+    count = {"POINT": len(mesh.vertices), "FACE": 4, "CORNER": len(mesh.loops)}[domain]
+    numbers = (np.arange(count) + 0.5) / count
+    if kind == "FLOAT":
+        values, wanted = numbers, numbers
+    else:
+        values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
+        wanted = values[:, :3] @ LUMINANCE
+    add_attribute(mesh, "Ink", domain, kind, values)
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    face = np.repeat(np.arange(4), 4)
+    at = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
+    found = tone_of(ToneWish("attribute", "Ink")).values
+    np.testing.assert_allclose(found[:, 0], wanted[at], atol=0.01 if kind == "BYTE_COLOR" else 1e-6)
+
+
+def test_no_name_is_the_active_colour(wall):
+    add_attribute(wall.data, "Some", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.2))
+    add_attribute(wall.data, "Paint", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.7))
+    wall.data.color_attributes.active_color_name = "Paint"
+    found = tone_of(ToneWish("attribute")).values
+    np.testing.assert_allclose(found, 0.7, atol=1e-6)
+
+
+def test_modifiers_carry_attributes(wall):
+    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.linspace(0, 1, 9))
+    wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
+    found = tone_of(ToneWish("attribute", "Ink")).values
+    assert len(found) == 4 * 16
+    height = depsgraph().id_eval_get(wall).data
+    places = np.empty(3 * len(height.vertices), dtype=np.float32)
+    height.vertices.foreach_get("co", places)
+    corner = np.empty(len(height.loops), dtype=np.int32)
+    height.loops.foreach_get("vertex_index", corner)
+    x, _, z = places.reshape(-1, 3)[corner].T
+    np.testing.assert_allclose(found[:, 0], 0.5 + x / 8 + 3 * z / 8, atol=1e-5)
+
+
+def test_objects_without_the_attribute_have_the_light(wall, monkey):
+    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
+    assert tone_of(ToneWish("attribute", "Ink"), "Suzanne") is None
+
+
+def test_attributes_that_nobody_has(wall, monkey):
+    add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
+    with pytest.raises(RosyError) as caught:
+        read_scene(depsgraph(), wish=ToneWish("attribute", "Pain"))
+    said = str(caught.value)
+    assert "'Pain'" in said and "'Paint'" in said and "'Plane'" in said and "'Suzanne'" in said
+    with pytest.raises(RosyError, match="no vertex colours"):
+        read_scene(depsgraph(), wish=ToneWish("attribute"))
+
+
+def test_attributes_that_will_not_do(wall):
+    with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': found"):
+        read_scene(depsgraph(), wish=ToneWish("attribute", "rosy"))
+    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
+    with pytest.raises(RosyError, match="attribute 'Ink': has values that are not finite"):
+        read_scene(depsgraph(), wish=ToneWish("attribute", "Ink"))
+
+
+# --- images ---------------------------------------------------------------------------------------
+
+
+def test_luminance_of_images():
+    values = np.array([[0.0, 1.0], [0.5, 0.25]])
+    eight = image_luminance(add_image(values=values))
+    np.testing.assert_allclose(eight, to_linear(np.rint(values * 255) / 255), atol=1e-3)
+    linear = image_luminance(add_image("deep", values, as_float=True))
+    np.testing.assert_allclose(linear, values, atol=1e-6)
+    data = add_image("data", values, space="Non-Color")
+    np.testing.assert_allclose(image_luminance(data), values, atol=3e-3)
+    clear = bpy.data.images.new("clear", 2, 2, alpha=True)
+    clear.pixels.foreach_set(np.zeros(16, dtype=np.float32))
+    np.testing.assert_allclose(image_luminance(clear), 1)
+
+
+def add_uv(mesh):
+    """From 0 to 1 over the square."""
+    layer = mesh.uv_layers.new(name="Map")
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    uv = places.reshape(-1, 3)[corner][:, [0, 2]] * 0.5 + 0.5
+    layer.uv.foreach_set("vector", uv.ravel())
+
+
+def test_images_on_uv_maps_are_drawn(scene, wall):
+    """Streaks of a picture are as light as the image says, quarter by quarter."""
+    add_uv(wall.data)
+    quarters = np.array([[0.1, 0.9], [0.6, 0.3]])
+    wall.rosy.tone_image = add_image(values=np.kron(quarters, np.ones((8, 8))), as_float=True)
+    bpy.context.view_layer.update()
+    look = Look(ink="hatch", tone="image", grain=2.0)
+    rgba = pixels(bake(scene, look=look, size=(256, 256))[0].image)
+    covered = np.argwhere(rgba[..., 3] == 1)
+    low, high = covered.min(axis=0), covered.max(axis=0)
+    size = high - low
+    for place, wanted in np.ndenumerate(quarters):
+        # The middle of each.
+        start, stop = (low + size * (np.array(place) + part) // 2 for part in (0.2, 0.8))
+        (bottom, left), (top, right) = start.astype(int), stop.astype(int)
+        got = to_linear(rgba[bottom:top, left:right, 1]).mean()
+        assert got == pytest.approx(wanted, abs=0.08)
+
+
+def test_images_without_a_map_or_none_at_all(wall):
+    with pytest.raises(RosyError, match="no image is chosen for the tone of 'Plane'"):
+        read_scene(depsgraph(), wish=ToneWish("image"))
+    wall.rosy.tone_image = add_image()
+    bpy.context.view_layer.update()
+    with pytest.raises(RosyError, match="object 'Plane': its mesh has no UV map"):
+        read_scene(depsgraph(), wish=ToneWish("image"))
+    add_uv(wall.data)
+    assert tone_of(ToneWish("image")).image.shape == (2, 2)
+    wall.rosy.tone_uv_map = "Other"
+    with pytest.raises(RosyError, match="no UV map 'Other'"):
+        read_scene(depsgraph(), wish=ToneWish("image"))
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+PICTURE = Look(ink="hatch", tone="picture", grain=2.0)
+
+
+def test_pictures_from_files(scene, wall, tmp_path):
+    """Each half of the frame as light as in the file."""
+    values = np.full((32, 32), 0.9)
+    values[:, 16:] = 0.4
+    save_picture(tmp_path / "shot.png", values)
+    scene.rosy.tone_picture = str(tmp_path / "shot.png")
+    images = set(bpy.data.images)
+    rendered = read_rendered(scene, depsgraph(), scene.camera, PICTURE)
+    np.testing.assert_allclose(
+        rendered.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
+    )
+    assert set(bpy.data.images) == images
+    rgba = pixels(bake(scene, look=PICTURE, size=(256, 256))[0].image)
+    whole = rgba[..., 3] == 1
+    left, right = whole.copy(), whole.copy()
+    left[:, 120:], right[:, :136] = False, False
+    for side, wanted in ((left, 0.9), (right, 0.4)):
+        got = to_linear(rgba[..., 1][side]).mean()
+        assert got == pytest.approx(float(to_linear(np.array(wanted))), abs=0.06)
+
+
+def test_pictures_that_will_not_do(scene, wall, tmp_path):
+    def error(path):
+        scene.rosy.tone_picture = str(path)
+        with pytest.raises(RosyError) as caught:
+            bake(scene, look=PICTURE, size=(64, 64))
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    images = set(bpy.data.images)
+    assert "choose its file" in error("")
+    assert "none.png" in error(tmp_path / "none.png")
+    (tmp_path / "text.png").write_text("no picture")
+    assert "text.png" in error(tmp_path / "text.png")
+    assert set(bpy.data.images) == images
+    save_picture(tmp_path / "wide.png", np.zeros((16, 32)))
+    said = error(tmp_path / "wide.png")
+    assert "wide.png" in said and "32 x 16" in said and "128 x 128" in said
+    assert not scene.rosy.bakes
+
+
+def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
+    for frame, value in ((1, 0.95), (2, 0.3)):
+        save_picture(tmp_path / f"shot_{frame:03d}.png", np.full((16, 16), value))
+    scene.rosy.tone_picture = str(tmp_path / "shot_###.png")
+    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "out")
+    settings = settings_of(scene)
+
+    def run():
+        made = bake_animation(
+            scene, [1, 2], look=PICTURE, size=(128, 128), settings=settings, show=False
+        )
+        return made[0].drawn
+
+    assert run() == (1, 2)
+    means = []
+    for path in sorted((tmp_path / "out").glob("*.png")):
+        rgba = pixels(bpy.data.images.load(str(path)))
+        means.append(rgba[..., 1][rgba[..., 3] == 1].mean())
+    assert means[0] > means[1] + 0.3
+    # Another picture of a frame is another frame, and only that.
+    assert run() == ()
+    save_picture(tmp_path / "shot_002.png", np.full((16, 16), 0.6))
+    assert run() == (2,)
+
+
+# --- the rest -------------------------------------------------------------------------------------
+
+
+def test_wishes_of_looks(scene):
+    scene.rosy.tone_attribute = "Ink"
+    assert tone_wish(scene, Look()) is None
+    assert tone_wish(scene, Look(tone="attribute")) == ToneWish("attribute", "Ink")
+    assert tone_wish(scene, Look(tone="image")) == ToneWish("image")
+    assert tone_wish(scene, Look(tone="picture")) is None
+
+
+def test_a_live_view_reads_tones_again_when_they_change(wall):
+    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
+    wish, follower = ToneWish("attribute", "Ink"), Follower()
+    (first,) = follower.read(depsgraph(), wish=wish)
+    (again,) = follower.read(depsgraph(), wish=wish)
+    assert again.number == first.number and not first.body.tone.values.any()
+    wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
+    wall.data.update()
+    follower.forget({"Plane"})
+    (changed,) = follower.read(depsgraph(), wish=wish)
+    assert changed.number != first.number and changed.body.tone.values.all()
+    (none,) = follower.read(depsgraph())
+    assert none.body.tone is None
+
+
+def test_shadows_are_of_what_renders_show(scene, wall):
+    """Something between a sun and the wall, itself out of the frame, darkens it."""
+    light = link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
+    light.data.energy = np.pi
+    light.rotation_euler = (np.radians(60), 0, 0)
+    add_mesh("Lid", [(-2, -0.3, 1), (2, -0.3, 1), (2, -3, 1), (-2, -3, 1)], [(0, 1, 2, 3)])
+    bpy.context.view_layer.update()
+    look = Look(light="scene", shading=1.0, gain=0.0)
+
+    def mean(look):
+        rgba = pixels(bake(scene, look=look, size=(64, 64))[0].image)
+        return rgba[..., 1][rgba[..., 3] == 1].mean()
+
+    bare, shaded = mean(look), mean(look.with_settings({"shadows": True}))
+    assert shaded < 0.8 * bare
+    bpy.data.objects["Lid"].hide_render = True
+    bpy.context.view_layer.update()
+    assert mean(look.with_settings({"shadows": True})) == pytest.approx(bare, abs=0.01)
+
+
+def test_occlusion_is_stored_and_drawn(scene, wall):
+    floor = add_mesh("Floor", [(-9, 0, -1), (9, 0, -1), (9, -9, -1), (-9, -9, -1)], [(3, 2, 1, 0)])
+    add_field(floor, "axis", 2, (1.0, 0.0, 0.0))
+    bpy.context.view_layer.update()
+    drain(storing_occlusion(depsgraph(), [wall], directions=128))
+    attribute = wall.data.attributes[OCCLUSION]
+    assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
+    assert OCCLUSION not in floor.data.attributes
+    values = np.empty(16, dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    corner = np.array([loop.vertex_index for loop in wall.data.loops])
+    height = np.array([wall.data.vertices[index].co.z for index in corner])
+    # In the edge with the floor, which is as good as endless, half of the sky; more above.
+    assert values[height == -1].mean() == pytest.approx(0.5, abs=0.05)
+    assert values[height == 1].mean() > values[height == 0].mean() > 0.55
+    assert tone_of(ToneWish("attribute", OCCLUSION)) is not None
+    # Once more in its place.
+    drain(storing_occlusion(depsgraph(), [wall], directions=16))
+    assert sum(a.name.startswith(OCCLUSION) for a in wall.data.attributes) == 1
+
+
+def test_occlusion_of_meshes_that_modifiers_make_anew(scene, wall):
+    wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
+    bpy.context.view_layer.update()
+    drain(storing_occlusion(depsgraph(), [wall], directions=16))
+    assert len(wall.data.attributes[OCCLUSION].data) == 16
+    assert len(tone_of(ToneWish("attribute", OCCLUSION)).values) == 64
+
+
+def test_occlusion_leaves_other_attributes_alone(scene, wall):
+    add_attribute(wall.data, OCCLUSION, "POINT", "FLOAT", np.arange(9))
+    with pytest.raises(RosyError, match="object 'Plane': has an attribute 'Occlusion' already"):
+        drain(storing_occlusion(depsgraph(), [wall], directions=4))
+    assert wall.data.attributes[OCCLUSION].data[3].value == 3

@@ -105,5 +105,4 @@ def _new_material(name: str, colour: str) -> bpy.types.Material:
     material = bpy.data.materials.new(name)
     bpy.data.materials.create_gpencil_data(material)
     material.grease_pencil.color = (*to_linear(from_hex(colour)).tolist(), 1.0)
-    material.grease_pencil.show_fill = False
     return material

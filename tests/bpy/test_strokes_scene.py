@@ -57,6 +57,7 @@ def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
     data, strokes = made.thing.data, made.drawn.strokes
     assert made.thing.type == "GPENCIL"
     assert [layer.info for layer in data.layers] == ["Family 1", "Family 2", "Outline"]
+    assert not any(material.grease_pencil.show_fill for material in data.materials)
     eye = view(scene)
     for number, layer in enumerate(data.layers):
         lines = layer.frames[0].strokes

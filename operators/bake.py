@@ -55,7 +55,7 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
 def view_camera(context: bpy.types.Context) -> Camera:
     area = context.area
     if area is None or area.type != "VIEW_3D":
-        raise RosyError("the current view can only be baked from a 3D view")
+        raise RosyError("the current view is that of a 3D view: start this from one")
     region = next(region for region in area.regions if region.type == "WINDOW")
     return camera_of_view(region, area.spaces.active.region_3d)
 

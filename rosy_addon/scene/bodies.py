@@ -302,6 +302,8 @@ def _is_seen(instance: bpy.types.DepsgraphObjectInstance, shown: set[bpy.types.O
     # Curves, texts, surfaces and metaballs come with their meshes as instances of their own.
     if thing.type != "MESH" or not instance.show_self or not thing.visible_camera:
         return False
+    if thing.original.get(MADE):  # Geometry Nodes may have made a mesh of strokes
+        return False
     if instance.is_instance:
         by = instance.parent
         return not thing.original.hide_render and (by is None or by.original in shown)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 
 from ..compositor.colour import from_hex, to_linear
 from ..strokes.draw import Lines
 from .capabilities import can_show_nodes_by_default
+
+#: What is told of each datablock that is made, and the name that it is to have.
+Keep = Callable[[bpy.types.ID, str], None]
 
 #: What a point and a stroke carry besides the radius: name, type, domain.
 POINT_ATTRIBUTES = {
@@ -23,7 +28,7 @@ INK = "ink"
 POLY = 1
 
 
-def new_curves(name: str, lines: Lines, frame: int, made: list[bpy.types.ID]) -> bpy.types.ID:
+def new_curves(name: str, lines: Lines, frame: int, keep: Keep) -> bpy.types.ID:
     """Hair curves, polylines with a radius, and a material that shows each family's ink.
 
     Parameters
@@ -32,17 +37,20 @@ def new_curves(name: str, lines: Lines, frame: int, made: list[bpy.types.ID]) ->
     lines : Lines
     frame : int
         Curves have no frames: they are there at all.
-    made : list
-        Takes what is made.
+    keep : callable
+        Is given each datablock that is made, and its name.
     """
     data = bpy.data.hair_curves.new(name)
-    made.append(data)
+    keep(data, name)
     strokes = lines.strokes
     data.add_curves(np.diff(strokes.start).tolist())
     colours = np.array([[*to_linear(from_hex(colour)), 1.0] for colour in lines.colours])
     _set(data, "position", "FLOAT_VECTOR", "POINT", lines.points)
     _set(data, "radius", "FLOAT", "POINT", lines.radius)
     _set(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY))
+    # Blender counts the types when curves are added, and writes past its arrays if the counts are
+    # of the types before.
+    data.add_curves([])
     _set(data, "family", "INT", "CURVE", strokes.family)
     _set(data, "object", "INT", "CURVE", lines.body)
     _set(data, INK, "FLOAT_COLOR", "CURVE", colours[strokes.family])
@@ -56,7 +64,7 @@ def new_curves(name: str, lines: Lines, frame: int, made: list[bpy.types.ID]) ->
     for key, kind in POINT_ATTRIBUTES.items():
         _set(data, key, kind, "POINT", values[key])
     material = _new_material(name)
-    made.append(material)
+    keep(material, name)
     data.materials.append(material)
     return data
 

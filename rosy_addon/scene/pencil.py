@@ -11,6 +11,7 @@ from ..compositor.colour import from_hex, to_linear
 from ..strokes.draw import Lines
 from ..strokes.outline import KINDS
 from .capabilities import has_drawings
+from .curves import Keep
 
 #: The layer of silhouettes, creases and borders.
 OUTLINE = "Outline"
@@ -20,7 +21,7 @@ PER_UNIT = 2000
 WIDEST = 1000
 
 
-def new_pencil(name: str, lines: Lines, frame: int, made: list[bpy.types.ID]) -> bpy.types.ID:
+def new_pencil(name: str, lines: Lines, frame: int, keep: Keep) -> bpy.types.ID:
     """Grease Pencil data with a layer, and a material, for each family.
 
     Parameters
@@ -29,19 +30,19 @@ def new_pencil(name: str, lines: Lines, frame: int, made: list[bpy.types.ID]) ->
     lines : Lines
     frame : int
         From which on they are there.
-    made : list
-        Takes what is made.
+    keep : callable
+        Is given each datablock that is made, and its name.
     """
     store = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)
     data = store.new(name)
-    made.append(data)
+    keep(data, name)
     data.stroke_depth_order = "3D"
     add = _add_to_drawing if has_drawings() else _add_to_frame
     strokes = lines.strokes
     titles = [OUTLINE if name in KINDS else name.capitalize() for name in strokes.names]
     for number, title in enumerate(dict.fromkeys(titles)):
-        material = _new_material(title, lines.colours[titles.index(title)])
-        made.append(material)
+        material = _new_material(f"RoSy {title}", lines.colours[titles.index(title)])
+        keep(material, f"RoSy {title}")
         data.materials.append(material)
         layer = data.layers.new(title)
         layer.use_lights = False
@@ -101,8 +102,7 @@ def _add_to_frame(
 
 
 def _new_material(name: str, colour: str) -> bpy.types.Material:
-    material = bpy.data.materials.new(f"RoSy {name}")
+    material = bpy.data.materials.new(name)
     bpy.data.materials.create_gpencil_data(material)
     material.grease_pencil.color = (*to_linear(from_hex(colour)).tolist(), 1.0)
-    material.grease_pencil.show_fill = False
     return material

@@ -73,8 +73,14 @@ def put_strokes(
     """
     name = f"RoSy Strokes {camera.name}"
     lines = as_lines(drawn, camera, pen)
+    names: dict[bpy.types.ID, str] = {}
     with all_or_nothing() as made:
-        data = KINDS[kind](name, lines, min(scene.frame_start, scene.frame_current), made)
+
+        def keep(datablock: bpy.types.ID, wanted: str) -> None:
+            made.append(datablock)
+            names[datablock] = wanted
+
+        data = KINDS[kind](name, lines, min(scene.frame_start, scene.frame_current), keep)
         thing = _found(scene, kind, camera.name)
         if thing is None:
             thing = bpy.data.objects.new(name, data)
@@ -85,7 +91,8 @@ def put_strokes(
     if thing.data != data:
         old, thing.data = thing.data, data
         _discard(old)
-        data.name = name
+        for datablock, wanted in names.items():
+            datablock.name = wanted  # which the old one had
     thing.parent = owner
     thing.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     thing.matrix_basis = Matrix()

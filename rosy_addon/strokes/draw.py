@@ -27,8 +27,8 @@ from .trace import tracing
 #: Width of tapered strokes at their very ends.
 LEAST_WIDTH = 0.15
 
-#: Spacings where nobody looks are at least this share of the widest.
-NEAREST = 0.02
+#: Share of the distance of a body at which its spacings are least, if no vertex is in the frame.
+NEAREST = 0.1
 
 #: Pixels by which thinned strokes may miss the points that are left out, and how many pixels the
 #: full width counts for there.
@@ -166,12 +166,18 @@ def drawing(
     owners = [number for number, body in enumerate(bodies) if body.field is not None]
     if not owners:
         raise RosyError("there is no field to draw strokes along")
+    if framed or not manner.hidden:
+        owners = [number for number in owners if _is_in_view(bodies[number], camera)]
     parts = []
     for place, number in enumerate(owners):
         start, stop = (0.05 + 0.8 * done / len(owners) for done in (place, place + 1))
         work = _on_body(bodies[number], camera, manner, lights)
         parts.append((yield from part(work, start, stop)))
+    if not parts:
+        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
     strokes = reduce(Strokes.joined, parts)
+    if not len(strokes):
+        raise RosyError("there is no room for a stroke: ask for a narrower spacing")
     if framed or not manner.hidden:
         yield Progress(0.85, "finding what is seen")
         strokes = seen(strokes, bodies, camera, hide=not manner.hidden)
@@ -208,12 +214,33 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
     if manner.unit == "length":
         return np.full(len(body.surface.vertices), manner.distance)
     spacing = pixel_spacing(body, camera, manner.spacing)
-    matrix = np.asarray(body.matrix, dtype=np.float64)
-    pixels, _ = on_screen(body.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3], camera)
+    points = _in_world(body)
+    pixels, _ = on_screen(points, camera)
     with np.errstate(invalid="ignore"):
         inside = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
-    least = spacing[inside].min() if inside.any() else NEAREST * spacing.max()
-    return np.maximum(spacing, least)
+    if not camera.is_perspective:
+        return spacing
+    if inside.any():
+        return np.maximum(spacing, spacing[inside].min())
+    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
+    far = float(np.linalg.norm(points - eye, axis=1).mean()) / camera.pixels_per_unit
+    share = NEAREST if _is_in_view(body, camera) else 1.0
+    return np.maximum(spacing, manner.spacing * share * far)
+
+
+def _is_in_view(body: Body, camera: Camera) -> bool:
+    """False only if all of a body is beyond one of the sides of what a camera sees."""
+    points = _in_world(body)
+    matrix = camera.projection @ camera.view
+    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    beyond = np.abs(clip[:, :2]) > clip[:, 3:]
+    sides = np.concatenate([beyond & (clip[:, :2] > 0), beyond & (clip[:, :2] < 0)], axis=1)
+    return not (sides.all(axis=0).any() or (clip[:, 2] < -clip[:, 3]).all())
+
+
+def _in_world(body: Body) -> np.ndarray:
+    matrix = np.asarray(body.matrix, dtype=np.float64)
+    return body.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _by_name(strokes: Strokes) -> Strokes:
@@ -251,9 +278,9 @@ class Lines:
 def as_lines(drawn: Drawn, camera: Camera, pen: Pen) -> Lines:
     """Strokes as they are drawn with a pen whose width is in pixels of a camera."""
     strokes = thinned(drawn.strokes, camera)
-    radius = pen.width / 2 * pixel_size(strokes.points, camera) * strokes.width
     # Strokes that go on behind the silhouette have no side of their own to come forward on.
     points = (raised if drawn.hidden else lifted)(strokes, camera, pen.width)
+    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
     return Lines(strokes, drawn.body, points, radius, pen.inks(strokes.names))
 
 

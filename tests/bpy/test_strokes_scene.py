@@ -2,12 +2,328 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import bpy
 import numpy as np
-from rosy.rosy_addon.sketch import sketch
+import pytest
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.scene.bodies import read_scene
+from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.strokes import remove_strokes, stroke_objects
+from rosy.rosy_addon.sketch import sketch, sketching
+from rosy.rosy_addon.strokes.draw import Manner
+from rosy.rosy_addon.strokes.outline import KINDS
+from rosy.rosy_addon.strokes.seen import on_screen, pixel_size
+from rosy.rosy_addon.strokes.svg import Pen
+from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
+
+PLAIN = Manner(spacing=6, outline=True)
+BLACK = Pen(width=1.5)
 
 
-def test_pencil(monkey, camera):
-    made = sketch(bpy.context.scene)
-    assert made.thing.type in ("GPENCIL", "GREASEPENCIL")
-    print(len(made.drawn.strokes), np.diff(made.drawn.strokes.start).mean())
+def view(scene):
+    return camera_of_object(scene, bpy.context.evaluated_depsgraph_get(), scene.camera)
+
+
+def values(attribute, key="value", columns=1):
+    found = np.empty(columns * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get(key, found)
+    return found.reshape(-1, columns) if columns > 1 else found
+
+
+def coverage(points, start, radius, camera, fine=8):
+    """(H, W) share of each pixel, rows from the bottom, that lines cover, by many small discs."""
+    pixels, _ = on_screen(points, camera)
+    size = radius / pixel_size(points, camera)
+    canvas = np.zeros((camera.height * fine, camera.width * fine), dtype=bool)
+    y, x = np.mgrid[: camera.height * fine, : camera.width * fine]
+    for first, last in pairwise(start):
+        for a in range(first, last - 1):
+            steps = max(int(np.ceil(np.hypot(*(pixels[a + 1] - pixels[a])) * fine / 2)), 1)
+            for share in np.arange(steps + 1) / steps:
+                at = (pixels[a] + share * (pixels[a + 1] - pixels[a])) * fine
+                r = (size[a] + share * (size[a + 1] - size[a])) * fine
+                box = [
+                    slice(max(int(at[k] - r) - 1, 0), max(int(at[k] + r) + 2, 0)) for k in (1, 0)
+                ]
+                near = np.hypot(x[*box] + 0.5 - at[0], y[*box] + 0.5 - at[1]) <= r
+                canvas[*box] |= near
+    return canvas.reshape(camera.height, fine, camera.width, fine).mean(axis=(1, 3))
+
+
+def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
+    made = sketch(scene, kind="PENCIL", manner=PLAIN, pen=BLACK)
+    data, strokes = made.thing.data, made.drawn.strokes
+    assert made.thing.type == "GPENCIL"
+    assert [layer.info for layer in data.layers] == ["Family 1", "Family 2", "Outline"]
+    assert not any(material.grease_pencil.show_fill for material in data.materials)
+    eye = view(scene)
+    for number, layer in enumerate(data.layers):
+        lines = layer.frames[0].strokes
+        own = np.array([strokes.names[family] in KINDS for family in strokes.family])
+        own = own if number == 2 else strokes.family == number
+        assert len(lines) == own.sum() and not layer.use_lights
+        assert {line.material_index for line in lines} == {number}
+        for line, stroke in zip(lines, np.flatnonzero(own), strict=True):
+            part = slice(*strokes.start[stroke : stroke + 2])
+            points = np.empty(3 * len(line.points))
+            line.points.foreach_get("co", points)
+            points = points.reshape(-1, 3)
+            where, _ = on_screen(points, eye)
+            wanted, _ = on_screen(strokes.points[part], eye)
+            np.testing.assert_allclose(where[[0, -1]], wanted[[0, -1]], atol=0.01)
+            width = np.array([point.pressure for point in line.points]) * line.line_width / 1000
+            width = width / pixel_size(points, eye)
+            assert np.isclose(width.max(), 1.5 * strokes.width[part].max(), rtol=0.03)
+
+
+def test_curves_hold_the_strokes_and_what_is_known_of_them(monkey, camera, scene):
+    made = sketch(scene, kind="CURVES", manner=PLAIN, pen=BLACK)
+    data, strokes = made.thing.data, made.drawn.strokes
+    assert made.thing.type == "CURVES" and len(data.curves) == len(strokes)
+    found = {name: data.attributes[name] for name in data.attributes.keys()}  # noqa: SIM118
+    wanted = {
+        "radius": ("POINT", "FLOAT"),
+        "opacity": ("POINT", "FLOAT"),
+        "spacing": ("POINT", "FLOAT"),
+        "member": ("POINT", "FLOAT_VECTOR"),
+        "surface_normal": ("POINT", "FLOAT_VECTOR"),
+        "face_index": ("POINT", "INT"),
+        "family": ("CURVE", "INT"),
+        "object": ("CURVE", "INT"),
+        "ink": ("CURVE", "FLOAT_COLOR"),
+    }
+    for name, (domain, kind) in wanted.items():
+        assert (found[name].domain, found[name].data_type) == (domain, kind)
+    np.testing.assert_array_equal(values(found["family"]), strokes.family)
+    assert {curve.points[0].radius for curve in data.curves} > {0.0} or values(
+        found["radius"]
+    ).all()
+    # Of every point, the face is one of the mesh's, and the normal is that face's, about.
+    faces = bpy.data.objects["Suzanne"].data.polygons
+    along = values(found["member"], "vector", 3)
+    normal = values(found["surface_normal"], "vector", 3)
+    drawn = along.any(axis=1)
+    assert np.allclose(np.linalg.norm(along[drawn], axis=1), 1, atol=1e-4)
+    flat = np.array([faces[int(face)].normal for face in values(found["face_index"])])
+    assert np.einsum("ni,ni->n", flat, normal).mean() > 0.85
+    points = values(found["position"], "vector", 3)
+    eye = view(scene)
+    assert (
+        np.einsum("ni,ni->n", np.array(camera.location) - points, normal)[drawn] > 0
+    ).mean() > 0.97
+    first = np.array([curve.first_point_index for curve in data.curves])
+    where, _ = on_screen(points[first].astype(float), eye)
+    np.testing.assert_allclose(
+        where, on_screen(strokes.points[strokes.start[:-1]], eye)[0], atol=0.01
+    )
+
+
+def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
+    monkey, camera, scene, tmp_path
+):
+    wall = add_plane("Wall", size=0.5)
+    wall.location = (0.5, -2.0, 0.3)
+    bpy.context.view_layer.update()
+    made = sketch(scene, kind="CURVES", manner=Manner(spacing=9), pen=Pen(width=2.0))
+    eye = view(scene)
+    corners = np.array([[x, 0, z] for x in (-0.5, 0.5) for z in (-0.5, 0.5)]) + wall.location
+    low, high = (edge(on_screen(corners, eye)[0], axis=0) for edge in (np.min, np.max))
+    covered = (slice(int(low[1]) + 2, int(high[1]) - 2), slice(int(low[0]) + 2, int(high[0]) - 2))
+    wall.hide_render = monkey.hide_render = True
+    alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
+    strokes = made.drawn.strokes
+    radius = pixel_size(strokes.points, eye) * strokes.width
+    expected = coverage(strokes.points, strokes.start, radius, eye)
+    assert expected.mean() > 0.03
+    assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
+    assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
+    # Behind the wall was nothing to be seen, and it is not there now that the wall is gone.
+    assert alpha[covered].size > 300 and alpha[covered].mean() < 1e-4
+    monkey.hide_render = False
+    kept = sketch(scene, kind="CURVES", manner=Manner(spacing=9, hidden=True), pen=Pen(width=2.0))
+    assert kept.thing == made.thing
+    monkey.hide_render = True
+    alpha = render(scene, tmp_path / "kept.exr", samples=8)[..., 3]
+    assert alpha[covered].mean() > 0.1
+
+
+@pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
+def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
+    before = contents()
+    first = sketch(scene, kind=kind, manner=PLAIN).thing
+    once = contents()
+    first.name = "Mine"
+    if kind == "PENCIL":
+        first.grease_pencil_modifiers.new("Noise", "GP_NOISE")
+    first.location.x = 5.0
+    again = sketch(scene, kind=kind, manner=Manner(spacing=12, outline=True)).thing
+    assert again == first and again.name == "Mine"
+    assert kind == "CURVES" or again.grease_pencil_modifiers[0].name == "Noise"
+    assert np.allclose(again.matrix_basis, np.eye(4))
+    again.name = f"RoSy Strokes {camera.name}"
+    after = contents()
+    assert {key for key in after if key != "object " + again.name} == {
+        key for key in once if key != "object " + again.name
+    }
+    assert [after[key] for key in ("objects", "materials")] == [
+        once[key] for key in ("objects", "materials")
+    ]
+    assert remove_strokes(scene) == 1
+    assert contents() == before
+    assert remove_strokes(scene) == 0
+
+
+def test_copies_are_the_users(monkey, camera, scene):
+    first = sketch(scene, kind="CURVES", manner=PLAIN).thing
+    copy = first.copy()
+    copy.data = first.data.copy()
+    scene.collection.objects.link(copy)
+    count = len(copy.data.curves)
+    linked = first.copy()  # on the same data
+    scene.collection.objects.link(linked)
+    assert sketch(scene, kind="CURVES", manner=Manner(spacing=20)).thing == first
+    assert len(copy.data.curves) == len(linked.data.curves) == count > len(first.data.curves)
+    assert stroke_objects(scene) == [first]
+    remove_strokes(scene)
+    assert {copy.name, linked.name} <= set(scene.objects.keys())
+
+
+def test_deleted_by_the_user_it_is_made_anew(monkey, camera, scene):
+    first = sketch(scene, kind="PENCIL", manner=PLAIN).thing
+    bpy.data.objects.remove(first)
+    assert not stroke_objects(scene)
+    sketch(scene, kind="PENCIL", manner=PLAIN)
+    scene.collection.objects.unlink(stroke_objects(scene)[0])  # as Delete does
+    assert not stroke_objects(scene)
+    second = sketch(scene, kind="PENCIL", manner=PLAIN).thing
+    assert stroke_objects(scene) == [second]
+    assert [thing.name for thing in bpy.data.objects if thing.type == "GPENCIL"] == [second.name]
+
+
+def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
+    side = add_camera("Side", (5.0, 0.0, 0.5))
+    made = [
+        sketch(scene, kind=kind, camera=source, manner=PLAIN).thing
+        for kind in ("PENCIL", "CURVES")
+        for source in (camera, side, camera)
+    ]
+    assert len(set(made)) == 4 and set(stroke_objects(scene)) == set(made)
+
+
+def test_strokes_of_one_mesh_move_with_it(monkey, camera, scene):
+    monkey.location, monkey.scale = (0.2, 0.0, 0.1), (1.2, 1.0, 0.9)
+    bpy.context.view_layer.update()
+    thing = sketch(scene, kind="CURVES", manner=PLAIN).thing
+    bpy.context.view_layer.update()
+    assert np.allclose(thing.matrix_world, np.eye(4), atol=1e-6)
+    monkey.location.x += 1.0
+    bpy.context.view_layer.update()
+    assert np.allclose(thing.matrix_world.translation, (1, 0, 0), atol=1e-6)
+    add_field(add_plane("Other", cuts=4), "axis")
+    assert sketch(scene, kind="CURVES", manner=PLAIN).thing.parent is None
+
+
+def test_chosen_objects_are_drawn_on_and_the_others_hide(monkey, camera, scene):
+    wall = add_field(add_plane("Wall", size=0.6, cuts=3), "axis")
+    wall.location.y = -2.0
+    bpy.context.view_layer.update()
+    bodies = read_scene(bpy.context.evaluated_depsgraph_get()).bodies
+    assert len(bodies) == 2
+    made = sketch(
+        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], manner=Manner(spacing=6)
+    )
+    assert np.allclose(made.drawn.strokes.points[:, 1], -2.0)
+    alone = len(
+        sketch(scene, kind="CURVES", objects=[monkey], manner=Manner(spacing=6)).drawn.strokes
+    )
+    wall.hide_render = True
+    assert len(sketch(scene, kind="CURVES", manner=Manner(spacing=6)).drawn.strokes) > alone
+
+
+def test_what_was_made_of_strokes_hides_nothing(monkey, camera, scene):
+    """Geometry Nodes may make meshes of them; these are not what is drawn on."""
+    wanted = sketch(scene, kind="CURVES", manner=Manner(spacing=6))
+    thicken(wanted.thing, 0.3)
+    again = sketch(scene, kind="CURVES", manner=Manner(spacing=6))
+    np.testing.assert_array_equal(again.drawn.strokes.points, wanted.drawn.strokes.points)
+
+
+def thicken(thing, radius):
+    """A tube around each curve, by Geometry Nodes."""
+    group = bpy.data.node_groups.new("Tubes", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    names = "NodeGroupInput", "GeometryNodeCurveToMesh", "GeometryNodeCurvePrimitiveCircle"
+    inside, tube, circle = (group.nodes.new(name) for name in names)
+    outside = group.nodes.new("NodeGroupOutput")
+    circle.inputs["Radius"].default_value = radius
+    group.links.new(inside.outputs[0], tube.inputs["Curve"])
+    group.links.new(circle.outputs["Curve"], tube.inputs["Profile Curve"])
+    group.links.new(tube.outputs["Mesh"], outside.inputs[0])
+    thing.modifiers.new("Tubes", "NODES").node_group = group
+    bpy.context.view_layer.update()
+
+
+def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, tmp_path):
+    settings = scene.rosy.strokes
+    settings.kind, settings.filepath = "SVG", str(tmp_path / "a.svg")
+    settings.spacing, settings.taper, settings.width = 6.3, 0.4, 0.7
+    settings.tone, settings.light, settings.outline = True, "lamp", True
+    settings.inks, settings.outline_colour = "FAMILIES", (1.0, 0.0, 0.0)
+    assert sketch(scene).path == tmp_path / "a.svg"
+    manner = Manner(spacing=6.3, taper=0.4, tone=True, light="lamp", outline=True)
+    pen = Pen(width=0.7, colours=["#db8021", "#4594eb"], outline="#ff0000")
+    sketch(scene, kind="SVG", path=tmp_path / "b.svg", manner=manner, pen=pen)
+    text = (tmp_path / "a.svg").read_text()
+    assert text == (tmp_path / "b.svg").read_text() and 'stroke="#ff0000"' in text
+
+
+def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
+    before = contents()
+    work = sketching(scene, kind="PENCIL", manner=PLAIN)
+    labels = []
+    for step in work:
+        labels.append(step.label)
+        if step.fraction > 0.9:
+            work.close()
+            break
+    assert "growing strokes" in labels and contents() == before
+
+
+@pytest.mark.parametrize(
+    ("spoil", "more", "wanted"),
+    [
+        ("camera", {}, "scene 'Scene' has no active camera"),
+        ("field", {}, "no visible object has a RoSy field"),
+        ("away", {}, "camera 'Camera' sees none of the strokes"),
+        ("", {"kind": "SVG", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
+        ("", {"kind": "SVG", "path": "/tmp/a.png"}, "/tmp/a.png: strokes are written to .svg"),
+        ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "there is no folder /nowhere"),
+        ("", {"manner": Manner(spacing=1e4)}, "no room for a stroke"),
+        ("", {"manner": Manner(unit="length", distance=1e-6)}, "too many"),
+    ],
+)
+def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoil, more, wanted):
+    if spoil == "camera":
+        scene.camera = None
+    elif spoil == "field":
+        monkey.data.attributes.remove(monkey.data.attributes["rosy"])
+    elif spoil == "away":
+        monkey.location.y = -50.0
+        bpy.context.view_layer.update()
+    before = contents()
+    with pytest.raises(RosyError) as caught:
+        sketch(scene, **{"kind": "PENCIL", **more})
+    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+    assert contents() == before
+
+
+def test_other_meshes_without_a_field_do_not_matter(camera, scene):
+    add_mesh("Points", [(0, 0, 0)], [])
+    add_field(add_plane("Square", cuts=4), "axis")
+    made = sketch(scene, kind="PENCIL", manner=Manner(spacing=6))
+    assert made.thing.data.layers[0].frames[0].frame_number == min(
+        scene.frame_start, scene.frame_current
+    )

@@ -162,8 +162,7 @@ def _drawn(pixels: np.ndarray, strokes: Strokes, width: float, colour: str) -> l
     point, start, first = _pieces(shade, strokes)
     radius = np.clip(strokes.width[point], 0, 1) * width / 2
     kept = simplified(np.column_stack([pixels[point], radius]), start, TOLERANCE)
-    count = np.add.reduceat(kept, start[:-1]) if len(start) > 1 else np.empty(0, dtype=np.int64)
-    start = np.concatenate([[0], np.cumsum(count)])
+    start = np.concatenate([[0], np.cumsum(kept)])[start]
     flat, radius = pixels[point][kept], radius[kept]
     least, most = (side.reduceat(radius, start[:-1]) for side in (np.minimum, np.maximum))
     left, right = _sides(flat, radius, start)
@@ -174,14 +173,14 @@ def _drawn(pixels: np.ndarray, strokes: Strokes, width: float, colour: str) -> l
         if not opaque or not most[piece]:
             continue
         more = "" if opaque == SHADES else f' opacity="{opaque / SHADES:.3g}"'
-        if most[piece] - least[piece] > SAME_WIDTH * width / 2 or not whole[piece]:
-            ends = (radius[part][0], radius[part][-1]) if whole[piece] else (0.0, 0.0)
-            more += f' fill={quoteattr(colour)} stroke="none"'
-            paths.append(f'<path{more} d="{_outline(left[part], right[part], ends)}"/>')
-        else:
+        if whole[piece] and most[piece] - least[piece] <= SAME_WIDTH * width / 2:
             wide = 2 * most[piece]
             more += "" if wide > (1 - SAME_WIDTH) * width else f' stroke-width="{wide:.3g}"'
             paths.append(f'<path{more} d="{_path(flat[part])}"/>')
+        else:
+            more += f' fill={quoteattr(colour)} stroke="none"'
+            ends = radius[part][[0, -1]] * whole[piece]
+            paths.append(f'<path{more} d="{_outline(left[part], right[part], ends)}"/>')
     return paths
 
 
@@ -232,8 +231,11 @@ def _sides(
     return points + off, points - off
 
 
-def _outline(left: np.ndarray, right: np.ndarray, ends: tuple[float, float]) -> str:
-    """Down one side, around the end, back on the other, and around the beginning."""
+def _outline(left: np.ndarray, right: np.ndarray, ends: np.ndarray) -> str:
+    """Down one side, around the end, back on the other, and around the beginning.
+
+    `ends` are the radii there, of the beginning and of the end; 0 is square.
+    """
     back = right[::-1]
     return (
         f"M{_listed(left)} {_turn(ends[1])}{_listed(back[:1])} L{_listed(back[1:])} "

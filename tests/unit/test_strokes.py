@@ -456,11 +456,14 @@ def test_outlines_of_simple_bodies():
 # --- files -------------------------------------------------------------------------------------------
 
 
+def svg_camera():
+    return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 100, scale=4.0)
+
+
 def svg_of(**more):
     body = body_of(plane(), 4)
-    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 100, scale=4.0)
-    drawn = seen(trace(body, 0.2).tapered(1.0), [body], camera)
-    return ElementTree.fromstring(svg_text(drawn, camera, Pen(**more))), drawn
+    drawn = seen(trace(body, 0.2).tapered(1.0), [body], svg_camera())
+    return ElementTree.fromstring(svg_text(drawn, svg_camera(), Pen(**more))), drawn
 
 
 def test_svg_has_a_layer_a_family_and_a_path_a_stroke():
@@ -482,6 +485,22 @@ def test_svg_has_a_layer_a_family_and_a_path_a_stroke():
         points = np.array(pairs, dtype=float)
         assert len(points) >= 2
         assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
+
+
+def test_outlines_hold_as_much_ink_as_their_strokes():
+    """In closed form: the mean width times the length; the round ends are left out."""
+    root, drawn = svg_of(width=3.0, paper=None)
+    pixels, _ = on_screen(drawn.points, svg_camera())
+    step = np.hypot(*np.diff(pixels, axis=0).T) * (np.diff(drawn.stroke) == 0)
+    mean = (drawn.width[1:] + drawn.width[:-1]) / 2
+    ink = np.bincount(drawn.stroke[1:], 3.0 * mean * step)
+    areas = []
+    for path in root.iter("{http://www.w3.org/2000/svg}path"):
+        pairs = re.findall(r"(-?[\d.]+),(-?[\d.]+)", re.sub(r"A\S+ 0 0 1", "", path.get("d")))
+        x, y = np.array(pairs, dtype=float).T
+        areas.append(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2)
+    by_family = np.argsort(drawn.family, kind="stable")
+    assert np.allclose(areas, ink[by_family], rtol=0.03, atol=0.2)
 
 
 def test_plotters_get_whole_lines_in_a_short_order():

@@ -33,10 +33,6 @@ GROUPS = {
     "Light": ("shading", "light", "shadows"),
     "Tone": (
         "tone",
-        "tone_attribute",
-        "tone_image",
-        "tone_uv_map",
-        "tone_picture",
         "tone_lit",
         "tone_black",
         "tone_white",
@@ -85,9 +81,6 @@ SHORT_NAMES = {
 }
 
 
-#: Names of something that the active mesh has.
-CHOSEN_FROM = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
-
 #: Settings of where the tone comes from, and when they count.
 TONE_SOURCES = {
     "tone_attribute": "attribute",
@@ -95,6 +88,12 @@ TONE_SOURCES = {
     "tone_uv_map": "image",
     "tone_picture": "picture",
 }
+
+#: Settings of the scene and of objects that are shown below one of a look.
+BELOW = {"tone": tuple(TONE_SOURCES)}
+
+#: Names of something that the active mesh has.
+CHOSEN_FROM = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
 
 #: What an empty setting of the generator stands for.
 IF_EMPTY = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
@@ -315,7 +314,7 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
         layout.use_property_decorate = False
         column = layout.column()
         settings = context.scene.rosy
-        for name in names:
+        for name in (more for name in names for more in (name, *BELOW.get(name, ()))):
             inside = _holder(context, name)
             if inside is None:
                 continue

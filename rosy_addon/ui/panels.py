@@ -307,6 +307,7 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
 
 def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...]) -> type:
     """A closed panel inside another that lists settings of `Scene.rosy`, or of its look."""
+    listed = [shown for name in names for shown in (name, *BELOW.get(name, ()))]
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -314,7 +315,7 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
         layout.use_property_decorate = False
         column = layout.column()
         settings = context.scene.rosy
-        for name in (more for name in names for more in (name, *BELOW.get(name, ()))):
+        for name in listed:
             inside = _holder(context, name)
             if inside is None:
                 continue

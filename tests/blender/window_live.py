@@ -320,7 +320,8 @@ def tones_are_those_of_a_bake():
     scene.rosy.tone_attribute, look.tone = "Ink", "attribute"
     yield from is_the_bake("live-tone-attribute", 0.97, most)
     scene.rosy.tone_attribute = "Pencil"
-    yield 0.5
+    view()[1].tag_redraw()
+    yield from until(lambda: live()._live.why_not)
     assert "'Pencil'" in live()._live.why_not and "'Ink'" in live()._live.why_not
     look.tone, look.shadows = "light", True
     with in_view():

@@ -34,10 +34,6 @@ GROUPS = {
     "Light": ("shading", "light", "shadows"),
     "Tone": (
         "tone",
-        "tone_attribute",
-        "tone_image",
-        "tone_uv_map",
-        "tone_picture",
         "tone_lit",
         "tone_black",
         "tone_white",
@@ -89,8 +85,6 @@ SHORT_NAMES = {
 #: Height of the picture of a preset, in the panel and where one is chosen: 128 pixels, half of what
 #: it has, if the screen's pixels are of usual size.
 PICTURE = 6.4
-#: Names of something that the active mesh has.
-CHOSEN_FROM = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
 
 #: Settings of where the tone comes from, and when they count.
 TONE_SOURCES = {
@@ -99,6 +93,12 @@ TONE_SOURCES = {
     "tone_uv_map": "image",
     "tone_picture": "picture",
 }
+
+#: Settings of the scene and of objects that are shown below one of a look.
+BELOW = {"tone": tuple(TONE_SOURCES)}
+
+#: Names of something that the active mesh has.
+CHOSEN_FROM = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
 
 #: What an empty setting of the generator stands for.
 IF_EMPTY = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
@@ -355,6 +355,7 @@ def _lines(words: str, context: bpy.types.Context) -> list[str]:
 
 def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...]) -> type:
     """A closed panel inside another that lists settings of `Scene.rosy`, or of its look."""
+    listed = [shown for name in names for shown in (name, *BELOW.get(name, ()))]
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -362,7 +363,7 @@ def _settings_panel(label: str, parent: str, group: str, names: tuple[str, ...])
         layout.use_property_decorate = False
         column = layout.column()
         settings = context.scene.rosy
-        for name in names:
+        for name in listed:
             inside = _holder(context, name)
             if inside is None:
                 continue

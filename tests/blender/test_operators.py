@@ -383,3 +383,18 @@ def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
     assert np.linalg.norm(found, axis=1).mean() > 0.5
     axis = np.array((0.2, 0.3, 1.0)) / np.linalg.norm((0.2, 0.3, 1.0))
     assert np.median(found @ axis) > 0.4
+
+
+# --- occlusion ------------------------------------------------------------------------------------
+
+
+def test_occlusion_becomes_the_tone(suzanne):
+    bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    assert bpy.ops.rosy.occlusion(directions=24) == {"FINISHED"}
+    attribute = suzanne.data.attributes["Occlusion"]
+    assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    assert 0 <= values.min() < 0.4 and 0.95 < values.max() <= 1
+    settings = bpy.context.scene.rosy
+    assert (settings.look.tone, settings.tone_attribute) == ("attribute", "Occlusion")

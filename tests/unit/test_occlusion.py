@@ -23,16 +23,17 @@ def of_vertices(surface, values):
     return found
 
 
-def trough(cells=24, size=4.0, sharp=True):
-    """A floor (z = 0, y > 0) and a wall (y = 0, z > 0), long in x; (V,) how far from the edge."""
+def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
+    """A floor (z = 0, y > 0) and a wall at an angle to it, long in x; (V,) how far from the edge."""
     x = np.linspace(-3 * size, 3 * size, 3 * cells + 1)
     along = np.linspace(0, size, cells + 1)
     along = np.concatenate([-along[:0:-1], along])
-    y, z = np.maximum(along, 0), np.maximum(-along, 0)
+    up = np.maximum(-along, 0)
+    y, z = np.maximum(along, 0) + up * np.cos(angle), up * np.sin(angle)
     points = [np.repeat(x, len(along)), np.tile(y, len(x)), np.tile(z, len(x))]
     quads, _ = grid_of_quads(3 * cells, 2 * cells, False, False)
-    angle = 0.5 if sharp else None
-    surface = from_quads(np.stack(points, axis=1), quads, name="trough", sharp_angle=angle)
+    bend = 0.5 if sharp else None
+    surface = from_quads(np.stack(points, axis=1), quads, name="trough", sharp_angle=bend)
     return surface, np.tile(along, len(x))
 
 
@@ -60,6 +61,17 @@ def test_a_corner_of_two_planes():
         wanted = 0.5 + 0.5 * distance / np.hypot(distance, 4.0)
         assert found[own].mean() == pytest.approx(wanted, abs=tolerance)
         assert found[own].std() < 0.01
+
+
+@pytest.mark.parametrize("degrees", [60, 90, 135, 150])
+def test_in_the_edge_of_two_planes(degrees):
+    """They leave each other 1/2 - cos(angle)/2, also where the point is on both of them."""
+    angle = np.radians(degrees)
+    surface, along = trough(2, angle=angle)
+    found = ambient_occlusion([at(surface)], 0)
+    edge = (np.abs(surface.vertices[:, 0]) < 5) & (along == 0)
+    own = found[edge[surface.corner_vertex]]
+    assert own.mean() == pytest.approx(0.5 - 0.5 * np.cos(angle), abs=0.05)
 
 
 def test_a_smooth_corner_looks_out_of_it():

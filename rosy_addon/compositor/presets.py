@@ -13,6 +13,7 @@ import os
 import reprlib
 import sys
 import unicodedata
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -112,9 +113,12 @@ def find_preset(preset: str | Path, own: Path | None = None) -> Path:
     if path.suffix.lower() == ".json":
         return path
     files = preset_files(own)
-    for key in (str(preset), key_of(str(preset))):
-        if key in files:
-            return files[key]
+    if str(preset) in files:
+        return files[str(preset)]
+    for path in files.values():
+        with suppress(RosyError):
+            if key_of(read_preset(path).name) == key_of(str(preset)):
+                return path
     raise RosyError(f"no preset is named '{preset}'; there are {', '.join(files)}")
 
 
@@ -285,7 +289,7 @@ def _checked(preset: Preset) -> Preset:
 def _free_place(preset: Preset, own: Path, replace: bool) -> Path:
     """Where a preset of the user's can be kept."""
     key = key_of(preset.name)
-    if (FOLDER / f"{key}.json").exists():
+    if key in {*preset_names(), *(key_of(load_preset(name).name) for name in preset_names())}:
         raise RosyError(f"preset '{preset.name}' comes with RoSy: choose another name")
     path = own / f"{key}.json"
     if path.exists() and not replace:

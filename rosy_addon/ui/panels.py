@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -302,10 +303,13 @@ class VIEW3D_PT_rosy_look(_Sidebar, bpy.types.Panel):
         column.template_icon_view(
             settings, "preset", show_labels=True, scale=PICTURE, scale_popup=PICTURE
         )
-        entry, changed = shelf.chosen(settings), shelf.is_changed(settings)
+        entry = shelf.chosen(settings)
         row = column.row(align=True)
-        name = settings.preset_name if entry is None else entry.preset.name
-        row.label(text=f"{name}, changed" if changed else name)
+        if entry is None:
+            row.label(text=f"{Path(settings.preset_name).stem}: not here")
+        else:
+            changed = shelf.is_changed(settings)
+            row.label(text=f"{entry.preset.name}, changed" if changed else entry.preset.name)
         row.operator("rosy.preset_save", text="", icon="ADD")
         row.menu("VIEW3D_MT_rosy_presets", text="", icon="DOWNARROW_HLT")
         if entry is not None:

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import bpy
 import bpy.utils.previews
 
-from ..compositor.presets import Preset, find_preset, picture_path, preset_files, read_preset
+from ..compositor.presets import (
+    FOLDER,
+    Preset,
+    find_preset,
+    picture_path,
+    preset_files,
+    read_preset,
+)
 from ..errors import RosyError
 from ..scene.folders import presets_folder
 from ..scene.looks import apply_look, is_look_of
 
 #: What is shown for a preset that has no picture, or is not there.
 NO_PICTURE, MISSING = "PRESET", "QUESTION"
+
+#: Seconds after which files are looked at again, if their folders are as they were.
+PATIENCE = 1.0
 
 
 class Entry(NamedTuple):
@@ -29,17 +40,28 @@ class _Shelf:
     """What was read last, and from files in which state."""
 
     def __init__(self) -> None:
+        self.folders: tuple[Any, ...] = ()
+        self.looked = 0.0
         self.state: dict[Path, tuple[Any, ...]] = {}
         self.entries: dict[str, Entry] = {}
         self.faults: list[str] = []
-        self.icons: dict[str, int] = {}
+        #: Blender's pictures, while there are panels to show them, and their numbers.
         self.pictures: Any = None
-        #: Blender keeps no reference to the texts of items.
+        self.icons: dict[str, int] = {}
+        #: Blender itself holds on to no text of an item.
         self.items: list[tuple] = []
 
     def read(self) -> None:
-        """Read the files again if any was added, changed or taken away."""
+        """Read the files again if any was added, changed or taken away.
+
+        Panels ask many times whenever they are drawn: folders tell at once what was added or taken
+        away, and whether a file was edited is looked up once in a while.
+        """
         own = presets_folder()
+        folders = (own, _state(own), _state(FOLDER))
+        if folders == self.folders and time.monotonic() < self.looked + PATIENCE:
+            return
+        self.folders, self.looked = folders, time.monotonic()
         files = preset_files(own)
         state = {path: (_state(path), _state(picture_path(path))) for path in files.values()}
         if state == self.state:
@@ -157,7 +179,7 @@ def set_chosen(settings: Any, place: int) -> None:
 
 
 def _state(path: Path) -> tuple[int, ...]:
-    """Changes whenever a file does."""
+    """Changes whenever a file or a folder does."""
     try:
         found = path.stat()
     except OSError:
@@ -172,5 +194,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Let go of them."""
+    global _SHELF
     bpy.utils.previews.remove(_SHELF.pictures)
-    _SHELF.__init__()
+    _SHELF = _Shelf()

@@ -106,3 +106,12 @@ def test_the_name_is_saved_and_copied_with_the_scene(scene, own, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert bpy.context.scene.rosy.preset == "woodcut"
+
+
+def test_a_file_that_was_edited_is_read_again(scene, own, monkeypatch):
+    save_preset(Preset("Mine", "First", LOOK), own)
+    assert shelf.entries()["mine"].preset.description == "First"
+    path = own / "mine.json"
+    path.write_text(path.read_text().replace("First", "Edited"))  # in its place in the folder
+    monkeypatch.setattr(shelf, "PATIENCE", 0.0)
+    assert shelf.entries()["mine"].preset.description == "Edited"

@@ -291,11 +291,17 @@ def test_nothing_is_replaced_unless_asked(own, undrawn, error_of):
 
 
 @pytest.mark.parametrize("replace", [False, True])
-def test_those_of_rosy_cannot_be_replaced(own, undrawn, error_of, replace):
-    before = (FOLDER / "plaid.json").read_bytes()
-    message = error_of(save_preset, MINE._replace(name="Plaid"), own, replace=replace)
-    assert "'Plaid' comes with RoSy" in message
-    assert not own.exists() and (FOLDER / "plaid.json").read_bytes() == before
+@pytest.mark.parametrize("name", ["Plaid", "pLAID!", "Print at 300 dpi", "print 300 dpi"])
+def test_those_of_rosy_cannot_be_replaced(own, undrawn, error_of, replace, name):
+    message = error_of(save_preset, MINE._replace(name=name), own, replace=replace)
+    assert f"'{name}' comes with RoSy" in message
+    assert not own.exists()
+
+
+@pytest.mark.parametrize("key", preset_names())
+def test_found_by_the_name_that_users_see(key, own):
+    preset = load_preset(key)
+    assert load_preset(preset.name, own) == load_preset(preset.name.upper(), own) == preset
 
 
 @pytest.mark.parametrize("name", ["../../outside", "/outside", "..\\outside", "out\0side"])

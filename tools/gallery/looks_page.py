@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.presets import Preset, load_preset, preset_names
+from rosy_addon.compositor.presets import load_preset, preset_names
 from rosy_addon.field.generate import curvature_field
 
 from .figure_11 import smoothed_a_little
@@ -40,6 +40,41 @@ SHOWN = {
 }
 SIDE = 256
 
+#: What is said of a user's own presets, a paragraph each.
+OWN = (
+    "![The presets in the panel, each with its picture and its sentence](images/presets.png)",
+    "In the panel's *Look* section, the picture opens all presets; a choice can be undone. The "
+    "line below says which one the look was taken from, and whether it was changed since. **+** "
+    "keeps the look of the scene as a preset of your own, with a name, a sentence, and a picture "
+    "that RoSy draws; the menu beside it renames and deletes your own, and imports and exports. "
+    "None is replaced or deleted unless you say so, and those that come with RoSy stay as they are.",
+    "They are in the extension's folder among Blender's user files, which stays when RoSy is "
+    "updated; `blender -b --command rosy presets` lists all with their sentences and says where "
+    "yours are. Plain Python, which knows no Blender, keeps its own with the user's data: "
+    "`python -m rosy_addon presets` says where, and the environment variable `ROSY_PRESETS` "
+    "names one folder for both.",
+    "`--preset` takes what `presets` lists, a name as it is in the panel, or the path of a file.",
+    "A preset is a small `.json` file that can be read, mailed and pasted: a `name` (a line of at "
+    "most 48 characters), a `description` (200) and a `look` of the settings that differ from the "
+    "default. There is no picture in it, since every RoSy draws the same one from the look. It is "
+    "data, and a stranger's is safe to import: at most 64 KiB, nothing but these entries, and a "
+    "setting or a value that does not exist is refused in one line that names it.",
+    """```json
+{
+  "name": "Wet ink",
+  "description": "Long lines that run together in the dark",
+  "look": {
+    "length": 90,
+    "ink": "hatch",
+    "ink_colour": "#102030"
+  }
+}
+```""",
+    "The buttons are operators, `preset_apply`, `preset_save`, `preset_rename`, `preset_remove`, "
+    "`preset_import` and `preset_export`, over functions of `rosy_addon.compositor.presets`: "
+    "`load_preset`, `save_preset`, `rename_preset`, `remove_preset`, `read_preset`, `write_preset`.",
+)
+
 
 def write() -> None:
     """Draw and write the page."""
@@ -51,9 +86,8 @@ def write() -> None:
         "This page is written, and its pictures are drawn, by `make gallery`.",
         "## Presets",
         _presets(),
-        "A preset of your own is a `.json` file with a `name`, a `description` and a `look` of the "
-        "settings that differ from the default: `--preset mine.json`. It is data; a file with "
-        "a setting or a value that does not exist is refused with its name.",
+        "## Presets of your own",
+        *OWN,
         "## What the main settings do",
         *(_setting(name, values, text) for name, (values, text) in SHOWN.items()),
         "## All settings",
@@ -67,8 +101,7 @@ def _presets() -> str:
     monkey = suzanne()
     curved = curvature_field(monkey, 4)
     even = smoothed_a_little(monkey, curved)
-    presets = [Preset("Default", "What a new scene has", Look())]
-    presets += [load_preset(name) for name in preset_names()]
+    presets = [load_preset(name) for name in preset_names()]
     panels = []
     for preset in presets:
         look = preset.look.with_settings({"supersampling": 2})

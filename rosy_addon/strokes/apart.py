@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..field.frames import dot
+from ..field.frames import dot, unit
 from .ground import Ground
 from .nearby import Nearby
 from .strokes import Strokes
@@ -22,13 +22,13 @@ from .strokes import Strokes
 LEAST = 0.52
 
 #: Radians by which directions of a family may be farther apart here than elsewhere.
-SLACK = np.radians(5)
+SLACK = np.radians(10)
 
 #: Shares of the spacing between points that are compared.
-FINE = 0.08
+FINE = 0.1
 
 #: Radians by which a stroke turns within a spacing where it is looked at closely.
-MUCH = np.radians(15)
+MUCH = np.radians(18)
 
 #: Around such places others are looked at within so many spacings.
 REACH = 1.0
@@ -56,6 +56,7 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
         What is left of a stroke and has fewer spacings goes, too.
     """
     bent = turning(strokes) > MUCH
+    bent[_meeting_ends(strokes)] = True
     if not bent.any():
         return strokes
     some = np.unique(strokes.stroke[_around(strokes, bent)])
@@ -67,6 +68,9 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
     too_near = _too_near(ground, fine, bent[point][whence], close.length)
     if not too_near.any():
         return strokes
+    # Loops that are opened are open where they were closed, too.
+    opened = np.flatnonzero(fine.closed & (np.bincount(fine.stroke, too_near) > 0))
+    too_near[fine.start[:-1][opened]] = too_near[fine.start[1:][opened] - 1] = True
     too_near = _widened(fine, too_near)
     hit = np.unique(fine.stroke[too_near])
     left = fine.runs(~too_near)
@@ -92,6 +96,14 @@ def turning(strokes: Strokes) -> np.ndarray:
     ahead = np.clip(np.searchsorted(position, position + reach), first, last)
     one, other = strokes.member[behind], strokes.member[ahead]
     return np.arccos(np.clip(dot(one, other), -1, 1))
+
+
+def _meeting_ends(strokes: Strokes) -> np.ndarray:
+    """Numbers of the last points of strokes that end not far from where they began."""
+    first, last = strokes.start[:-1], strokes.start[1:] - 1
+    gap = strokes.points[last] - strokes.points[first]
+    meets = dot(gap, gap) < (OWN * strokes.spacing[last]) ** 2
+    return last[meets & ~strokes.closed & (strokes.length > 2 * OWN * strokes.spacing[last])]
 
 
 def _around(strokes: Strokes, bent: np.ndarray) -> np.ndarray:
@@ -122,7 +134,8 @@ def _too_near(ground: Ground, fine: Strokes, bent: np.ndarray, length: np.ndarra
     query = np.flatnonzero(bent)
     own, other = grid.around(fine.points[query], LEAST * spacing[query])
     own = query[own]
-    apart = (stroke[own] != stroke[other]) | (np.abs(arc[own] - arc[other]) > OWN * spacing[own])
+    along = fine.between(own, other)
+    apart = (stroke[own] != stroke[other]) | (along > OWN * spacing[own])
     own, other = own[apart], other[apart]
     here, there = fine.normal[own], fine.normal[other]
     normal, delta = here + there, fine.points[own] - fine.points[other]
@@ -130,7 +143,12 @@ def _too_near(ground: Ground, fine: Strokes, bent: np.ndarray, length: np.ndarra
     same &= dot(delta, normal) ** 2 <= HEIGHT**2 * dot(delta, delta) * dot(normal, normal)
     one = ground.upright(fine.triangle[own], fine.member[own], here)
     two = ground.upright(fine.triangle[other], fine.member[other], there)
-    same &= ground.same_line(one, here, two, there, SLACK)
+    # Over sharp bends it matters how directions are compared: carried over, or seen from above.
+    above = unit(normal)
+    flat = [unit(way - dot(way, above)[:, None] * above) for way in (one, two)]
+    same &= ground.same_line(one, here, two, there, SLACK) | ground.same_line(
+        flat[0], above, flat[1], above, SLACK
+    )
     own, other = own[same], other[same]
     # The shorter one gives way; of one stroke, what is nearer to an end.
     to_end = np.minimum(arc, length[stroke] - arc)

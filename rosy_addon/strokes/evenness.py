@@ -71,18 +71,18 @@ def side_gaps(ground: Ground, strokes: Strokes, most: int = 20_000) -> Gaps:
     gap, nearest = np.full((len(own), 2), np.inf), np.full(len(own), np.inf)
     for first in range(0, len(own), 1 << 12):
         part = slice(first, first + (1 << 12))
-        gap[part], nearest[part] = _measured(ground, fine, way, fine.arc, grid, own[part])
+        gap[part], nearest[part] = _measured(ground, fine, way, grid, own[part])
     return Gaps(point, gap, _free(ground, fine, way, own), nearest)
 
 
 def _measured(
-    ground: Ground, fine: Strokes, way: np.ndarray, arc: np.ndarray, grid: Nearby, own: np.ndarray
+    ground: Ground, fine: Strokes, way: np.ndarray, grid: Nearby, own: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     stroke = fine.stroke
     query, other = grid.around(fine.points[own], REACH * fine.spacing[own])
     mine = own[query]
     away = stroke[mine] != stroke[other]
-    away |= np.abs(arc[mine] - arc[other]) > OWN * fine.spacing[mine]
+    away |= fine.between(mine, other) > OWN * fine.spacing[mine]
     away &= dot(fine.normal[mine], fine.normal[other]) > 0.3
     query, other, mine = query[away], other[away], mine[away]
     normal = unit(fine.normal[mine] + fine.normal[other])

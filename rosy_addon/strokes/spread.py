@@ -149,7 +149,6 @@ class _Beside:
     gap: np.ndarray
     refused: np.ndarray
     gave_way: np.ndarray
-    closed: np.ndarray
     sample: np.ndarray
     other: np.ndarray
     own_side: np.ndarray
@@ -195,7 +194,6 @@ class Growth:
             gave_way=((2,), bool),
             seed=((), np.int32),
             alive=((), bool),
-            closed=((), bool),
             spacing=((), float),
         )
         self.busy = np.zeros(1024, dtype=np.int32)
@@ -289,8 +287,6 @@ class Growth:
         older |= (s.time[other] == s.time[own]) & (s.stroke[other] < s.stroke[own])
         refused = np.zeros(len(number), dtype=bool)
         refused[query[older & (distance < nearest * spacing)]] = True
-        closed = np.zeros(len(number), dtype=bool)
-        closed[query[(s.stroke[own] == s.stroke[other]) & (distance < 0.2 * spacing)]] = True
 
         abeam = np.abs(dot(flat, here[:, 2])) <= ABEAM * spacing
         abeam = np.flatnonzero(abeam & (across < REACH * spacing))
@@ -308,7 +304,6 @@ class Growth:
             gap,
             refused,
             gave_way,
-            closed,
             query[covering],
             other[covering],
             own_side[covering],
@@ -363,7 +358,6 @@ class Growth:
         self._stretch(heads.stroke[kept], arc[kept])
         total = self.strokes.high[heads.stroke] - self.strokes.low[heads.stroke]
         ended |= total > rules.longest * self.strokes.spacing[heads.stroke]
-        self.strokes.closed[heads.stroke[which[beside.closed]]] = True
         self._finish(heads.stroke[ended], sign[ended])
         back = np.flatnonzero(refused)
         now.put(back, heads.walkers.take(back))

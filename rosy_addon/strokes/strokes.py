@@ -89,6 +89,16 @@ class Strokes:
         """(S,) float64."""
         return self.arc[self.start[1:] - 1]
 
+    def between(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """(n,) float64: how far pairs of points of a stroke are apart along it, world space.
+
+        Of a closed one the shorter way round.
+        """
+        arc, stroke = self.arc, self.stroke
+        apart = np.abs(arc[one] - arc[other])
+        round_ = np.where(self.closed, self.length, np.inf)[stroke[one]] - apart
+        return np.where(stroke[one] == stroke[other], np.minimum(apart, np.abs(round_)), np.inf)
+
     def chosen(self, strokes: np.ndarray) -> Strokes:
         """Some of the strokes, by number or by (S,) bool, in that order."""
         strokes = np.asarray(strokes)

@@ -13,6 +13,7 @@ from ..projection.gbuffer import Body
 from .apart import kept_apart
 from .families import label_families
 from .ground import lay_ground, nearest_member, on_corners
+from .loops import closed_up
 from .spread import FEW, PAUSE, Growth, Rules
 from .strokes import Strokes
 from .walk import Walkers
@@ -72,7 +73,8 @@ def tracing(
     growth = Growth(ground, corners, rules or Rules())
     rules = growth.rules
     yield from growing(growth)
-    drawn = kept_apart(ground, collect(growth), rules.shortest)
+    drawn = closed_up(ground, collect(growth), corners)
+    drawn = kept_apart(ground, drawn, rules.shortest)
     return label_families(drawn, ground)
 
 

@@ -96,7 +96,7 @@ class Path:
 
 
 def walk(
-    ground: Ground, walkers: Walkers, length: np.ndarray
+    ground: Ground, walkers: Walkers, length: np.ndarray, lean: np.ndarray | None = None
 ) -> tuple[Walkers, np.ndarray, np.ndarray, Path]:
     """Follow the field.
 
@@ -106,6 +106,8 @@ def walk(
     walkers : Walkers
     length : (n,) float64 ndarray
         How far, in world space.
+    lean : (n,) float64 ndarray, optional
+        Small angles by which they keep to the left of the field.
 
     Returns
     -------
@@ -121,12 +123,15 @@ def walk(
     left = length.astype(np.float64).copy()
     ended = np.zeros(len(walkers), dtype=bool)
     active = np.arange(len(walkers))
+    aside = np.exp(1j * (np.zeros(len(walkers)) if lean is None else lean))
     pieces: list[tuple[np.ndarray, ...]] = []
     for _ in range(MOST_PIECES):
         if not len(active):
             break
         some = now.take(active)
-        piece, way, member, edge, step, lost = _piece(ground, some, left[active], length[active])
+        piece, way, member, edge, step, lost = _piece(
+            ground, some, left[active], length[active], aside[active]
+        )
         pieces.append(
             tuple(column[~lost] for column in (active, some.triangle, some.weights, piece, way))
         )
@@ -184,7 +189,7 @@ def go_straight(
 
 
 def _piece(
-    ground: Ground, some: Walkers, left: np.ndarray, length: np.ndarray
+    ground: Ground, some: Walkers, left: np.ndarray, length: np.ndarray, aside: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """One piece of each: new weights, direction, member, edge reached or -1, step, and if lost."""
     corner_z = ground.z[some.triangle]
@@ -192,7 +197,8 @@ def _piece(
     scale = np.abs(corner_z).max(axis=1)
     lost = np.abs(z) <= FAINT * scale
     member = nearest_member(some.member, np.where(lost, 1, z), ground.degree)
-    way = some.sign * ground.ways(some.triangle, some.weights, member)
+    turn = some.sign * aside
+    way = turn * ground.ways(some.triangle, some.weights, member)
     slope = _slopes(ground, some.triangle, way)
     reach, _ = _reach(ground, some, slope)
     turning = np.abs((np.einsum("nk,nk->n", slope, corner_z) * z.conj()).imag)
@@ -209,7 +215,7 @@ def _piece(
         most = np.minimum(left, limit)[tried]
         middle = _moved(few.weights, slope[tried], 0.5 * np.minimum(reach[tried], most))
         along = nearest_member(member[tried], np.einsum("nk,nk->n", middle, z), ground.degree)
-        ahead = few.sign * ground.ways(few.triangle, middle, along)
+        ahead = turn[tried] * ground.ways(few.triangle, middle, along)
         rise = _slopes(ground, few.triangle, ahead)
         far, border = _reach(ground, few, rise)
         walked = np.minimum(far, most)

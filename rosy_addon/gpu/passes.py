@@ -205,7 +205,7 @@ FLOW = Compute(
         ("foreshorten", "int"),
         ("harmonics", "int"),
         ("lowest", "int"),
-        ("sway", "float"),
+        ("wobble", "float"),
     ),
 )
 
@@ -266,9 +266,10 @@ WALK = Compute(
         ("breaks", "float"),
         ("piece_length", "int"),
         ("piece_deviation", "float"),
-        ("sway", "float"),
-        ("swell", "float"),
+        ("wobble", "float"),
+        ("SWELL", "float"),
         ("tooth_depth", "float"),
+        ("tooth_stretch", "int"),
         ("subpixels", "int"),
         ("JOINING", "float"),
         ("EARLY", "float"),

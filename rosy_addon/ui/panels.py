@@ -34,11 +34,16 @@ GROUPS = {
     "Ink": (
         "ink",
         "ink_colour",
+        "ink_ramp",
+        "ink_colour_light",
         "paper_colour",
         "clear_paper",
         "crispness",
         "layers",
         "layering",
+        "breaks",
+        "wobble",
+        "paper_grain",
     ),
     "Quality": ("supersampling", "display", "method", "anchor", "seed"),
 }
@@ -64,7 +69,16 @@ OUTPUT = (
 
 
 #: Where a property's own name does not fit beside its value in a sidebar of usual width.
-SHORT_NAMES = {"magnitude_range": "Top Value", "undefined": "Skip Bad Vectors"}
+SHORT_NAMES = {
+    "magnitude_range": "Top Value",
+    "undefined": "Skip Bad Vectors",
+    "ink_ramp": "Second Colour",
+    "ink_colour_light": "In the Lights",
+}
+
+
+#: What magnitude may drive so that its colours take the place of others.
+COLOURING = {"colour", "both"}
 
 
 #: What an empty setting of the generator stands for.
@@ -313,6 +327,10 @@ def _matters(settings: Any, name: str) -> bool:
         return look.shading > 0
     if name == "directory":
         return settings.store == "SAVED"
+    if name == "ink_colour_light" and not look.ink_ramp:
+        return False
+    if name in {"ink_colour", "ink_ramp", "ink_colour_light"} and look.magnitude in COLOURING:
+        return False
     if name in GROUPS["Ink"] and name != "ink":
         return look.ink == "hatch"
     if name == "crease_angle":

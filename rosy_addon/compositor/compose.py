@@ -16,7 +16,7 @@ from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
-from .hatching import Hand, hatched, piece_length, unevenness
+from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
@@ -27,7 +27,7 @@ from .picture import Layers, Picture
 from .shading import Light
 from .sheets import sheets_images
 from .tone import Rendered, tone_of
-from .waver import SWAY, swayed, waver
+from .waver import swayed, waver, wavers
 
 #: The ways to compose, by their names in a look.
 METHODS: dict[str, Callable[[Flow, Look, np.ndarray], Work[Images]]] = {
@@ -105,7 +105,7 @@ def composing(
         layer = _layers(flow, finer, images)
         own = degree_of == degree
         if look.ink == "hatch":
-            hand = yield from part(_hand(gbuffer, flow, finer, own), stop, stop)
+            hand = yield from part(_hand(gbuffer, flow, finer), stop, stop)
             tone = light[own].mean(axis=1)
             colour[own], alpha[own] = hatched(flow, images, finer, tone, hand)
         else:
@@ -183,14 +183,8 @@ def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
         gbuffer.made["flow", degree] = made
     if not wavers(look):
         return made[1]
-    _, course = _waver(gbuffer, look)
     own = np.searchsorted(gbuffer.pixel, made[1].pixel)
-    return swayed(made[1], np.float32(SWAY * look.wobble) * course[own])
-
-
-def wavers(look: Look) -> bool:
-    """Whether lines are drawn as by hand."""
-    return look.ink == "hatch" and look.wobble > 0
+    return swayed(made[1], np.float32(look.wobble) * _waver(gbuffer, look)[own])
 
 
 def _waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
@@ -213,18 +207,17 @@ def _images_of(gbuffer: GBuffer, flow: Flow, look: Look, name: str = "images") -
     return made[1]
 
 
-def _hand(gbuffer: GBuffer, flow: Flow, look: Look, own: np.ndarray) -> Work[Hand]:
-    """What makes the lines of a flow uneven, at its `own` pixels of the G-buffer."""
-    broken = swell = tooth = None
-    if look.breaks:
+def _hand(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Hand]:
+    """What makes the lines of a flow uneven."""
+    pieces = tooth = None
+    if has_pieces(look):
         shorter = replace(look, length=piece_length(look))
-        broken = yield from _images_of(gbuffer, flow, shorter, "pieces")
-    if wavers(look):
-        swell = _waver(gbuffer, look)[0][own]
-    if look.paper_grain:
+        pieces = yield from _images_of(gbuffer, flow, shorter, "pieces")
+    if has_tooth(look):
         side = look.supersampling
-        tooth = paper_tooth(flow.pixel, flow.width, look.grain / side, look.seed, side)
-    return Hand(broken, unevenness(look, swell, tooth))
+        grain = look.grain / side
+        tooth = paper_tooth(flow.pixel, flow.width, grain, look.seed, side, flow.lines)
+    return Hand(pieces, tooth)
 
 
 def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:

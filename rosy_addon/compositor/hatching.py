@@ -8,8 +8,8 @@ it, 1 - a = T^s with shares that sum to 1. In light tones one family has it all,
 ones join in, those nearest to the guiding angle first.
 
 Whatever makes lines uneven is part of the streaks before they are compared with the threshold, and
-of the statistics that it comes from, so that the tone stays: shorter streaks, which break lines, the
-wavering of the hand, and the tooth of the paper.
+of the statistics that it comes from, so that the tone stays: shorter streaks, which break lines or make
+them swell and thin out, and the tooth of the paper.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from .inks import INKS, inks_of
 from .look import Look
 from .noise import MEAN, image_noise
 from .paper import TOOTH, paper_tooth
-from .waver import SWELL
 
 #: Darkness over which a family that joins in comes to its full share.
 JOINING = 0.35
@@ -38,6 +37,9 @@ EARLY = 0.15
 
 #: Half the width of the step from paper to ink, in deviations of the streaks: soft and crisp.
 SOFTEST, CRISPEST = 1.6, 0.2
+
+#: How far lines are made of pieces where a hand wavers as much as it can.
+SWELL = 0.5
 
 #: Length of the pieces of broken lines each way, in grains, and at most as a part of the whole.
 PIECE, LONGEST_PIECE = 4.0, 0.4
@@ -58,14 +60,14 @@ class Hand(NamedTuple):
 
     Attributes
     ----------
-    broken : Images or None
+    pieces : Images or None
         Of streaks as long as the pieces of broken lines (`piece_length`).
-    uneven : (P,) float32 ndarray or None
-        By how much a line is the more firmly drawn at a pixel, in deviations of the streaks.
+    tooth : (M, P) float32 ndarray or None
+        How much better than elsewhere the paper takes the ink of each line, in deviations.
     """
 
-    broken: Images | None = None
-    uneven: np.ndarray | None = None
+    pieces: Images | None = None
+    tooth: np.ndarray | None = None
 
 
 def hatched(
@@ -166,34 +168,38 @@ def line_coverage(
     """
     statistics = statistics_of(look)
     streak = (images.members[line].mean(axis=1) - MEAN) / statistics.deviation
-    if hand.broken is not None:
-        piece = (hand.broken.members[line].mean(axis=1) - MEAN) / statistics.piece_deviation
-        streak += brokenness(covered, look.breaks) * (piece - streak)
-    if hand.uneven is not None:
-        streak += hand.uneven
+    if hand.pieces is not None:
+        piece = (hand.pieces.members[line].mean(axis=1) - MEAN) / statistics.piece_deviation
+        streak += brokenness(covered, look.breaks, look.wobble) * (piece - streak)
+    if hand.tooth is not None:
+        streak += np.float32(TOOTH * look.paper_grain) * hand.tooth[line]
     limit = np.interp(covered, np.linspace(0, 1, STEPS), statistics.threshold)
     return _smooth_step((streak - limit) / (2 * softness(look.crispness)) + 0.5)
 
 
-def brokenness(covered: np.ndarray, breaks: float) -> np.ndarray:
-    """How far lines are made of pieces, where they are to cover so much: the lights break first."""
-    return breaks * (1 - covered) ** 2
+def brokenness(covered: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
+    """How far lines are made of pieces, where they are to cover so much of the paper.
+
+    The lights break first; a hand that wavers makes lines swell and thin out everywhere.
+    """
+    least = SWELL * wobble
+    return least + (1 - least) * breaks * (1 - covered) ** 2
+
+
+def has_pieces(look: Look) -> bool:
+    """Whether lines are made of pieces at all."""
+    return look.ink == "hatch" and (look.breaks > 0 or look.wobble > 0)
+
+
+def has_tooth(look: Look) -> bool:
+    """Whether ink catches on the tooth of the paper."""
+    return look.ink == "hatch" and look.paper_grain > 0
 
 
 def piece_length(look: Look) -> int:
-    """Steps each way of the streaks that break lines into pieces."""
+    """Steps each way of the streaks that lines are broken into."""
     steps = min(PIECE * look.grain / look.step, LONGEST_PIECE * look.length)
     return max(round(steps), 1)
-
-
-def unevenness(look: Look, swell: np.ndarray | None, tooth: np.ndarray | None) -> np.ndarray | None:
-    """(P,) `Hand.uneven` of a wavering hand (`waver`) and the tooth of the paper (`paper_tooth`)."""
-    parts = []
-    if swell is not None:
-        parts.append(np.float32(SWELL * look.wobble) * swell)
-    if tooth is not None:
-        parts.append(np.float32(TOOTH * look.paper_grain) * tooth)
-    return sum(parts) if parts else None
 
 
 def families_of_ink(flow: Flow, look: Look) -> list[np.ndarray] | None:
@@ -290,7 +296,7 @@ def statistics_of(look: Look) -> Statistics:
         anchored=look.anchor == "surface",
         piece=(2 * piece_length(look) + 1) * look.step,
         breaks=look.breaks,
-        swell=SWELL * look.wobble,
+        wobble=look.wobble,
         tooth=TOOTH * look.paper_grain,
     )
 
@@ -307,7 +313,7 @@ def ink_statistics(
     anchored: bool = False,
     piece: float = 1.0,
     breaks: float = 0.0,
-    swell: float = 0.0,
+    wobble: float = 0.0,
     tooth: float = 0.0,
 ) -> Statistics:
     """Read off a sample of noise what streaks cover.
@@ -318,7 +324,7 @@ def ink_statistics(
         Of the streamlines, pixels.
     grain, density, high_pass
         Of the noise.
-    crispness, breaks : float
+    crispness, breaks, wobble : float
         Of the look.
     tapered : bool
         Whether they are less of a streamline's ends.
@@ -326,8 +332,8 @@ def ink_statistics(
         Whether the noise is that of surfaces.
     piece : float
         Length of the pieces of broken lines, pixels.
-    swell, tooth : float
-        Deviation of what a wavering hand and the tooth of the paper add to the streaks.
+    tooth : float
+        Deviation of what the tooth of the paper adds to the streaks.
     """
     side = int(np.clip(SAMPLE * grain, SMALLEST_SAMPLE, LARGEST_SAMPLE))
     reach = max(round(length), 1)
@@ -343,33 +349,32 @@ def ink_statistics(
     streaks, deviation = _standardised(_means_along(noise, reach, side, tapered))
     within = min(max(round(piece), 1), reach)
     pieces, piece_deviation = _standardised(_means_along(noise, within, side, tapered))
-    uneven = np.zeros_like(streaks)
-    if swell:
-        # Waves are about normal, and as independent of the streaks as any numbers.
-        uneven += swell * np.random.default_rng(0).standard_normal(streaks.shape)
+    uneven = 0.0
     if tooth:
-        uneven += tooth * paper_tooth(pixel[: streaks.size], streaks.shape[1], grain, 1, 1).reshape(
-            streaks.shape
-        )
-    soft = softness(crispness)
-    low = min(streaks.min(), pieces.min()) + uneven.min()
-    high = max(streaks.max(), pieces.max()) + uneven.max()
+        heights = paper_tooth(np.arange(streaks.size, dtype=np.int32), len(streaks[0]), grain, 1)
+        uneven = tooth * heights[0].reshape(streaks.shape)
+    wanted = np.linspace(0, 1, STEPS)
+    degrees = brokenness(wanted, breaks, wobble)
+    known = np.linspace(degrees.min(), degrees.max(), BREAKS if breaks else 1)
+    samples = [streaks + degree * (pieces - streaks) + uneven for degree in known]
+    table = _limits(samples, softness(crispness))
+    if len(known) == 1:
+        return Statistics(table[0], deviation, piece_deviation)
+    place = (degrees - known[0]) / (known[-1] - known[0]) * (BREAKS - 1)
+    below = np.minimum(place.astype(int), BREAKS - 2)
+    low, high = (table[row, np.arange(STEPS)] for row in (below, below + 1))
+    return Statistics(low + (place - below) * (high - low), deviation, piece_deviation)
+
+
+def _limits(samples: list[np.ndarray], soft: float) -> np.ndarray:
+    """(S, STEPS): above which values each of S samples of streaks cover even shares from 0 to 1."""
+    low, high = min(map(np.min, samples)), max(map(np.max, samples))
     edges = np.linspace(low, high, BINS + 1)
     limits = np.linspace(high + soft, low - soft, 4 * STEPS)
     inked = _smooth_step(((edges[:-1] + edges[1:]) / 2 - limits[:, None]) / (2 * soft) + 0.5)
     wanted = np.linspace(0, 1, STEPS)
-    degrees = np.linspace(0, breaks, BREAKS) if breaks else np.zeros(1)
-    found = []
-    for degree in degrees:
-        mixed = streaks + degree * (pieces - streaks) + uneven
-        share = np.histogram(mixed, edges)[0] / mixed.size
-        found.append(np.interp(wanted, inked @ share, limits))
-    place = brokenness(wanted, breaks) / breaks * (BREAKS - 1) if breaks else np.zeros(STEPS)
-    below = np.minimum(place.astype(int), max(len(found) - 2, 0))
-    above = np.minimum(below + 1, len(found) - 1)
-    table, step = np.array(found), np.arange(STEPS)
-    threshold = table[below, step] + (place - below) * (table[above, step] - table[below, step])
-    return Statistics(threshold, deviation, piece_deviation)
+    shares = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
+    return np.array([np.interp(wanted, inked @ share, limits) for share in shares])
 
 
 def _means_along(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:

@@ -21,7 +21,7 @@ INKS = 12
 HUE_STEP, FIRST_HUE = 220.0, -185.0
 
 #: Lightness and least chroma in Oklab of all inks but the first: colours that can be seen as such.
-LIGHTNESS, CHROMA = (0.46, 0.80), 0.13
+LIGHTNESS, CHROMA = (0.5, 0.8), 0.14
 
 #: Chroma below which an ink has no hue that others could start from.
 GREY = 0.03

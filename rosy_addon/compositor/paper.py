@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -22,8 +23,14 @@ TOOTH = 1.2
 _KEPT = 1 << 22
 
 
-def paper_tooth(pixel: np.ndarray, width: int, grain: float, seed: int, side: int) -> np.ndarray:
-    """How deep the paper lies at each pixel, with mean 0 and deviation 1.
+def paper_tooth(
+    pixel: np.ndarray, width: int, grain: float, seed: int, side: int = 1, lines: int = 1
+) -> np.ndarray:
+    """How well the paper takes the ink of each line at each pixel, with mean 0 and deviation 1.
+
+    Lines that cross do not catch on the same spots, or they would leave more of the paper than lines
+    that know nothing of each other: each is drawn on a stretch of the paper that lies beside that of
+    the one before.
 
     Parameters
     ----------
@@ -36,19 +43,32 @@ def paper_tooth(pixel: np.ndarray, width: int, grain: float, seed: int, side: in
     seed : int
     side : int
         Subpixels of a pixel, each way; all of them are of one height.
+    lines : int
 
     Returns
     -------
-    (P,) float32 ndarray
+    (lines, P) float32 ndarray
     """
     row, column = np.divmod(pixel, np.int32(width))
     row, column = row // side, column // side
-    left, right = _tiled(int(column.min()), int(column.max()) + 1)
+    beside = stretch(grain)
+    left, right = _tiled(int(column.min()), int(column.max()) + 1 + (lines - 1) * beside)
     bottom, top = _tiled(int(row[0]), int(row[-1]) + 1)
     make = _sheet if (right - left) * (top - bottom) <= _KEPT else _sheet.__wrapped__
-    return make(left, right, bottom, top, grain, seed).take(
-        (row - bottom) * np.int32(right - left) + (column - left)
-    )
+    sheet = make(left, right, bottom, top, grain, seed)
+    place = (row - bottom) * np.int32(right - left) + (column - left)
+    return np.stack([sheet.take(place + line * beside) for line in range(lines)])
+
+
+def stretch(grain: float) -> int:
+    """Pixels from the paper of one line to that of the next: what they have in common is gone."""
+    return int(np.ceil(3 * _blurs(grain)[-1]))
+
+
+def _blurs(grain: float) -> list[float]:
+    """Deviations of the blurs between which the bands of the relief lie, pixels."""
+    finest = max(FINEST * grain, SMOOTHEST)
+    return [finest * 2**number for number in range(len(SHARES) + 1)]
 
 
 def _tiled(start: int, stop: int) -> tuple[int, int]:
@@ -59,21 +79,26 @@ def _tiled(start: int, stop: int) -> tuple[int, int]:
 @lru_cache(maxsize=2)
 def _sheet(left: int, right: int, bottom: int, top: int, grain: float, seed: int) -> np.ndarray:
     """(pixels,) float32 heights of a rectangle of the picture."""
-    finest = max(FINEST * grain, SMOOTHEST)
-    blurs = [finest * 2**number for number in range(len(SHARES) + 1)]
-    margin = 4 * max(map(blur_reach, blurs))
+    blurs = _blurs(grain)
+    margin = 4 * blur_reach(blurs[-1])
     column = np.arange(left - margin, right + margin, dtype=np.int32)
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
     # A seed of its own: the tooth is not to know of the streaks.
     white = hash_bits(column, row, seed ^ 0x5EED, 0, 0.5).astype(np.float32) - np.float32(0.5)
+    heights = _relief(white, blurs)[margin:-margin, margin:-margin]
+    return np.ascontiguousarray(heights / np.float32(_deviation(*blurs))).reshape(-1)
+
+
+def _relief(white: np.ndarray, blurs: Sequence[float]) -> np.ndarray:
+    """Bands of (H, W) white noise, from each blur to the next."""
     total = np.zeros_like(white)
     finer = _softened(white, blurs[0])
-    for blur, broader_blur, share in zip(blurs, blurs[1:], SHARES, strict=False):
+    for finer_blur, broader_blur, share in zip(blurs, blurs[1:], SHARES, strict=False):
         broader = _softened(white, broader_blur)
-        total += np.float32(share / _deviation(blur, broader_blur)) * (finer - broader)
+        # What a blur leaves of white noise goes with the inverse of its deviation.
+        total += np.float32(share * finer_blur / blurs[0]) * (finer - broader)
         finer = broader
-    total = total[margin : len(total) - margin, margin : total.shape[1] - margin]
-    return np.ascontiguousarray(total / np.float32(np.hypot.reduce(SHARES))).reshape(-1)
+    return total
 
 
 def _softened(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -88,9 +113,9 @@ def _softened(image: np.ndarray, deviation: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _deviation(finer: float, broader: float) -> float:
-    """Of the difference of two blurs of white noise, by what they make of a single pixel."""
-    reach = 4 * blur_reach(broader)
+def _deviation(*blurs: float) -> float:
+    """Of the relief of noise of deviation a half, by what it makes of a single pixel."""
+    reach = 4 * blur_reach(blurs[-1])
     single = np.zeros((2 * reach + 1,) * 2, dtype=np.float32)
     single[reach, reach] = 1
-    return float(np.linalg.norm(_softened(single, finer) - _softened(single, broader)) / 2)
+    return float(np.linalg.norm(_relief(single, blurs)) / 2)

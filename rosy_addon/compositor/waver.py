@@ -1,4 +1,4 @@
-"""How a hand wavers: slow, smooth changes in the course of lines and in how firmly they are drawn.
+"""How a hand wavers: slow, smooth changes in the course of lines.
 
 They are sums of a few plane waves, in the space in which the body is at rest or in the picture, with
 the noise. In space their length follows that of a pixel in octaves of which two are mixed, as in
@@ -17,15 +17,14 @@ from ..trigonometry import cosine_sine, phase_of
 from .flow import Flow
 from .look import Look
 
-#: Waves that one wavering is the sum of.
-WAVES = 6
+#: Waves that a wavering is the sum of.
+WAVES = 7
 
 #: Mean length of a wave, in grains.
 WAVELENGTH = 40.0
 
-#: Deviation of a line's course from the field's at `Look.wobble` 1, radians, and of the threshold
-#: above which it is drawn, in deviations of the streaks.
-SWAY, SWELL = 0.09, 0.6
+#: Deviation of a line's course from the field's at `Look.wobble` 1, radians.
+SWAY = 0.09
 
 #: Brings a sum of waves to deviation 1. Each is 4 v (1 - |v|), v from -1 to 1: a sine made of two
 #: parabolas, the same bits everywhere, of which 16 / 30 is the variance.
@@ -35,32 +34,30 @@ EVENED = (WAVES * 16 / 30) ** -0.5
 _BLOCK = 1 << 15
 
 
-def wave_table() -> np.ndarray:
-    """(2, WAVES, 4) float32: waves of two waverings, as how many there are in a unit, and the phase.
+def wavers(look: Look) -> bool:
+    """Whether lines are drawn as by hand."""
+    return look.ink == "hatch" and look.wobble > 0
 
-    Their directions are spread evenly over the sphere, as a spiral, and their lengths over an octave.
+
+def wave_table() -> np.ndarray:
+    """(WAVES, 4) float32: how many of each wave there are in a unit along the axes, and its phase.
+
+    Their directions are spread evenly over a half of the sphere, as a spiral, their lengths over an
+    octave.
     """
     golden = (5**0.5 - 1) / 2
-    number = np.arange(2 * WAVES)
-    height = 1 - (2 * number + 1) / (2 * WAVES)
+    number = np.arange(WAVES)
+    height = 1 - (number + 0.5) / WAVES
     turn = 2 * np.pi * golden * number
     out = np.sqrt(1 - height**2)
-    often = 2.0 ** ((number * 7 % WAVES + 0.5) / WAVES - 0.5)
-    table = np.stack(
-        [
-            often * out * np.cos(turn),
-            often * out * np.sin(turn),
-            often * height,
-            number * golden * 5 % 1,
-        ],
-        axis=1,
-    )
-    # Neighbours on the spiral take turns, so that each of the two has waves of all directions.
-    return table.astype(np.float32).reshape(WAVES, 2, 4).transpose(1, 0, 2).copy()
+    often = 2.0 ** ((number * 3 % WAVES + 0.5) / WAVES - 0.5)
+    along = [out * np.cos(turn), out * np.sin(turn), height]
+    table = np.stack([*(often * axis for axis in along), number * golden * 5 % 1], axis=1)
+    return table.astype(np.float32)
 
 
 def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
-    """Two waverings that know nothing of each other, with mean 0 and deviation 1, about.
+    """By how much the course of lines deviates from the field's at `Look.wobble` 1.
 
     Parameters
     ----------
@@ -71,8 +68,8 @@ def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
 
     Returns
     -------
-    (2, P) float32 ndarray
-        For the firmness of lines and for their course.
+    (P,) float32 ndarray
+        Radians, with mean 0 and deviation `SWAY`, about.
     """
     if look.anchor == "surface":
         places = rest_places(gbuffer)
@@ -82,11 +79,11 @@ def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
         place = np.stack([column, row, 0 * row]).astype(np.float32)
         size = np.ones(len(row), dtype=np.float32)
     level = np.log2(np.maximum(size, 1e-30) * np.float32(look.grain * WAVELENGTH))
-    found = np.empty((2, len(level)), dtype=np.float32)
+    found = np.empty(len(level), dtype=np.float32)
     for start in range(0, len(level), _BLOCK):
         block = slice(start, start + _BLOCK)
-        found[:, block] = _waves(place[:, block], level[block])
-    return found
+        found[block] = _waves(place[:, block], level[block])
+    return np.float32(SWAY) * found
 
 
 def swayed(flow: Flow, angle: np.ndarray) -> Flow:
@@ -102,16 +99,15 @@ def swayed(flow: Flow, angle: np.ndarray) -> Flow:
 
 
 def _waves(place: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """(2, P) waverings at (3, P) places, for waves of (P,) lengths, as powers of two."""
+    """(P,) sums at (3, P) places, of waves of (P,) lengths, as powers of two; of deviation 1."""
     octave = np.floor(level)
     share = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
-    total = np.zeros((2, len(level)), dtype=np.float32)
+    total = np.zeros(len(level), dtype=np.float32)
     # The squares of both weights sum to 1, so that the variance is that of one.
     for number, weight in enumerate(cosine_sine(share)):
         x, y, z = place * np.exp2(-(octave + number)).astype(np.float32)
-        for out, waves in zip(total, wave_table(), strict=True):
-            for wave in waves:
-                at = wave[0] * x + wave[1] * y + wave[2] * z + wave[3]
-                at = 2 * (at - np.floor(at)) - 1
-                out += weight * (4 * at * (1 - np.abs(at)))
+        for along_x, along_y, along_z, phase in wave_table():
+            at = along_x * x + along_y * y + along_z * z + phase
+            at = 2 * (at - np.floor(at)) - 1
+            total += weight * (4 * at * (1 - np.abs(at)))
     return total * np.float32(EVENED)

@@ -15,18 +15,28 @@ import numpy as np
 
 from ..compositor.anchored import LOWEST, OCTAVES, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops
-from ..compositor.compose import noise_of, scaled_look, wavers
+from ..compositor.compose import noise_of, scaled_look
 from ..compositor.contrast import averaging_gain, expected_deviation, streaks_of
-from ..compositor.hatching import EARLY, JOINING, LEAST, piece_length, softness, statistics_of
+from ..compositor.hatching import (
+    EARLY,
+    JOINING,
+    LEAST,
+    SWELL,
+    has_pieces,
+    has_tooth,
+    piece_length,
+    softness,
+    statistics_of,
+)
 from ..compositor.hues import PALETTE, SHARPNESS
 from ..compositor.inks import INKS, inks_of
 from ..compositor.kernel import whole_samples
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
-from ..compositor.paper import TOOTH, paper_tooth
+from ..compositor.paper import TOOTH, paper_tooth, stretch
 from ..compositor.shading import Light, lights_of
 from ..compositor.tone import Rendered, curve_of
-from ..compositor.waver import EVENED, SWAY, SWELL, WAVELENGTH, WAVES, wave_table
+from ..compositor.waver import EVENED, SWAY, WAVELENGTH, WAVES, wave_table, wavers
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..progress import Progress, Work, drain, part
@@ -481,7 +491,7 @@ class Card:
             return self._table("palette", None, lambda: PALETTE)
         width, height = camera.width, camera.height
         wavering = self._image("wavering", width, height)
-        waves = self._values("waves", None, wave_table)
+        waves = self._values("waves", None, lambda: wave_table()[None])
         length = scaled_look(look).grain * WAVELENGTH
         on_surface = look.anchor == "surface"
         for number, entry in enumerate(placed):
@@ -496,7 +506,7 @@ class Card:
                 "on_surface": int(on_surface),
                 "unit_of_pixel": length / growing,
                 "wave_count": WAVES,
-                "evened": EVENED,
+                "evened": EVENED * SWAY,
             }
             self.device.compute(
                 passes.WAVER,
@@ -575,7 +585,7 @@ class Card:
                 "foreshorten": int(look.foreshorten),
                 "harmonics": len(deviations),
                 "lowest": deviations[0] if deviations else 0,
-                "sway": SWAY * look.wobble if wavers(look) else 0.0,
+                "wobble": look.wobble if wavers(look) else 0.0,
             },
         )
         read = {"cells": cells, "ways": ways}
@@ -596,7 +606,7 @@ class Card:
             "palette": self._table("palette", None, lambda: PALETTE),
             "thresholds": self._thresholds(scaled_look(look)),
             "inks": self._inks(kind, look),
-            "tooth": self._tooth(width, height, look),
+            "tooth": self._tooth(width, height, look, kind.lines),
         }
         constants = {**covering, **_look_constants(kind, look)}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
@@ -798,20 +808,19 @@ class Card:
         found = inks_of(look, count)
         return self._table("inks", key, lambda: np.concatenate([found.dark, found.light]))
 
-    def _tooth(self, width: int, height: int, look: Look) -> Any:
-        """`paper.paper_tooth` in the first channel, for a frame of this size at least."""
+    def _tooth(self, width: int, height: int, look: Look, lines: int) -> Any:
+        """`paper.paper_tooth` in the first channel, for a frame of this size and so many lines."""
         if not has_tooth(look):
             return self._table("palette", None, lambda: PALETTE)
-        side = look.supersampling
-        width, height = (-(-length // (side * TILE)) * TILE for length in (width, height))
+        width = width // look.supersampling + (lines - 1) * stretch(look.grain)
+        width, height = (-(-length // TILE) * TILE for length in (width, height))
         key = look.grain, look.seed
         kept = self._tables.get("tooth")
         if kept is None or kept[0][0] != key or width > kept[0][1] or height > kept[0][2]:
             pixel = np.arange(width * height, dtype=np.int32)
             data = np.zeros((height, width, 4), dtype=np.float32)
-            data[:, :, 0] = paper_tooth(pixel, width, look.grain, look.seed, 1).reshape(
-                height, width
-            )
+            heights = paper_tooth(pixel, width, look.grain, look.seed)
+            data[:, :, 0] = heights.reshape(height, width)
             texture = self.device.texture(width, height, "RGBA32F", data=data)
             kept = self._tables["tooth"] = (key, width, height), texture
         return kept[1]
@@ -896,13 +905,14 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "layering": look.layering,
         "softness": softness(look.crispness),
         "deviation": statistics.deviation if statistics else 1.0,
-        "breaks": look.breaks if look.ink == "hatch" else 0.0,
-        "piece_length": piece_length(finer),
+        "breaks": look.breaks,
+        "piece_length": piece_length(finer) if has_pieces(look) else 0,
         "piece_whole": whole_samples(replace(finer, length=piece_length(finer))),
         "piece_deviation": statistics.piece_deviation if statistics else 1.0,
-        "sway": SWAY * look.wobble if wavers(look) else 0.0,
-        "swell": SWELL * look.wobble if wavers(look) else 0.0,
+        "wobble": look.wobble if wavers(look) else 0.0,
+        "SWELL": SWELL,
         "tooth_depth": TOOTH * look.paper_grain if has_tooth(look) else 0.0,
+        "tooth_stretch": stretch(look.grain),
         "subpixels": look.supersampling,
         "JOINING": JOINING,
         "EARLY": EARLY,
@@ -915,11 +925,6 @@ def _ink_count(kind: Kind, look: Look) -> int:
     if look.ink == "soft" or look.hue == "one" or look.magnitude in ("colour", "both"):
         return 1
     return min(kind.families if kind.families > 1 else kind.lines, INKS)
-
-
-def has_tooth(look: Look) -> bool:
-    """Whether ink catches on the tooth of the paper."""
-    return look.ink == "hatch" and look.paper_grain > 0
 
 
 def _light_constants(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:

@@ -205,7 +205,7 @@ FLOW = Compute(
         ("foreshorten", "int"),
         ("harmonics", "int"),
         ("lowest", "int"),
-        ("sway", "float"),
+        ("wobble", "float"),
     ),
 )
 
@@ -331,9 +331,10 @@ WALK = Compute(
         ("piece_length", "int"),
         ("piece_whole", "float"),
         ("piece_deviation", "float"),
-        ("sway", "float"),
-        ("swell", "float"),
+        ("wobble", "float"),
+        ("SWELL", "float"),
         ("tooth_depth", "float"),
+        ("tooth_stretch", "int"),
         ("subpixels", "int"),
         ("JOINING", "float"),
         ("EARLY", "float"),

@@ -43,11 +43,16 @@ GROUPS = {
     "Ink": (
         "ink",
         "ink_colour",
+        "ink_ramp",
+        "ink_colour_light",
         "paper_colour",
         "clear_paper",
         "crispness",
         "layers",
         "layering",
+        "breaks",
+        "wobble",
+        "paper_grain",
     ),
     "Quality": ("supersampling", "display", "method", "anchor", "seed"),
 }
@@ -80,7 +85,13 @@ SHORT_NAMES = {
     "tone_black": "Black",
     "tone_white": "White",
     "tone_gamma": "Gamma",
+    "ink_ramp": "Second Colour",
+    "ink_colour_light": "In the Lights",
 }
+
+
+#: What magnitude may drive so that its colours take the place of others.
+COLOURING = {"colour", "both"}
 
 
 #: Height of the picture of a preset, in the panel and where one is chosen: 128 pixels, half of what
@@ -422,6 +433,10 @@ def _matters(settings: Any, name: str) -> bool:
         return look.tone != "light"
     if name == "directory":
         return settings.store == "SAVED"
+    if name == "ink_colour_light" and not look.ink_ramp:
+        return False
+    if name in {"ink_colour", "ink_ramp", "ink_colour_light"} and look.magnitude in COLOURING:
+        return False
     if name in GROUPS["Ink"] and name != "ink":
         return look.ink == "hatch"
     if name == "crease_angle":

@@ -70,6 +70,29 @@ def test_parity(rosy, card, surface_of, name, degree):
     assert pair.likeness >= (0.98 if degree > 1 else 0.95)
 
 
+@pytest.mark.parametrize("degree", [3, 4])
+@pytest.mark.parametrize("anchor", ["picture", "surface"])
+def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
+    """All that makes lines uneven, and an ink for each family."""
+    surface = surface_of("torus")
+    camera = camera_for(rosy, "torus", surface, 2 * SIZE)
+    body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
+    look = rosy.Look(
+        ink="hatch",
+        hue="families",
+        anchor=anchor,
+        shading=0.9,
+        grain=2.5,
+        length=LENGTH,
+        supersampling=2,
+        breaks=0.6,
+        wobble=0.6,
+        paper_grain=0.4,
+    )
+    pair = drawn_twice(rosy, card, [body], camera, look)
+    assert pair.likeness >= 0.98
+
+
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     """What a bake would read: a field on faces, a modifier, instances, a lens that is shifted."""

@@ -806,6 +806,28 @@ def test_families_of_rosys(card, degree):
         alike(card, [Body(BALL, np.eye(4), field)], view(), look)
 
 
+@pytest.mark.parametrize("name", ["three", "two lines", "tensors"])
+def test_free_directions_by_hand(card, name):
+    """Each family in its ink, lines that waver together, whatever the angles between them."""
+    look = replace(
+        LOOK, ink="hatch", shading=0.9, grain=2.5, hue="families", wobble=1.0, breaks=0.5
+    )
+    alike(card, [Body(BALL, np.eye(4), FREE[name](BALL))], view(), look)
+
+
+@pytest.mark.parametrize("hue", ["one", "families"])
+def test_ink_on_clear_paper(card, hue):
+    look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
+    pair = drawn_twice(ROSY, card, [ball(4)], view(), look)
+    laid, wanted = (picture[..., 3] for picture in (pair.card, pair.numpy))
+    assert 0.2 < wanted[wanted > 0].mean() < 0.8
+    assert np.corrcoef(laid.ravel(), wanted.ravel())[0, 1] > 0.98
+    both = (laid > 0.2) & (wanted > 0.2)
+    np.testing.assert_allclose(
+        np.median(pair.card[both], axis=0), np.median(pair.numpy[both], axis=0), atol=0.01
+    )
+
+
 def test_families_beside_a_field_without(card):
     """Of one degree: what knows no families has the hue of the first."""
     told = smooth_field(BALL, 4, 2)

@@ -29,6 +29,30 @@ from .solid import compose_view, view
 #: Of a picture, pixels: two and three in a row.
 SIDE, THIRD = 384, 256
 
+#: Of pictures that a part is shown of, and where that begins.
+LARGE, CORNER = 720, (290, 150)
+
+#: What a hand and paper do to lines, and inks: labels, presets and what is changed in them.
+EVEN = {"breaks": 0.0, "wobble": 0.0}
+HAND = {
+    "pen and ink, even": ("pen-and-ink", EVEN),
+    "breaks 1": ("pen-and-ink", EVEN | {"breaks": 1.0}),
+    "wobble 1": ("pen-and-ink", EVEN | {"wobble": 1.0}),
+    "pencil, paper_grain 0.6": ("pencil", {"paper_grain": 0.6}),
+}
+INKS = {
+    "hue families, of black ink": ("cross-hatch", {"hue": "families", "layering": 0.15}),
+    "hue families, of light ink": ("white-on-black", {"hue": "families"}),
+    "ink_ramp, from blue to ochre": (
+        "engraving",
+        {"ink_ramp": True, "ink_colour": "#141a3c", "ink_colour_light": "#b0703c"},
+    ),
+    "ink_ramp, charcoal to sanguine": (
+        "charcoal",
+        {"ink_ramp": True, "ink_colour": "#1c1418", "ink_colour_light": "#b5543a"},
+    ),
+}
+
 #: In the order of the page.
 PRESETS = (
     "pen-and-ink",
@@ -71,6 +95,12 @@ def write() -> None:
         shown = compose_view(monkey, field, turned, camera)
         guided.append(Panel(display(shown.rgba), f"guiding angle {degrees} degrees"))
     save(sheet([guided]), IMAGES / "hatching-guide.png")
+    for name, panels in {"hatching-hand": HAND, "hatching-inks": INKS}.items():
+        shown = [
+            Panel(_closer(monkey, field, replace(load_preset(preset).look, **settings)), label)
+            for label, (preset, settings) in panels.items()
+        ]
+        save(sheet([shown[start : start + 2] for start in (0, 2)]), IMAGES / f"{name}.png")
     save(sheet(_tones(monkey, field)), IMAGES / "hatching-tone.png")
 
 
@@ -129,3 +159,11 @@ def _at(x: float, y: float, z: float, scale: float = 1.0) -> np.ndarray:
     matrix = np.diag([scale, scale, scale, 1.0])
     matrix[:3, 3] = x, y, z
     return matrix
+
+
+def _closer(surface: Surface, field: RosyField, look: Look) -> np.ndarray:
+    """The middle of a picture: large enough to see single lines."""
+    camera = view(surface, (-26, 8), (LARGE, LARGE), look.supersampling)
+    shown = display(compose_view(surface, field, look, camera).rgba)
+    left, top = CORNER
+    return shown[top : top + SIDE, left : left + SIDE]

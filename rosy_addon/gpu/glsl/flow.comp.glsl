@@ -79,7 +79,7 @@ void main()
       bits |= 1 << bit;
     }
   }
-  float wavered = sway != 0.0 ? sway * texelFetch(wavering, pixel, 0).y : 0.0;
+  float wavered = wobble > 0.0 ? wobble * texelFetch(wavering, pixel, 0).x : 0.0;
   float toward = float(degree) * (guiding_angle - wavered);
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
   float angle = atan(z.y, z.x) / float(degree);

@@ -108,6 +108,13 @@ int family_of_line(int line, float first, float stored, int told)
   return modulo(int(round(ahead)), told);
 }
 
+// The member whose line this is. Of odd degree every other line is a member's opposite half.
+int member_of_line(int line)
+{
+  bool halves = around > degree && (degree & 1) == 1;
+  return halves ? ((line & 1) == 0 ? line / 2 : (line + degree) / 2) : line;
+}
+
 // The mean of the noise along a streamline, around 0: those that ended early get the spread of whole
 // ones (`contrast.even_out`).
 vec3 evened_out(Sums sums, float of_whole_ones)
@@ -207,9 +214,9 @@ void main()
   }
   int steps = magnitude_drives >= 2 ? int(round(float(walk_length) * relative)) : walk_length;
 
-  // Without a wavering hand or tooth there are no such images to look into.
-  vec2 hand = sway != 0.0 ? texelFetch(wavering, pixel, 0).xy : vec2(0.0);
-  float toward = float(degree) * (guiding_angle - sway * hand.y);
+  // Without a hand that wavers there is no such image to look into.
+  float wavered = wobble > 0.0 ? wobble * texelFetch(wavering, pixel, 0).x : 0.0;
+  float toward = float(degree) * (guiding_angle - wavered);
   vec2 z = times(value.xy, vec2(cos(toward), -sin(toward)));
   float first = 0.0, stored = 0.0;
   int told = 1;
@@ -226,7 +233,6 @@ void main()
   float wanted = ink_floor + left * (1.0 - ink_floor);
   bool by_magnitude = magnitude_drives == 1 || magnitude_drives == 3;
   float nearest = angle_of(z) / float(degree), soonest = 10.0, sharers = 0.0, paper = 1.0;
-  float uneven = 0.0;
   vec3 one_ink = vec3(0.0), through = vec3(1.0);
   if (hatch != 0) {
     if (by_magnitude) {
@@ -236,10 +242,6 @@ void main()
       one_ink = ink_at(0.0, tone_here);
       left = 1.0 - covering(wanted, one_ink);
     }
-    uneven = swell * hand.x;
-    if (tooth_depth != 0.0) {
-      uneven += tooth_depth * texelFetch(tooth, pixel / subpixels, 0).x;
-    }
     for (int line = 0; line < lines; ++line) {
       soonest = min(soonest, onset_of(line, nearest));
     }
@@ -248,7 +250,7 @@ void main()
       sharers += smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY));
     }
   }
-  int near_steps = breaks > 0.0 ? piece_length : 0;
+  int near_steps = piece_length;
   if (magnitude_drives >= 2) {
     near_steps = int(round(float(near_steps) * relative));
   }
@@ -274,13 +276,18 @@ void main()
         covered = covering(pow(wanted, own), ink);
       }
       float streak = grey(mean) / deviation;
-      if (breaks > 0.0) {
+      if (piece_length > 0) {
         vec3 near = evened_out(whole_of(cell.yzw, ahead.near, behind.near), piece_whole);
         // `hatching.brokenness`
-        float broken = breaks * (1.0 - covered) * (1.0 - covered);
+        float least = SWELL * wobble;
+        float broken = least + (1.0 - least) * breaks * (1.0 - covered) * (1.0 - covered);
         streak = mix(streak, grey(near) / piece_deviation, broken);
       }
-      float above = streak + uneven - threshold_of(covered);
+      if (tooth_depth > 0.0) {
+        ivec2 place = pixel / subpixels + ivec2(member_of_line(line) * tooth_stretch, 0);
+        streak += tooth_depth * texelFetch(tooth, place, 0).x;
+      }
+      float above = streak - threshold_of(covered);
       float coverage = smooth_step(above / (2.0 * softness) + 0.5);
       paper *= 1.0 - coverage;
       vec3 passed = inverted(ink) / max(inverted(paper_light.xyz), 1e-3);

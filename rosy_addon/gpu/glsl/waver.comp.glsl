@@ -1,19 +1,17 @@
 // How a hand wavers at the pixels of one body: `waver.waver`.
 
-// Two waverings at a place, of waves so long, as a power of two.
-vec2 waves_at(vec3 place, float level)
+// The wavering at a place, of waves so long, as a power of two.
+float waves_at(vec3 place, float level)
 {
   float octave = floor(level);
   float share = (level - octave) * 0.25 * TAU;
-  vec2 total = vec2(0.0);
+  float total = 0.0;
   for (int finer = 0; finer < 2; ++finer) {
     vec3 at = place * exp2(-(octave + float(finer)));
-    vec2 sum = vec2(0.0);
+    float sum = 0.0;
     for (int number = 0; number < wave_count; ++number) {
-      vec4 one = texelFetch(waves, ivec2(number, 0), 0);
-      vec4 other = texelFetch(waves, ivec2(number, 1), 0);
-      vec2 along = vec2(dot(one.xyz, at) + one.w, dot(other.xyz, at) + other.w);
-      along = 2.0 * fract(along) - 1.0;
+      vec4 wave = texelFetch(waves, ivec2(number, 0), 0);
+      float along = 2.0 * fract(dot(wave.xyz, at) + wave.w) - 1.0;
       sum += 4.0 * along * (1.0 - abs(along));
     }
     total += (finer == 0 ? cos(share) : sin(share)) * sum;
@@ -49,5 +47,5 @@ void main()
     size *= perspective != 0 ? depth : 1.0;
     place = weights.x * rest0 + weights.y * rest1 + weights.z * rest2;
   }
-  imageStore(wavering, pixel, vec4(waves_at(place, log2(max(size, 1e-30))), 0.0, 1.0));
+  imageStore(wavering, pixel, vec4(waves_at(place, log2(max(size, 1e-30))), 0.0, 0.0, 1.0));
 }

@@ -32,6 +32,7 @@ SCRIPTS = (
     "animation",
     "memory",
     "fields",
+    "strokes",
 )
 
 #: Runs of each way with --quick: a minute in all.

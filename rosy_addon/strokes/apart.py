@@ -27,7 +27,7 @@ SLACK = np.radians(10)
 #: Shares of the spacing between points that are compared.
 FINE = 0.1
 
-#: Radians by which a stroke turns within a spacing where it is looked at closely.
+#: Radians by which a stroke, or the field, turns within a spacing where it is looked at closely.
 MUCH = np.radians(18)
 
 #: Around such places others are looked at within so many spacings.
@@ -55,7 +55,7 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
     shortest : float
         What is left of a stroke and has fewer spacings goes, too.
     """
-    bent = turning(strokes) > MUCH
+    bent = (turning(strokes) > MUCH) | (field_turning(ground, strokes) > MUCH)
     bent[_meeting_ends(strokes)] = True
     if not bent.any():
         return strokes
@@ -96,6 +96,16 @@ def turning(strokes: Strokes) -> np.ndarray:
     ahead = np.clip(np.searchsorted(position, position + reach), first, last)
     one, other = strokes.member[behind], strokes.member[ahead]
     return np.arccos(np.clip(dot(one, other), -1, 1))
+
+
+def field_turning(ground: Ground, strokes: Strokes) -> np.ndarray:
+    """(n,) radians by which the field turns within a spacing, whichever way one goes from there."""
+    z, slope = ground.z[strokes.triangle], ground.gradient[strokes.triangle]
+    here = np.einsum("nk,nk->n", strokes.weights, z)
+    along = np.einsum("nk,nk->n", slope.real, z) * here.conj()
+    across = np.einsum("nk,nk->n", slope.imag, z) * here.conj()
+    size = np.maximum(ground.degree * np.abs(here) ** 2, 1e-300)
+    return strokes.spacing * np.hypot(along.imag, across.imag) / size
 
 
 def _meeting_ends(strokes: Strokes) -> np.ndarray:

@@ -16,13 +16,13 @@ from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
-from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length
+from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length, statistics_of
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
 from .members import members_images
 from .noise import MEAN, image_noise
-from .paper import paper_tooth
+from .paper import TEETH, paper_tooth, surface_tooth
 from .picture import Layers, Picture
 from .shading import Light
 from .sheets import sheets_images
@@ -214,20 +214,33 @@ def _hand(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Hand]:
         shorter = replace(look, length=piece_length(look))
         pieces = yield from _images_of(gbuffer, flow, shorter, "pieces")
     if has_tooth(look):
+        tooth = _tooth(gbuffer, flow, look)
+    return Hand(pieces, tooth)
+
+
+def _tooth(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray:
+    """(M, P) how well the paper takes the ink of each line."""
+    if look.anchor == "picture":
         side = look.supersampling
         grain = look.grain / side
-        tooth = paper_tooth(flow.pixel, flow.width, grain, look.seed, side, flow.lines)
-    return Hand(pieces, tooth)
+        return paper_tooth(flow.pixel, flow.width, grain, look.seed, side, flow.lines)
+    heights = _on_surfaces(gbuffer, flow, "tooth", surface_tooth(look)) - np.float32(MEAN)
+    heights /= np.float32(statistics_of(look).tooth_deviation)
+    return heights.T[np.arange(flow.lines) % TEETH]
 
 
 def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:
     """(P, K) noise on the surfaces at the pixels of a flow; None for that of the picture."""
     if look.anchor == "picture":
         return None
-    key = noise_of(look)
-    made = gbuffer.made.get("noise")
+    return _on_surfaces(gbuffer, flow, "noise", noise_of(look))
+
+
+def _on_surfaces(gbuffer: GBuffer, flow: Flow, name: str, key: dict[str, Any]) -> np.ndarray:
+    """(P, K) `surface_noise` at the pixels of a flow, or that made for the last look."""
+    made = gbuffer.made.get(name)
     if made is None or made[0] != key:
-        made = gbuffer.made["noise"] = key, surface_noise(gbuffer, **key)
+        made = gbuffer.made[name] = key, surface_noise(gbuffer, **key)
     noise = made[1]
     if len(flow.pixel) == len(gbuffer.pixel):
         return noise

@@ -27,7 +27,7 @@ from .images import Images, relative_magnitude
 from .inks import INKS, inks_of
 from .look import Look
 from .noise import MEAN, image_noise
-from .paper import TOOTH, paper_tooth
+from .paper import TOOTH, paper_tooth, surface_tooth
 
 #: Darkness over which a family that joins in comes to its full share.
 JOINING = 0.35
@@ -277,11 +277,14 @@ class Statistics(NamedTuple):
         Of the streaks.
     piece_deviation : float
         Of those as long as the pieces of broken lines.
+    tooth_deviation : float
+        Of a tooth that stays with surfaces.
     """
 
     threshold: np.ndarray
     deviation: float
     piece_deviation: float
+    tooth_deviation: float = 1.0
 
 
 def statistics_of(look: Look) -> Statistics:
@@ -298,7 +301,16 @@ def statistics_of(look: Look) -> Statistics:
         breaks=look.breaks,
         wobble=look.wobble,
         tooth=TOOTH * look.paper_grain,
+        surface_tooth=_tooth_on_surface(look),
     )
+
+
+def _tooth_on_surface(look: Look) -> tuple[float, float, float] | None:
+    """Grain, density and high pass of the tooth, if it stays with surfaces."""
+    if look.anchor == "picture":
+        return None
+    noise = surface_tooth(look)
+    return noise["grain"], noise["density"], noise["high_pass"]
 
 
 @lru_cache(maxsize=16)
@@ -315,6 +327,7 @@ def ink_statistics(
     breaks: float = 0.0,
     wobble: float = 0.0,
     tooth: float = 0.0,
+    surface_tooth: tuple[float, float, float] | None = None,
 ) -> Statistics:
     """Read off a sample of noise what streaks cover.
 
@@ -334,23 +347,22 @@ def ink_statistics(
         Length of the pieces of broken lines, pixels.
     tooth : float
         Deviation of what the tooth of the paper adds to the streaks.
+    surface_tooth : 3 floats, optional
+        Grain, density and high pass of a tooth that stays with surfaces.
     """
     side = int(np.clip(SAMPLE * grain, SMALLEST_SAMPLE, LARGEST_SAMPLE))
     reach = max(round(length), 1)
     width = side + reach
-    pixel = np.arange(side * width, dtype=np.int32)
-    # Of a surface across which the middle one of its octaves has the size that is asked for.
-    away = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
-    noise = np.zeros((side, width), dtype=np.float32)
-    for octave, share in zip(away, octave_shares(away) if anchored else (1.0,), strict=True):
-        size = grain * 2.0**octave
-        cells = image_noise(pixel, width, size, 1, 1, density=density, high_pass=high_pass)
-        noise += np.float32(share) * cells.reshape(side, width)
+    noise = _sample((side, width), grain, density, high_pass, anchored)
     streaks, deviation = _standardised(_means_along(noise, reach, side, tapered))
     within = min(max(round(piece), 1), reach)
     pieces, piece_deviation = _standardised(_means_along(noise, within, side, tapered))
-    uneven = 0.0
-    if tooth:
+    uneven, tooth_deviation = 0.0, 1.0
+    if tooth and surface_tooth is not None:
+        heights = _sample(streaks.shape, *surface_tooth, anchored=True)
+        tooth_deviation = float(heights.std())
+        uneven = tooth / tooth_deviation * (heights - heights.mean())
+    elif tooth:
         heights = paper_tooth(np.arange(streaks.size, dtype=np.int32), len(streaks[0]), grain, 1)
         uneven = tooth * heights[0].reshape(streaks.shape)
     wanted = np.linspace(0, 1, STEPS)
@@ -359,11 +371,13 @@ def ink_statistics(
     samples = [streaks + degree * (pieces - streaks) + uneven for degree in known]
     table = _limits(samples, softness(crispness))
     if len(known) == 1:
-        return Statistics(table[0], deviation, piece_deviation)
+        return Statistics(table[0], deviation, piece_deviation, tooth_deviation)
     place = (degrees - known[0]) / (known[-1] - known[0]) * (BREAKS - 1)
     below = np.minimum(place.astype(int), BREAKS - 2)
     low, high = (table[row, np.arange(STEPS)] for row in (below, below + 1))
-    return Statistics(low + (place - below) * (high - low), deviation, piece_deviation)
+    return Statistics(
+        low + (place - below) * (high - low), deviation, piece_deviation, tooth_deviation
+    )
 
 
 def _limits(samples: list[np.ndarray], soft: float) -> np.ndarray:
@@ -375,6 +389,23 @@ def _limits(samples: list[np.ndarray], soft: float) -> np.ndarray:
     wanted = np.linspace(0, 1, STEPS)
     shares = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
     return np.array([np.interp(wanted, inked @ share, limits) for share in shares])
+
+
+def _sample(
+    shape: tuple[int, int], grain: float, density: float, high_pass: float, anchored: bool
+) -> np.ndarray:
+    """Some noise of a picture, or as that of a surface, as an image.
+
+    Of a surface across which the middle one of its octaves has the size that is asked for.
+    """
+    pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
+    away = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
+    noise = np.zeros(shape, dtype=np.float32)
+    for octave, share in zip(away, octave_shares(away) if anchored else (1.0,), strict=True):
+        size = grain * 2.0**octave
+        cells = image_noise(pixel, shape[1], size, 1, 1, density=density, high_pass=high_pass)
+        noise += np.float32(share) * cells.reshape(shape)
+    return noise
 
 
 def _means_along(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:

@@ -1,23 +1,39 @@
-"""The tooth of paper: heights that catch the ink of a soft tool, and stay with the picture."""
+"""The tooth of paper: heights that catch the ink of a soft tool.
+
+They stay with the picture as the paper of a drawing does, or with the surfaces, where streaks do: one
+sheet for many frames would seem to lie between the eye and what moves.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from .look import Look
 from .noise import TILE, blur_reach, blurred, hash_bits
 
 #: Deviation of the finest blur whose differences are the bands of the relief, in grains, and the
 #: least, pixels: what is finer is not paper, but noise.
 FINEST, SMOOTHEST = 0.16, 0.7
 
+#: The tooth is not to know of the streaks.
+OWN_SEED = 0x5EED
+
 #: How much each band has to say, an octave each: fine tooth on broad unevenness.
 SHARES = (1.0, 0.6, 0.4)
 
 #: Of the threshold of ink, at `Look.paper_grain` 1, in deviations of the streaks.
 TOOTH = 1.2
+
+#: Size of the tooth that stays with surfaces, in grains of the streaks and at least in pixels, and
+#: what is broader than so many of these is taken out.
+ON_SURFACE, SMALLEST, BROADEST = 0.4, 1.5, 6.0
+
+#: The lines of so many families catch on different spots of a surface.
+TEETH = 3
 
 #: So many pixels of paper are kept for the next picture.
 _KEPT = 1 << 22
@@ -60,6 +76,26 @@ def paper_tooth(
     return np.stack([sheet.take(place + line * beside) for line in range(lines)])
 
 
+def surface_tooth(look: Look) -> dict[str, Any]:
+    """The tooth that stays with surfaces, by the parameters of `surface_noise`.
+
+    A channel for each of `TEETH` families. Its deviation is `hatching.Statistics.tooth_deviation`.
+
+    Parameters
+    ----------
+    look : Look
+        With its lengths in the pixels of the frame.
+    """
+    grain = max(ON_SURFACE * look.grain, SMALLEST * look.supersampling)
+    return {
+        "grain": grain,
+        "seed": look.seed ^ OWN_SEED,
+        "channels": TEETH,
+        "density": 0.5,
+        "high_pass": BROADEST * grain,
+    }
+
+
 def stretch(grain: float) -> int:
     """Pixels from the paper of one line to that of the next: what they have in common is gone."""
     return int(np.ceil(3 * _blurs(grain)[-1]))
@@ -83,8 +119,7 @@ def _sheet(left: int, right: int, bottom: int, top: int, grain: float, seed: int
     margin = 4 * blur_reach(blurs[-1])
     column = np.arange(left - margin, right + margin, dtype=np.int32)
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
-    # A seed of its own: the tooth is not to know of the streaks.
-    white = hash_bits(column, row, seed ^ 0x5EED, 0, 0.5).astype(np.float32) - np.float32(0.5)
+    white = hash_bits(column, row, seed ^ OWN_SEED, 0, 0.5).astype(np.float32) - np.float32(0.5)
     heights = _relief(white, blurs)[margin:-margin, margin:-margin]
     return np.ascontiguousarray(heights / np.float32(_deviation(*blurs))).reshape(-1)
 

@@ -22,6 +22,7 @@ from ..compositor.hatching import (
     JOINING,
     LEAST,
     SWELL,
+    Statistics,
     has_pieces,
     has_tooth,
     piece_length,
@@ -33,7 +34,7 @@ from ..compositor.inks import INKS, inks_of
 from ..compositor.kernel import whole_samples
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
-from ..compositor.paper import TOOTH, paper_tooth, stretch
+from ..compositor.paper import TEETH, TOOTH, paper_tooth, stretch, surface_tooth
 from ..compositor.shading import Light, lights_of
 from ..compositor.tone import Rendered, curve_of
 from ..compositor.waver import EVENED, SWAY, WAVELENGTH, WAVES, wave_table, wavers
@@ -317,16 +318,19 @@ class Card:
         self.device.clear(fine)
         kinds = sorted({entry.kind for entry in placed} - {None}, key=lambda kind: kind.degree)
         if look.anchor == "surface":
-            noise = self._anchored(placed, camera, scaled_look(look))
+            noise = self._anchored(placed, camera, noise_of(scaled_look(look)), "noise")
         else:
             noise = self._noise(camera.width, camera.height, look)
+        tooth = None
+        if has_tooth(look) and look.anchor == "surface":
+            tooth = self._anchored(placed, camera, surface_tooth(scaled_look(look)), "tooth")
         gbuffer["wavering"] = self._wavering(placed, camera, look)
         gbuffer["tones"] = self._tones(placed, camera, look, lights, rendered)
         for number, kind in enumerate(kinds):
             around = _around([_window(entry, camera) for entry in placed if entry.kind == kind])
             if _is_empty(around):
                 continue
-            work = self._composing(kind, around, camera, look, gbuffer, noise, fine)
+            work = self._composing(kind, around, camera, look, gbuffer, noise, tooth, fine)
             start, stop = number / len(kinds), (number + 1) / len(kinds)
             yield from part(work, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
         if whole:
@@ -446,21 +450,24 @@ class Card:
             )
         return images
 
-    def _anchored(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
-        """Noise that stays with the surfaces, as `anchored.surface_noise`."""
+    def _anchored(
+        self, placed: Sequence[Placed], camera: Camera, wanted: dict[str, Any], name: str
+    ) -> Any:
+        """Noise that stays with the surfaces, as `anchored.surface_noise`; the image of a name."""
+        density = wanted["density"]
         width, height = camera.width, camera.height
         raw = self._image("raw_noise", width, height)
         self.device.clear(raw)
         lattice = lattice_axes()
-        spread = DEVIATION / np.sqrt(look.density * (1 - look.density)) / len(TAPS)
+        spread = DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS)
         shared = {
             **_camera_constants(camera),
             **{f"lattice_{axis}": (*row, 0.0) for axis, row in zip("xyz", lattice, strict=True)},
             "amplitude": spread,
-            "density": look.density,
-            "bright_below": round(look.density * 2**24),
-            "channels": noise_of(look)["channels"],
-            "seed": look.seed,
+            "density": density,
+            "bright_below": round(density * 2**24),
+            "channels": wanted["channels"],
+            "seed": wanted["seed"],
             "LOWEST": LOWEST,
             "OCTAVES": OCTAVES,
         }
@@ -473,7 +480,7 @@ class Card:
                 **shared,
                 **_body_constants(number, entry, camera),
                 "corner": (left, bottom),
-                "unit_of_pixel": look.grain * SIDE / (camera.pixels_per_unit * entry.grown),
+                "unit_of_pixel": wanted["grain"] * SIDE / (camera.pixels_per_unit * entry.grown),
                 "identity": int(names[number]),
             }
             self.device.compute(
@@ -483,7 +490,7 @@ class Card:
                 {"raw_noise": raw},
                 constants,
             )
-        return self._without_clouds(raw, camera, look.high_pass)
+        return self._without_clouds(raw, camera, wanted["high_pass"], name)
 
     def _wavering(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
         """How a hand wavers at each pixel, as `waver.waver`."""
@@ -521,7 +528,7 @@ class Card:
             )
         return wavering
 
-    def _without_clouds(self, raw: Any, camera: Camera, high_pass: float) -> Any:
+    def _without_clouds(self, raw: Any, camera: Camera, high_pass: float, name: str) -> Any:
         """Noise around its mean, and nothing broad in it: `anchored._broad`."""
         size = camera.width, camera.height
         smooth = raw
@@ -537,7 +544,7 @@ class Card:
                     {"along": along, "reach": reach},
                 )
                 smooth = smoother
-        noise = self._image("noise", *size)
+        noise = self._image(name, *size)
         self.device.compute(
             passes.SETTLE,
             size,
@@ -555,6 +562,7 @@ class Card:
         look: Look,
         gbuffer: dict[str, Any],
         noise: Any,
+        tooth: Any,
         picture: Any,
     ) -> Work[None]:
         """Draw the fields of one kind into the picture."""
@@ -606,7 +614,7 @@ class Card:
             "palette": self._table("palette", None, lambda: PALETTE),
             "thresholds": self._thresholds(scaled_look(look)),
             "inks": self._inks(kind, look),
-            "tooth": self._tooth(width, height, look, kind.lines),
+            "tooth": self._tooth(width, height, look, kind.lines) if tooth is None else tooth,
         }
         constants = {**covering, **_look_constants(kind, look)}
         steps = size[0] * kind.lines * 2 * constants["walk_length"]
@@ -911,13 +919,20 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "piece_deviation": statistics.piece_deviation if statistics else 1.0,
         "wobble": look.wobble if wavers(look) else 0.0,
         "SWELL": SWELL,
-        "tooth_depth": TOOTH * look.paper_grain if has_tooth(look) else 0.0,
+        "tooth_depth": _tooth_depth(look, statistics),
+        "teeth": TEETH if look.anchor == "surface" else 0,
         "tooth_stretch": stretch(look.grain),
         "subpixels": look.supersampling,
         "JOINING": JOINING,
         "EARLY": EARLY,
         "LEAST": LEAST,
     }
+
+
+def _tooth_depth(look: Look, statistics: Statistics | None) -> float:
+    if statistics is None or not has_tooth(look):
+        return 0.0
+    return TOOTH * look.paper_grain / statistics.tooth_deviation
 
 
 def _ink_count(kind: Kind, look: Look) -> int:

@@ -335,6 +335,7 @@ WALK = Compute(
         ("SWELL", "float"),
         ("tooth_depth", "float"),
         ("tooth_stretch", "int"),
+        ("teeth", "int"),
         ("subpixels", "int"),
         ("JOINING", "float"),
         ("EARLY", "float"),

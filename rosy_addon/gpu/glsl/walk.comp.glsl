@@ -186,6 +186,18 @@ float covering(float wanted, vec3 ink)
   return clamp((1.0 - wanted) / max(1.0 - left_by, 1e-3), 0.0, 1.0);
 }
 
+// How well the paper takes the ink of a member: on a stretch of its own of one sheet, or on one of the
+// `teeth` of the surface (`compose._tooth`).
+float tooth_of(int member, ivec2 pixel)
+{
+  if (teeth == 0) {
+    return texelFetch(tooth, pixel / subpixels + ivec2(member * tooth_stretch, 0), 0).x;
+  }
+  vec3 heights = texelFetch(tooth, pixel, 0).xyz - MEAN;
+  int which = modulo(member, teeth);
+  return which == 0 ? heights.x : which == 1 ? heights.y : heights.z;
+}
+
 float threshold_of(float covered)
 {
   int last = textureSize(thresholds, 0).x - 1;
@@ -284,8 +296,7 @@ void main()
         streak = mix(streak, grey(near) / piece_deviation, broken);
       }
       if (tooth_depth > 0.0) {
-        ivec2 place = pixel / subpixels + ivec2(member_of_line(line) * tooth_stretch, 0);
-        streak += tooth_depth * texelFetch(tooth, place, 0).x;
+        streak += tooth_depth * tooth_of(member_of_line(line), pixel);
       }
       float above = streak - threshold_of(covered);
       float coverage = smooth_step(above / (2.0 * softness) + 0.5);

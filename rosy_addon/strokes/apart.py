@@ -155,7 +155,8 @@ def _too_near(ground: Ground, fine: Strokes, bent: np.ndarray, length: np.ndarra
     two = ground.upright(fine.triangle[other], fine.member[other], there)
     # Over sharp bends it matters how directions are compared: carried over, or seen from above.
     above = unit(normal)
-    flat = [unit(way - dot(way, above)[:, None] * above) for way in (one, two)]
+    ways = fine.member[own], fine.member[other]
+    flat = [unit(way - dot(way, above)[:, None] * above) for way in ways]
     same &= ground.same_line(one, here, two, there, SLACK) | ground.same_line(
         flat[0], above, flat[1], above, SLACK
     )

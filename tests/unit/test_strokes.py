@@ -110,7 +110,7 @@ def too_near(strokes, lines, least=0.5):
     distance = np.linalg.norm(gap, axis=1)
     above = unit(normal[one] + normal[two])
     near = distance < least * np.minimum(spacing[one], spacing[two])
-    near &= dot(normal[one], normal[two]) > 0.5  # else an edge is between them, or a thin sheet
+    near &= dot(normal[one], normal[two]) > 0.3  # else an edge is between them, or a thin sheet
     near &= np.abs(dot(gap, above)) <= 0.5 * distance
     a, b = (unit(w - dot(w, above)[:, None] * above) for w in (way[one], way[two]))
     near &= np.degrees(np.arccos(np.clip(np.abs(dot(a, b)), 0, 1))) < 90 / lines

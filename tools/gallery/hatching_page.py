@@ -53,33 +53,11 @@ INKS = {
     ),
 }
 
-#: In the order of the page.
-PRESETS = (
-    "pen-and-ink",
-    "cross-hatch",
-    "engraving",
-    "pencil",
-    "charcoal",
-    "woodcut",
-    "white-on-black",
-    "print-300-dpi",
-)
-
 
 def write() -> None:
     """Draw them."""
     monkey = suzanne()
     field = smoothed_a_little(monkey, curvature_field(monkey, 4))
-    panels = []
-    for name in PRESETS:
-        preset = load_preset(name)
-        camera = view(monkey, (-26, 8), (SIDE, SIDE), preset.look.supersampling)
-        shown = display(compose_view(monkey, field, preset.look, camera).rgba)
-        panels.append(Panel(shown, preset.name))
-    save(
-        sheet([panels[start : start + 2] for start in range(0, len(panels), 2)]),
-        IMAGES / "hatching-presets.png",
-    )
     look = load_preset("cross-hatch").look
     camera = view(monkey, (-26, 8), (THIRD, THIRD), look.supersampling)
     layered = []

@@ -36,7 +36,7 @@ LARGE, SMALL = (820, 640), (410, 320)
 MARGIN = 0.04
 
 #: How far curvature reaches into what is hardly curved.
-REACH = 0.03
+REACH = 0.1
 
 #: Of a file: hatching is ink, paper and the edges between.
 INKS, COLOURS = 32, 192

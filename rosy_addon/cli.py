@@ -699,7 +699,7 @@ def _add_strokes(verbs: Any) -> None:
         type=_number(0.5, 1e4),
         default=8.0,
         metavar="PX",
-        help="pixels between strokes of a family, where the surface faces the camera (%(default)g)",
+        help="pixels of the picture between strokes of a family (%(default)g)",
     )
     verb.add_argument(
         "--distance",
@@ -708,7 +708,16 @@ def _add_strokes(verbs: Any) -> None:
         help="between strokes of a family in units of the mesh, instead of pixels",
     )
     verb.add_argument(
-        "--tone", action="store_true", help="nearer where a light leaves the surface darker"
+        "--tone",
+        action="store_true",
+        help="nearer where a light leaves the surface darker, thinner and none where it is bright",
+    )
+    verb.add_argument(
+        "--layering",
+        type=_number(0.0, 1.0),
+        default=Manner.layering,
+        metavar="AMOUNT",
+        help="with --tone, how much darker it has to be for the next family to begin (%(default)g)",
     )
     verb.add_argument(
         "--light",

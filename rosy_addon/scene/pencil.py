@@ -47,9 +47,12 @@ def new_pencil(name: str, lines: Lines, frame: int, keep: Keep) -> bpy.types.ID:
         layer = data.layers.new(title)
         layer.use_lights = False
         chosen = (np.array(titles) == title)[strokes.family]
+        drawn = layer.frames.new(frame)
+        if not chosen.any():
+            continue
         point = np.repeat(chosen, np.diff(strokes.start))
         add(
-            layer.frames.new(frame),
+            drawn,
             np.diff(strokes.start)[chosen],
             lines.points[point].astype(np.float32),
             lines.radius[point].astype(np.float32),

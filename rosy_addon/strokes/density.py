@@ -20,6 +20,12 @@ from .strokes import Strokes
 #: Spacings are at most and at least so many times what was asked for.
 LIGHTEST, DARKEST = 3.0, 0.5
 
+#: Part of its width at which a stroke is lifted from the paper.
+THINNEST = 0.12
+
+#: Cosine of the slant up to which strokes are moved apart for it.
+SLANT = 1 / 3
+
 #: Share of each channel in what is seen of a linear colour (Rec. 709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -55,6 +61,24 @@ def pixel_spacing(body: Body, camera: Camera, pixels: float) -> np.ndarray:
     if not (np.isfinite(pixels) and pixels > 0):
         raise RosyError(f"a spacing of {pixels:g} pixels is not above 0")
     return pixels * pixel_size(_in_world(body), camera)
+
+
+def foreshortened(body: Body, camera: Camera, spacing: np.ndarray) -> np.ndarray:
+    """(V,) wider where the surface turns away from a camera, so that strokes do not crowd there.
+
+    Seen at a slant of cosine c, a surface has c times its area, and lines on it are between c and 1
+    times as long, (1 + c) / 2 on average over their directions.
+
+    Parameters
+    ----------
+    body : Body
+    camera : Camera
+    spacing : (V,) ndarray
+        Where the surface faces the camera.
+    """
+    toward = _toward(body, camera)
+    cosine = np.maximum(np.maximum(lambert(body, toward), lambert(body, -toward)), SLANT)
+    return spacing * (1 + cosine) / (2 * cosine)
 
 
 def by_tone(
@@ -154,19 +178,29 @@ def lambert(body: Body, light: np.ndarray) -> np.ndarray:
     return np.clip(dot(unit(normal), unit(np.broadcast_to(light, normal.shape) + 0.0)), 0, 1)
 
 
-def kept_by_tone(strokes: Strokes, tone: np.ndarray, thresholds: np.ndarray) -> Strokes:
-    """Families one after the other as it gets darker: hatching, then cross-hatching.
+def weighed_by_tone(
+    strokes: Strokes, tone: np.ndarray, layering: float, lightest: float = LIGHTEST
+) -> Strokes:
+    """Families one after the other as it gets darker, thinner in the lights, and none in the brightest.
+
+    In the first one width over spacing goes on where `by_tone` has spread strokes as far as they
+    may be: the ink on paper falls to nothing.
 
     Parameters
     ----------
     strokes : Strokes
+        As they were traced.
     tone : (n,) ndarray
-        At the points of the strokes, 0 to 1; `at_points` gives it.
-    thresholds : (families,) array_like
-        Each family is drawn where the tone is below its own.
+        At their points, 0 to 1; `at_points` gives it.
+    layering : float
+        How much darker it has to be for each next family to begin.
+    lightest : float
+        As of `by_tone`.
     """
-    below = tone < np.asarray(thresholds, dtype=np.float64)[strokes.family[strokes.stroke]]
-    return replace(strokes.runs(below), names=strokes.names)
+    dark = 1 - np.clip(tone, 0, 1) - layering * strokes.family[strokes.stroke]
+    weight = np.clip(dark * lightest, 0, 1)
+    weighed = replace(strokes, width=strokes.width * weight)
+    return replace(weighed.runs(weight > THINNEST), names=strokes.names)
 
 
 def at_points(strokes: Strokes, surface: Surface, values: np.ndarray) -> np.ndarray:

@@ -15,7 +15,16 @@ from ..progress import Progress, Work, drain, part
 from ..projection.camera import Camera
 from ..projection.gbuffer import Body
 from .crossings import with_gaps
-from .density import Lamp, by_curvature, by_tone, lit, pixel_spacing
+from .density import (
+    Lamp,
+    at_points,
+    by_curvature,
+    by_tone,
+    foreshortened,
+    lit,
+    pixel_spacing,
+    weighed_by_tone,
+)
 from .families import label_families
 from .ground import lay_ground
 from .outline import KINDS, outline
@@ -53,7 +62,7 @@ class Manner:
         "pixels",
         "What the spacing is counted in",
         options={
-            "pixels": "Pixels of the picture, wherever the surface faces the camera",
+            "pixels": "Pixels of the picture",
             "length": "Blender units, on the surface",
         },
     )
@@ -67,7 +76,17 @@ class Manner:
         high=1e6,
         unit="length",
     )
-    tone: bool = _setting(False, "Bring strokes nearer to each other where the light is weak")
+    tone: bool = _setting(
+        False,
+        "Bring strokes nearer to each other where the light is weak, and lift the pen where it is "
+        "strong",
+    )
+    layering: float = _setting(
+        0.3,
+        "With tone: how much darker it has to be for each next family to begin",
+        low=0.0,
+        high=1.0,
+    )
     light: str = _setting(
         "headlight",
         "Where that light comes from",
@@ -191,12 +210,16 @@ def drawing(
 def _on_body(body: Body, camera: Camera, manner: Manner, lights: Sequence[Lamp]) -> Work[Strokes]:
     """Strokes, and the outline, hidden or not."""
     spacing = _spacing(body, camera, manner)
-    if manner.tone:
-        spacing = by_tone(spacing, lit(body, camera, lights))
+    tone = lit(body, camera, lights) if manner.tone else None
+    if tone is not None:
+        spacing = by_tone(spacing, tone)
     if manner.curvature:
         spacing = by_curvature(body.surface, spacing, manner.curvature)
     strokes = yield from tracing(body, spacing, cross_creases=manner.cross_creases)
     strokes = label_families(strokes, lay_ground(body), camera.view[0, :3])
+    if tone is not None:
+        here = at_points(strokes, body.surface, tone)
+        strokes = weighed_by_tone(strokes, here, manner.layering)
     if manner.gaps:
         strokes = with_gaps(strokes, manner.gaps, weave=True)
     if manner.taper:
@@ -213,7 +236,7 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
     """
     if manner.unit == "length":
         return np.full(len(body.surface.vertices), manner.distance)
-    spacing = pixel_spacing(body, camera, manner.spacing)
+    spacing = foreshortened(body, camera, pixel_spacing(body, camera, manner.spacing))
     points = _in_world(body)
     pixels, _ = on_screen(points, camera)
     with np.errstate(invalid="ignore"):

@@ -494,7 +494,7 @@ STROKE_ICONS = {
 
 #: Settings of strokes that are folded away.
 STROKE_GROUPS = {
-    "Density": ("tone", "light", "curvature"),
+    "Density": ("tone", "light", "layering", "curvature"),
     "Ends": ("taper", "gaps", "cross_creases"),
     "Inks": ("inks", "ink_colour", "outline_colour"),
 }
@@ -506,6 +506,7 @@ def _draw_stroke_settings(
     column = layout.column()
     unused = {
         "light": not settings.tone,
+        "layering": not settings.tone,
         "outline_colour": settings.inks == "ONE" or not settings.outline,
         "ink_colour": settings.inks != "ONE",
         "paper": settings.plotter,

@@ -80,10 +80,14 @@ def test_light_is_that_of_lambert():
 
 
 def test_light_makes_room():
-    made = draw([BALL], CAMERA, Manner(spacing=5, tone=True), lights=[LAMP]).strokes
+    manner = Manner(unit="length", distance=0.05, tone=True)
+    made = draw([BALL], CAMERA, manner, lights=[LAMP]).strokes
     light = unit(made.points) @ (CAMERA.view[:3, :3].T @ LAMP.vector)
-    sparse, dense = made.spacing[light > 0.8].mean(), made.spacing[light < 0.0].mean()
-    assert sparse > 2 * dense
+    assert made.spacing[light > 0.8].mean() > 2.5 * made.spacing[light < 0.0].mean()
+    assert light.max() < 0.97 and made.width[light > 0.9].max() < 0.35
+    # One family in the lights, both in the dark.
+    families = [np.unique(made.family[made.stroke][part]) for part in (light > 0.75, light < 0.2)]
+    assert [len(found) for found in families] == [1, 2]
 
 
 def test_thinned_lines_miss_nothing():

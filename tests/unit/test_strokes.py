@@ -24,7 +24,15 @@ from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_cam
 from rosy_addon.projection.gbuffer import Body
 from rosy_addon.strokes.apart import kept_apart
 from rosy_addon.strokes.crossings import crossings, cut, with_gaps
-from rosy_addon.strokes.density import at_points, by_curvature, by_tone, headlight, kept_by_tone
+from rosy_addon.strokes.density import (
+    at_points,
+    by_curvature,
+    by_tone,
+    foreshortened,
+    headlight,
+    pixel_spacing,
+    weighed_by_tone,
+)
 from rosy_addon.strokes.evenness import side_gaps
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.ground import lay_ground
@@ -485,10 +493,35 @@ def test_families_by_tone():
     body = body_of(plane(10, 10), 4)
     drawn = trace(body, 0.1)
     tone = at_points(drawn, body.surface, (body.surface.vertices[:, 0] + 1) / 2)
-    crossed = kept_by_tone(drawn, tone, (0.8, 0.4))
-    for family, threshold in ((0, 0.8), (1, 0.4)):
-        own = crossed.chosen(crossed.family == family)
-        assert len(own) and own.points[:, 0].max() < 2 * threshold - 1
+    weighed = weighed_by_tone(drawn, tone, 0.4)
+    for family, begins in ((0, 1.0), (1, 0.6)):
+        own = weighed.chosen(weighed.family == family)
+        x = own.points[:, 0]
+        assert len(own) and x.max() < 2 * begins - 1
+        # Three times as wide as the darkness, up to the whole of the pen.
+        wanted = np.clip(3 * (begins - (x + 1) / 2), 0, 1)
+        np.testing.assert_allclose(own.width, wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("slant", [0.0, 0.8, 1.2])
+def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
+    """Of lines of all directions, in length over area."""
+    floor = plane(20, 20)
+    camera = orthographic_camera(
+        look_at((0, -5 * np.sin(slant), 5 * np.cos(slant)), (0, 0, 0), (0, 1, 0)), 400, 400, scale=2
+    )
+    turned = []
+    for angle in np.linspace(0, np.pi / 2, 5)[:-1]:
+        body = Body(floor, STILL, axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0)))
+        spacing = foreshortened(body, camera, pixel_spacing(body, camera, 6.0))
+        drawn = trace(body, spacing)
+        pixels, _ = on_screen(drawn.points, camera)
+        piece = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
+        same = np.diff(drawn.stroke) == 0
+        turned.append(piece[same].sum())
+    area = 400 * 400 * np.cos(slant)
+    # Of two families, six pixels apart.
+    assert np.mean(turned) / area == pytest.approx(2 / 6, rel=0.12)
 
 
 # --- families --------------------------------------------------------------------------------------

@@ -97,7 +97,7 @@ def test_presets_reproduce_a_ramp_on_the_surface(name):
         look = replace(PRESETS[name], tone="attribute", seed=seed)
         off.append(blurred(gbuffer, left_of(compose(fine, look).rgba, look)) - wanted)
     assert np.abs(off).mean() <= 0.04
-    assert abs(np.mean(off)) <= 0.015
+    assert abs(np.mean(off)) <= 0.02
 
 
 def contrast(look, tone):
@@ -113,7 +113,7 @@ def contrast(look, tone):
 
 @pytest.mark.parametrize("name", HATCHED)
 def test_lines_are_as_legible_in_the_dark_as_in_the_light(name):
-    assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.1
+    assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.08
 
 
 def test_soft_streaks_lose_contrast_in_the_dark():

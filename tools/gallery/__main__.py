@@ -26,6 +26,7 @@ OTHERS = (
     "hatching-page",
     "presets-page",
     "peers",
+    "strokes-page",
     "fields-page",
     "turntable",
     "performance",

@@ -1,0 +1,61 @@
+"""The pictures of docs/strokes.md; its text is written by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from rosy_addon.compositor.shading import lights_of
+from rosy_addon.field.generate import Recipe, generate
+from rosy_addon.projection.camera import Camera, orbit_camera
+from rosy_addon.projection.gbuffer import Body
+from rosy_addon.strokes.draw import Manner, draw
+from rosy_addon.strokes.seen import on_screen
+from rosy_addon.strokes.strokes import Strokes
+
+from .looks_page import IMAGES
+from .shapes import suzanne
+from .sheet import Panel, save, sheet
+
+#: Of a picture, and how many subpixels a pixel of it has, each way.
+SIDE, FINE = 402, 4
+
+#: Pixels.
+WIDTH = 1.3
+
+#: What is shown, by labels: how Suzanne is drawn.
+DRAWN = {
+    "evenly spaced, with an outline": Manner(spacing=6, outline=True),
+    "by tone, of a lamp": Manner(spacing=4, outline=True, tone=True, light="lamp"),
+}
+
+
+def write() -> None:
+    """Draw them."""
+    surface = suzanne()
+    body = Body(surface, np.eye(4), generate(surface, Recipe("curvature", reach=0.1), 4))
+    camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
+    panels = []
+    for label, manner in DRAWN.items():
+        strokes = draw([body], camera, manner, lights=lights_of(manner, ())).strokes
+        panels.append(Panel(rastered(strokes, camera), label))
+    save(sheet([panels]), IMAGES / "strokes.png")
+
+
+def rastered(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """(H, W, 3) uint8 from the top: black strokes on white paper, as round pens draw them."""
+    pixels, _ = on_screen(strokes.points, camera)
+    pixels[:, 1] = camera.height - pixels[:, 1]
+    pixels *= FINE
+    paper = Image.new("L", (camera.width * FINE, camera.height * FINE), 255)
+    pen = ImageDraw.Draw(paper)
+    radius = strokes.width * (WIDTH * FINE / 2)
+    for start, stop in zip(strokes.start[:-1].tolist(), strokes.start[1:].tolist(), strict=True):
+        for number in range(start, stop):
+            x, y, r = *pixels[number], radius[number]
+            pen.ellipse((x - r, y - r, x + r, y + r), fill=0)
+            if number > start:
+                ends = [tuple(pixels[number - 1]), (x, y)]
+                pen.line(ends, fill=0, width=max(round(r + radius[number - 1]), 1))
+    small = paper.resize((camera.width, camera.height), Image.Resampling.BOX)
+    return np.repeat(np.asarray(small)[..., None], 3, axis=2)

@@ -1,7 +1,8 @@
 # `make demo` and `make test` need Python 3.11, make and git; the rest is set up in .venv* here.
 #
 #   make demo      Suzanne with a 4-RoSy field, baked and rendered: demo.png
-#   make test      unit tests with new and old numpy, and tests with Blender 4.2's Python module
+#   make test      unit tests with new numpy, the quick ones with old numpy, and tests with
+#                  Blender 4.2's Python module
 #   make test-all  the same, and Blender 4.5's and 5.0's modules
 #   make check     formatting, lint, import rules and unit tests: seconds
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
@@ -33,7 +34,7 @@ test-unit: .venv/ready .venv-numpy1/ready
 	ROSY_OTHER_PYTHON=$(abspath $(NUMPY1)) $(UNIT) $(PYTEST) tests/unit
 
 test-numpy1: .venv-numpy1/ready
-	$(NUMPY1) $(PYTEST) tests/unit
+	$(NUMPY1) $(PYTEST) -m "not slow" tests/unit
 
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/bin/python $(PYTEST) tests/bpy

@@ -11,7 +11,7 @@ from rosy_addon.errors import RosyError
 ROOT = Path(__file__).resolve().parents[2]
 
 #: Modules that draw many pictures and measure them; `make check` leaves them out.
-SLOW = {"test_compositor", "test_pictures"}
+SLOW = {"test_compositor", "test_hatching", "test_occlusion", "test_pictures", "test_tone"}
 
 
 def pytest_collection_modifyitems(items):

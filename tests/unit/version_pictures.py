@@ -16,6 +16,7 @@ from shapes import icosphere, torus
 from rosy_addon.compositor.compose import compose, compose_planar
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.png import to_bytes
+from rosy_addon.compositor.presets import load_preset
 from rosy_addon.field.generate import generate
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import Body
@@ -29,6 +30,8 @@ def draw() -> dict[str, np.ndarray]:
     shapes = {
         "torus": (torus(), "curvature", 4, look),
         "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
+        "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
+        "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
         "magnitude": (torus(40, 20), "axis", 3, Look(magnitude="both", supersampling=2)),
     }
     for name, (surface, kind, degree, drawn) in shapes.items():

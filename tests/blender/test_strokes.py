@@ -86,7 +86,7 @@ def test_what_is_hidden_is_not_rendered(drawn, scene, tmp_path):
     bpy.ops.mesh.primitive_plane_add(
         size=1.0, location=(0.0, -2.0, 0.6), rotation=(np.pi / 2, 0, 0)
     )
-    scene.rosy.strokes.outline = False
+    scene.rosy.strokes.outline, scene.rosy.strokes.spacing = False, 4.0
     assert bpy.ops.rosy.strokes(kind="PENCIL") == {"FINISHED"}
     found = ink(scene, tmp_path / "render.png")
     middle = found[52:68, 72:88]  # what the square covers, and more

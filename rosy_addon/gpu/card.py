@@ -892,7 +892,7 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
     return {
         "walk_length": finer.length,
         "taper": int(look.taper),
-        "whole": whole_samples(finer),
+        "whole_samples": whole_samples(finer),
         "step_length": finer.step,
         "grain": finer.grain,
         "crossing": crossing,
@@ -915,7 +915,7 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "deviation": statistics.deviation if statistics else 1.0,
         "breaks": look.breaks,
         "piece_length": piece_length(finer) if has_pieces(look) else 0,
-        "piece_whole": whole_samples(replace(finer, length=piece_length(finer))),
+        "piece_samples": whole_samples(replace(finer, length=piece_length(finer))),
         "piece_deviation": statistics.piece_deviation if statistics else 1.0,
         "wobble": look.wobble if wavers(look) else 0.0,
         "SWELL": SWELL,

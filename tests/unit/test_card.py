@@ -355,6 +355,17 @@ def test_common_code_is_told_nothing():
     assert not words_of(passes._read("common.glsl")) & known
 
 
+@pytest.mark.parametrize("shader", passes.ALL, ids=lambda shader: shader.name)
+def test_nothing_else_has_the_name_of_a_constant(shader):
+    """In Blender constants are macros, which know no scope: neither variables nor members may."""
+    source = code_of(own_source(shader))
+    kinds = "float|int|bool|vec[234]|ivec[234]|mat[34]"
+    declared = set(re.findall(rf"\b(?:{kinds})\s+(\w+)", source))
+    declared |= set(re.findall(rf"\b(?:{kinds})\s[^;(]*?,\s*(\w+)\s*[=;,]", source))
+    declared |= set(re.findall(r"(?<=[A-Za-z_\])])\.([A-Za-z_]\w*)", source))
+    assert not declared & {name for name, _ in shader.constants}
+
+
 # --- windows -------------------------------------------------------------------------------------
 
 

@@ -274,7 +274,7 @@ void main()
     Half ahead = followed(pixel, line, 1.0, cell, steps, near_steps);
     Half behind = followed(pixel, back, paired ? 1.0 : -1.0, cell, steps, near_steps);
     Sums sums = whole_of(cell.yzw, ahead.all, behind.all);
-    vec3 mean = evened_out(sums, whole);
+    vec3 mean = evened_out(sums, whole_samples);
     if (hatch != 0) {
       float later = onset_of(line, nearest) - soonest;
       float own = smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY)) / sharers;
@@ -289,7 +289,7 @@ void main()
       }
       float streak = grey(mean) / deviation;
       if (piece_length > 0) {
-        vec3 near = evened_out(whole_of(cell.yzw, ahead.near, behind.near), piece_whole);
+        vec3 near = evened_out(whole_of(cell.yzw, ahead.near, behind.near), piece_samples);
         // `hatching.brokenness`
         float least = SWELL * wobble;
         float broken = least + (1.0 - least) * breaks * (1.0 - covered) * (1.0 - covered);
@@ -317,7 +317,7 @@ void main()
   blend /= float(lines);
   samples /= float(lines);
   // The mean of M images has the contrast of one (equation 6, `contrast.blend_gain`).
-  float shared_ = clamp(crossing * whole / samples, 0.0, float(lines - 1));
+  float shared_ = clamp(crossing * whole_samples / samples, 0.0, float(lines - 1));
   blend *= gain * sqrt(float(lines) / (1.0 + shared_));
   vec3 tone = channels == 1 ? blend.xxx : blend;
   vec3 ink = tone + MEAN;

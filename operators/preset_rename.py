@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.compositor.presets import LONGEST_DESCRIPTION, LONGEST_NAME, rename_preset
+from ..rosy_addon.compositor.presets import LONGEST_NAME, rename_preset
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.folders import presets_folder
 from ..rosy_addon.ui import shelf
-from .shelved import ANY_PRESET, has_own, preset_of
+from .shelved import ANY_PRESET, SENTENCE, draw_name, has_own, preset_of
 
 
 class ROSY_OT_preset_rename(bpy.types.Operator):
@@ -24,11 +24,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
     name: bpy.props.StringProperty(
         name="Name", description="What the preset is to be called", maxlen=LONGEST_NAME
     )
-    sentence: bpy.props.StringProperty(
-        name="Sentence",
-        description="What the look is like, or what it is for",
-        maxlen=LONGEST_DESCRIPTION,
-    )
+    sentence: bpy.props.StringProperty(**SENTENCE)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -41,10 +37,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self, width=400)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(self, "name")
-        layout.prop(self, "sentence")
+        draw_name(self.layout, self)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         old, name = preset_of(self, context), self.name.strip()

@@ -7,7 +7,6 @@ from typing import Any
 import bpy
 
 from ..rosy_addon.compositor.presets import (
-    LONGEST_DESCRIPTION,
     LONGEST_NAME,
     Preset,
     key_of,
@@ -17,6 +16,7 @@ from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.folders import presets_folder
 from ..rosy_addon.ui import shelf
 from ..rosy_addon.ui.properties import look_of
+from .shelved import SENTENCE, draw_name
 
 
 class ROSY_OT_preset_save(bpy.types.Operator):
@@ -29,11 +29,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
     name: bpy.props.StringProperty(
         name="Name", description="What the preset is called", maxlen=LONGEST_NAME
     )
-    sentence: bpy.props.StringProperty(
-        name="Sentence",
-        description="What the look is like, or what it is for",
-        maxlen=LONGEST_DESCRIPTION,
-    )
+    sentence: bpy.props.StringProperty(**SENTENCE)
     replace: bpy.props.BoolProperty(
         name="Replace the One There",
         description="Let this preset take the place of one of yours that is called the same",
@@ -48,9 +44,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        layout.use_property_split = True
-        layout.prop(self, "name")
-        layout.prop(self, "sentence")
+        draw_name(layout, self)
         if _is_own(self.name):
             layout.label(text="You have a preset of this name", icon="INFO")
             layout.prop(self, "replace")

@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..rosy_addon.compositor.presets import LONGEST_DESCRIPTION
 from ..rosy_addon.ui import shelf
 
 #: Properties of operators that are about one preset.
@@ -13,6 +14,21 @@ ANY_PRESET = {
     "name": "Preset",
     "description": "What the preset is called by; empty: the one whose look the scene has",
 }
+
+
+#: Property of operators that ask for a preset's sentence.
+SENTENCE = {
+    "name": "Sentence",
+    "description": "What the look is like, or what it is for",
+    "maxlen": LONGEST_DESCRIPTION,
+}
+
+
+def draw_name(layout: bpy.types.UILayout, operator: Any) -> None:
+    """What a preset is to be called, and its sentence."""
+    layout.use_property_split = True
+    layout.prop(operator, "name")
+    layout.prop(operator, "sentence")
 
 
 def preset_of(operator: Any, context: bpy.types.Context) -> str:

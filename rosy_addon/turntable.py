@@ -59,7 +59,7 @@ def pictures(
     (H, W, 4) float32 ndarray
         As `Picture.rgba`.
     """
-    points = body.surface.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+    points = body.world_points()
     hull = _turned_hull(points)
     for number in range(count):
         azimuth = view[0] + 360 * number / count

@@ -103,8 +103,8 @@ def image_noise(
     """
     row, column = np.divmod(pixel, np.int32(width))
     # The same for all views of a picture, so that noise is made once for a moving camera.
-    left, right = _tiled(int(column.min()), int(column.max()) + 1)
-    bottom, top = _tiled(int(row[0]), int(row[-1]) + 1)
+    left, right = tiled(int(column.min()), int(column.max()) + 1)
+    bottom, top = tiled(int(row[0]), int(row[-1]) + 1)
     make = _tiles if (right - left) * (top - bottom) <= KEPT else _tiles.__wrapped__
     place = (row - bottom) * np.int32(right - left) + (column - left)
     noise = np.empty((channels, len(pixel)), dtype=np.float32)
@@ -114,7 +114,7 @@ def image_noise(
     return np.ascontiguousarray(noise.T)
 
 
-def _tiled(start: int, stop: int) -> tuple[int, int]:
+def tiled(start: int, stop: int) -> tuple[int, int]:
     """The whole tiles that hold some rows or columns of pixels."""
     return start // TILE * TILE, -(-stop // TILE) * TILE
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .look import Look
-from .noise import TILE, blur_reach, blurred, hash_bits
+from .noise import blur_reach, blurred, hash_bits, tiled
 
 #: Deviation of the finest blur whose differences are the bands of the relief, in grains, and the
 #: least, pixels: what is finer is not paper, but noise.
@@ -68,8 +68,8 @@ def paper_tooth(
     row, column = np.divmod(pixel, np.int32(width))
     row, column = row // side, column // side
     beside = stretch(grain)
-    left, right = _tiled(int(column.min()), int(column.max()) + 1 + (lines - 1) * beside)
-    bottom, top = _tiled(int(row[0]), int(row[-1]) + 1)
+    left, right = tiled(int(column.min()), int(column.max()) + 1 + (lines - 1) * beside)
+    bottom, top = tiled(int(row[0]), int(row[-1]) + 1)
     make = _sheet if (right - left) * (top - bottom) <= _KEPT else _sheet.__wrapped__
     sheet = make(left, right, bottom, top, grain, seed)
     place = (row - bottom) * np.int32(right - left) + (column - left)
@@ -105,11 +105,6 @@ def _blurs(grain: float) -> list[float]:
     """Deviations of the blurs between which the bands of the relief lie, pixels."""
     finest = max(FINEST * grain, SMOOTHEST)
     return [finest * 2**number for number in range(len(SHARES) + 1)]
-
-
-def _tiled(start: int, stop: int) -> tuple[int, int]:
-    """The whole tiles that hold some rows or columns of pixels, so that views share a sheet."""
-    return start // TILE * TILE, -(-stop // TILE) * TILE
 
 
 @lru_cache(maxsize=2)

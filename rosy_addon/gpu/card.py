@@ -385,7 +385,7 @@ class Card:
 
     def wait(self) -> None:
         """Until all that was asked for is done."""
-        self.device.read(self._table("palette", None, lambda: PALETTE), len(PALETTE), 1)
+        self.device.read(self._palette(), len(PALETTE), 1)
 
     def read(self, picture: Any, width: int, height: int) -> np.ndarray:
         """(H, W, 4) float32: what `draw` has drawn."""
@@ -495,7 +495,7 @@ class Card:
     def _wavering(self, placed: Sequence[Placed], camera: Camera, look: Look) -> Any:
         """How a hand wavers at each pixel, as `waver.waver`."""
         if not wavers(look):
-            return self._table("palette", None, lambda: PALETTE)
+            return self._palette()
         width, height = camera.width, camera.height
         wavering = self._image("wavering", width, height)
         waves = self._values("waves", None, lambda: wave_table()[None])
@@ -611,7 +611,7 @@ class Card:
             "colours": self._table(
                 "colours", look.colour_map, lambda: colour_stops(look.colour_map)
             ),
-            "palette": self._table("palette", None, lambda: PALETTE),
+            "palette": self._palette(),
             "thresholds": self._thresholds(scaled_look(look)),
             "inks": self._inks(kind, look),
             "tooth": self._tooth(width, height, look, kind.lines) if tooth is None else tooth,
@@ -791,19 +791,23 @@ class Card:
         for key in [key for key, used in self._used.items() if used < self._drawn - IMAGES_LAST]:
             del self._images[key], self._used[key]
 
-    def _table(self, name: str, key: Any, make: Any) -> Any:
+    def _palette(self) -> Any:
+        """`hues.PALETTE`, which also stands where a shader looks into nothing."""
+        return self._table("palette", None, lambda: PALETTE)
+
+    def _table(self, name: str, key: Any, make: Callable[[], np.ndarray]) -> Any:
         """A row of colours as a texture, made anew if its key is another."""
-        if name not in self._tables or self._tables[name][0] != key:
+
+        def row() -> np.ndarray:
             rgb = np.asarray(make(), dtype=np.float32)
-            data = np.ones((1, len(rgb), 4), dtype=np.float32)
-            data[0, :, :3] = rgb
-            self._tables[name] = key, self.device.texture(len(rgb), 1, "RGBA32F", data=data)
-        return self._tables[name][1]
+            return np.concatenate([rgb, np.ones_like(rgb[:, :1])], axis=1)[None]
+
+        return self._values(name, key, row)
 
     def _thresholds(self, look: Look) -> Any:
         """`hatching.ink_statistics` in the first channel."""
         if look.ink == "soft":
-            return self._table("palette", None, lambda: PALETTE)
+            return self._palette()
         threshold = statistics_of(look).threshold
         return self._table(
             "thresholds", threshold.tobytes(), lambda: np.repeat(threshold[:, None], 3, axis=1)
@@ -819,7 +823,7 @@ class Card:
     def _tooth(self, width: int, height: int, look: Look, lines: int) -> Any:
         """`paper.paper_tooth` in the first channel, for a frame of this size and so many lines."""
         if not has_tooth(look):
-            return self._table("palette", None, lambda: PALETTE)
+            return self._palette()
         width = width // look.supersampling + (lines - 1) * stretch(look.grain)
         width, height = (-(-length // TILE) * TILE for length in (width, height))
         key = look.grain, look.seed

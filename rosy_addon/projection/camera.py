@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
+from ..field.frames import unit
 from ..field.surface import Surface
 
 #: The longest side of a picture, in pixels.
@@ -85,6 +86,17 @@ class Camera:
         """
         scale = _determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
+
+    @property
+    def eye(self) -> np.ndarray:
+        """(3,) world space: where the rays of a perspective camera meet."""
+        return -self.view[:3, :3].T @ self.view[:3, 3]
+
+    def toward(self, points: np.ndarray) -> np.ndarray:
+        """(..., 3) unit directions from points in world space to this camera."""
+        if not self.is_perspective:
+            return np.broadcast_to(self.view[2, :3], points.shape)
+        return unit(self.eye - points)
 
     def resized(self, width: int, height: int) -> Camera:
         """The same camera with other pixels."""

@@ -39,6 +39,11 @@ class Body:
     tone: SurfaceTone | None = None
     carried: dict[str, Carried] = dataclass_field(default_factory=dict, repr=False)
 
+    def world_points(self) -> np.ndarray:
+        """(V, 3) float64: the vertices in world space."""
+        matrix = np.asarray(self.matrix, dtype=np.float64)
+        return self.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:

@@ -60,7 +60,7 @@ def pixel_spacing(body: Body, camera: Camera, pixels: float) -> np.ndarray:
     """
     if not (np.isfinite(pixels) and pixels > 0):
         raise RosyError(f"a spacing of {pixels:g} pixels is not above 0")
-    return pixels * pixel_size(_in_world(body), camera)
+    return pixels * pixel_size(body.world_points(), camera)
 
 
 def foreshortened(body: Body, camera: Camera, spacing: np.ndarray) -> np.ndarray:
@@ -76,7 +76,7 @@ def foreshortened(body: Body, camera: Camera, spacing: np.ndarray) -> np.ndarray
     spacing : (V,) ndarray
         Where the surface faces the camera.
     """
-    toward = _toward(body, camera)
+    toward = camera.toward(body.world_points())
     cosine = np.maximum(np.maximum(lambert(body, toward), lambert(body, -toward)), SLANT)
     return spacing * (1 + cosine) / (2 * cosine)
 
@@ -131,7 +131,7 @@ def by_curvature(surface: Surface, spacing: np.ndarray | float, amount: float = 
 
 def headlight(body: Body, camera: Camera) -> np.ndarray:
     """(V,) tones of a matt surface lit from the camera: 1 where it faces it."""
-    return lambert(body, _toward(body, camera))
+    return lambert(body, camera.toward(body.world_points()))
 
 
 def lit(body: Body, camera: Camera, lights: Sequence[Lamp]) -> np.ndarray:
@@ -155,7 +155,7 @@ def lit(body: Body, camera: Camera, lights: Sequence[Lamp]) -> np.ndarray:
         if light.kind == "sun":
             tone += strength * lambert(body, turned.T @ light.vector)
             continue
-        way = turned.T @ (light.vector - camera.view[:3, 3]) - _in_world(body)
+        way = turned.T @ (light.vector - camera.view[:3, 3]) - body.world_points()
         tone += strength / np.maximum(dot(way, way), 1e-12) * lambert(body, way)
     return np.minimum(tone, 1)
 
@@ -207,15 +207,3 @@ def at_points(strokes: Strokes, surface: Surface, values: np.ndarray) -> np.ndar
     """(n,) values of (V,) vertices at the points of strokes; not after `seen`, which adds points."""
     vertex = surface.triangle_vertex[strokes.triangle]
     return np.einsum("nk,nk->n", strokes.weights, np.asarray(values, dtype=np.float64)[vertex])
-
-
-def _in_world(body: Body) -> np.ndarray:
-    matrix = np.asarray(body.matrix, dtype=np.float64)
-    return body.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _toward(body: Body, camera: Camera) -> np.ndarray:
-    if not camera.is_perspective:
-        return camera.view[2, :3]
-    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    return unit(eye - _in_world(body))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import RosyError
-from ..field.frames import dot, unit
+from ..field.frames import dot
 from ..progress import Progress, Work, drain, part
 from ..projection.camera import Camera
 from ..projection.gbuffer import Body
@@ -237,7 +237,7 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
     if manner.unit == "length":
         return np.full(len(body.surface.vertices), manner.distance)
     spacing = foreshortened(body, camera, pixel_spacing(body, camera, manner.spacing))
-    points = _in_world(body)
+    points = body.world_points()
     pixels, _ = on_screen(points, camera)
     with np.errstate(invalid="ignore"):
         inside = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
@@ -245,25 +245,19 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
         return spacing
     if inside.any():
         return np.maximum(spacing, spacing[inside].min())
-    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    far = float(np.linalg.norm(points - eye, axis=1).mean()) / camera.pixels_per_unit
+    far = float(np.linalg.norm(points - camera.eye, axis=1).mean()) / camera.pixels_per_unit
     share = NEAREST if _is_in_view(body, camera) else 1.0
     return np.maximum(spacing, manner.spacing * share * far)
 
 
 def _is_in_view(body: Body, camera: Camera) -> bool:
     """False only if all of a body is beyond one of the sides of what a camera sees."""
-    points = _in_world(body)
+    points = body.world_points()
     matrix = camera.projection @ camera.view
     clip = points @ matrix[:, :3].T + matrix[:, 3]
     beyond = np.abs(clip[:, :2]) > clip[:, 3:]
     sides = np.concatenate([beyond & (clip[:, :2] > 0), beyond & (clip[:, :2] < 0)], axis=1)
     return not (sides.all(axis=0).any() or (clip[:, 2] < -clip[:, 3]).all())
-
-
-def _in_world(body: Body) -> np.ndarray:
-    matrix = np.asarray(body.matrix, dtype=np.float64)
-    return body.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _by_name(strokes: Strokes) -> Strokes:
@@ -347,11 +341,7 @@ def lifted(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
     width : float
         In pixels' lengths at a point's depth.
     """
-    if camera.is_perspective:
-        eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-        toward = unit(eye - strokes.points)
-    else:
-        toward = np.broadcast_to(camera.view[2, :3], strokes.points.shape)
+    toward = camera.toward(strokes.points)
     facing = np.abs(dot(strokes.normal, toward))
     steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / STEEPEST)
     length = width * (1 + steepness) * pixel_size(strokes.points, camera)

@@ -37,7 +37,7 @@ def outline(
     """
     surface = body.surface
     matrix = np.asarray(body.matrix, dtype=np.float64)
-    points = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    points = body.world_points()
     corner = points[surface.triangle_vertex]
     linear = matrix[:3, :3]
     cofactors = np.array([np.cross(linear[k - 2], linear[k - 1]) for k in range(3)])
@@ -66,11 +66,7 @@ def _none() -> _Pieces:
 
 def _silhouettes(surface, corner: np.ndarray, normal: np.ndarray, camera: Camera) -> _Pieces:
     """Where n . w is 0, a straight piece in each triangle in which it changes its sign."""
-    if camera.is_perspective:
-        eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-        facing = dot(normal, unit(eye - corner))
-    else:
-        facing = normal @ camera.view[2, :3]
+    facing = dot(normal, camera.toward(corner))
     front = facing > 0
     triangle = np.flatnonzero(front.any(axis=1) & ~front.all(axis=1))
     front, facing = front[triangle], facing[triangle]

@@ -503,10 +503,13 @@ def _time_of(path: Path) -> float | None:
 
 def _coarser(look: Look, coarseness: int) -> dict[str, Any]:
     """Settings with which fewer pixels show streaks of the same size on the view."""
+    if look.unit != "pixels":
+        return {"supersampling": 1}
     return {
         "length": max(look.length // coarseness, 1),
         "grain": max(look.grain / coarseness, 0.75),
         "high_pass": look.high_pass / coarseness,
+        "overshoot": look.overshoot / coarseness,
         "supersampling": 1,
     }
 

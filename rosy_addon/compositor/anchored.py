@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..projection.gbuffer import GBuffer
-from ..projection.rest import rest_places
+from ..projection.rest import growth, rest_places
 from .noise import BLUR, DEVIATION, MEAN, blur_reach, blurred, random_bits
 from .streamlines import blocks
 
@@ -33,12 +33,23 @@ ANGLES = (0.61, 1.13, 0.37)
 #: of them is new from one picture to the next; more than three make neither better.
 OCTAVES = 3
 
+#: How much larger or smaller than what is asked for cells may be, for their contrast to be evened out.
+EVENED = (0.25, 4.0)
+
 #: Octaves are counted from here, for hashes of whole numbers above 0.
 LOWEST = 64
 
 
 def surface_noise(
-    gbuffer: GBuffer, grain: float, seed: int, channels: int, *, density: float, high_pass: float
+    gbuffer: GBuffer,
+    grain: float,
+    seed: int,
+    channels: int,
+    *,
+    density: float,
+    high_pass: float,
+    pixel: float = 0.0,
+    smallest: float = 0.0,
 ) -> np.ndarray:
     """Noise anchored to the surfaces of a G-buffer.
 
@@ -55,6 +66,10 @@ def surface_noise(
         Share of cells that are bright.
     high_pass : float
         Pixels; variations broader than about this are taken out. 0 leaves the noise white.
+    pixel : float
+        Blender units: a cell is as wide as it would be seen where a pixel is as wide. 0: where it is.
+    smallest : float
+        Side that such a cell is seen of at least, pixels.
 
     Returns
     -------
@@ -62,18 +77,47 @@ def surface_noise(
         With mean `MEAN`, as `image_noise`.
     """
     places = rest_places(gbuffer)
-    level = np.log2(np.maximum(places.size, 1e-30) * np.float32(grain * SIDE))
+    larger = how_much_larger(gbuffer, places.size, pixel, smallest / grain)
+    level = np.log2(np.maximum(places.size * larger, 1e-30) * np.float32(grain * SIDE))
     identity = identities(gbuffer.names)[gbuffer.body]
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in blocks(len(gbuffer.pixel)):
         part = places.block(block)
         lattice = [_turned(part.at(*tap)) for tap in TAPS]
         _add_cells(total[:, block], lattice, level[block], identity[block], seed, density)
+    # Means over so many cells vary as those over as many of the size that is asked for.
+    total /= np.sqrt(np.clip(larger, *EVENED))
     total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
     if high_pass:
         for values in total:
             values -= _broad(gbuffer, values, BLUR * high_pass)
     return np.ascontiguousarray(total.T) + np.float32(MEAN)
+
+
+def how_much_larger(
+    gbuffer: GBuffer, size: np.ndarray, pixel: float, least: float
+) -> np.ndarray | np.float32:
+    """By how much things are larger than if they were counted in pixels as these are seen.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its bodies.
+    size : (P,) float32 ndarray
+        `RestPlaces.size`.
+    pixel : float
+        Blender units that they take for a pixel; 0 takes pixels as they are.
+    least : float
+        That much at least.
+
+    Returns
+    -------
+    (P,) float32 ndarray, or 1
+    """
+    if not pixel:
+        return np.float32(1)
+    own = np.array([pixel / growth(body.matrix) for body in gbuffer.bodies], dtype=np.float32)
+    return np.maximum(own[gbuffer.body] / np.maximum(size, 1e-30), np.float32(least))
 
 
 def _add_cells(

@@ -16,7 +16,7 @@ from .brute import brute_images
 from .colour import map_colours, to_linear
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
-from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length, statistics_of
+from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length, runs_on, statistics_of
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
@@ -24,6 +24,7 @@ from .members import members_images
 from .noise import MEAN, image_noise
 from .paper import TEETH, paper_tooth, surface_tooth
 from .picture import Layers, Picture
+from .scale import measured_look, scaled_look, unit_of
 from .shading import Light
 from .sheets import sheets_images
 from .tone import Rendered, tone_of
@@ -53,12 +54,15 @@ AFTERWARDS = (
     "ink_colour",
     "ink_ramp",
     "ink_colour_light",
+    "ink_middle",
+    "ink_colour_middle",
     "paper_colour",
     "clear_paper",
     "crispness",
     "layers",
     "layering",
     "breaks",
+    "overshoot",
     "paper_grain",
 )
 
@@ -91,6 +95,7 @@ def composing(
         If the tone is to come from what is not there.
     """
     camera = gbuffer.camera
+    look = measured_look(look, camera, gbuffer.bodies)
     finer = scaled_look(look)
     colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
@@ -105,8 +110,8 @@ def composing(
         layer = _layers(flow, finer, images)
         own = degree_of == degree
         if look.ink == "hatch":
-            hand = yield from part(_hand(gbuffer, flow, finer), stop, stop)
-            tone = light[own].mean(axis=1)
+            tone = np.clip(light[own].mean(axis=1), 0, 1)
+            hand = yield from part(_hand(gbuffer, flow, finer, tone), stop, stop)
             colour[own], alpha[own] = hatched(flow, images, finer, tone, hand)
         else:
             colour[own] = _ink(flow, layer, finer)
@@ -163,17 +168,6 @@ def compose_planar(
     return Picture(_frame(flow.pixel, colour, opaque, flow.width, flow.height, 1), (layers,))
 
 
-def scaled_look(look: Look) -> Look:
-    """The look with its lengths in the pixels of the supersampled frame."""
-    factor = look.supersampling
-    return replace(
-        look,
-        length=look.length * factor,
-        grain=look.grain * factor,
-        high_pass=look.high_pass * factor,
-    )
-
-
 def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
     """`surface_flow`, or that made for the last look if it would be the same."""
     key = look.crease_angle, look.cross_creases
@@ -189,7 +183,7 @@ def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
 
 def _waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """`waver`, or that made for the last look if it would be the same."""
-    key = look.anchor, look.grain
+    key = look.anchor, look.grain, look.unit, look.unit_size
     made = gbuffer.made.get("waver")
     if made is None or made[0] != key:
         made = gbuffer.made["waver"] = key, waver(gbuffer, look)
@@ -207,15 +201,28 @@ def _images_of(gbuffer: GBuffer, flow: Flow, look: Look, name: str = "images") -
     return made[1]
 
 
-def _hand(gbuffer: GBuffer, flow: Flow, look: Look) -> Work[Hand]:
+def _hand(gbuffer: GBuffer, flow: Flow, look: Look, tone: np.ndarray) -> Work[Hand]:
     """What makes the lines of a flow uneven."""
-    pieces = tooth = None
+    pieces = tooth = tones = None
     if has_pieces(look):
         shorter = replace(look, length=piece_length(look))
         pieces = yield from _images_of(gbuffer, flow, shorter, "pieces")
     if has_tooth(look):
         tooth = _tooth(gbuffer, flow, look)
-    return Hand(pieces, tooth)
+    if runs_on(look):
+        tones = yield from _tones_along(flow, look, tone)
+    return Hand(pieces, tooth, tones)
+
+
+def _tones_along(flow: Flow, look: Look, tone: np.ndarray) -> Work[np.ndarray]:
+    """(M, P) means of (P,) tones along lines, as far each way as these run on."""
+    near = replace(look, length=max(round(look.overshoot / look.step), 1), taper=False)
+    # What evening out does to means along streamlines that end early, it does to ones as well.
+    ones = np.ones_like(tone)
+    images = yield from METHODS[look.method](flow, near, np.stack([tone, ones, ones], axis=1))
+    spread = images.members - np.float32(MEAN)
+    means = MEAN + np.float32(1 - MEAN) * spread[..., 0] / spread[..., 1]
+    return np.clip(means, 0, 1)
 
 
 def _tooth(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray:
@@ -224,7 +231,8 @@ def _tooth(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray:
         side = look.supersampling
         grain = look.grain / side
         return paper_tooth(flow.pixel, flow.width, grain, look.seed, side, flow.lines)
-    heights = _on_surfaces(gbuffer, flow, "tooth", surface_tooth(look)) - np.float32(MEAN)
+    heights = _on_surfaces(gbuffer, flow, "tooth", surface_tooth(look) | unit_of(look))
+    heights = heights - np.float32(MEAN)
     heights /= np.float32(statistics_of(look).tooth_deviation)
     return heights.T[np.arange(flow.lines) % TEETH]
 
@@ -233,7 +241,7 @@ def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:
     """(P, K) noise on the surfaces at the pixels of a flow; None for that of the picture."""
     if look.anchor == "picture":
         return None
-    return _on_surfaces(gbuffer, flow, "noise", noise_of(look))
+    return _on_surfaces(gbuffer, flow, "noise", noise_of(look) | unit_of(look))
 
 
 def _on_surfaces(gbuffer: GBuffer, flow: Flow, name: str, key: dict[str, Any]) -> np.ndarray:

@@ -64,10 +64,14 @@ class Hand(NamedTuple):
         Of streaks as long as the pieces of broken lines (`piece_length`).
     tooth : (M, P) float32 ndarray or None
         How much better than elsewhere the paper takes the ink of each line, in deviations.
+    tones : (M, P) float32 ndarray or None
+        The light that each line is to leave, if that is not the tone alone: its mean along the line,
+        so that lines run on past the borders of tones, thinning out, the strongest farthest.
     """
 
     pieces: Images | None = None
     tooth: np.ndarray | None = None
+    tones: np.ndarray | None = None
 
 
 def hatched(
@@ -85,6 +89,7 @@ def hatched(
     tone : (P,) float32 ndarray
         The light that there is to be, 0 to 1, linear.
     hand : Hand
+        What makes them uneven.
 
     Returns
     -------
@@ -110,15 +115,18 @@ def _one_ink(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(P, 3) linear light of the ink, and (P,) how much of each pixel it covers."""
     inks = inks_of(look)
-    left = 1 - tone if inks.is_light else tone
-    if look.magnitude in ("colour", "both"):
+    by_magnitude = look.magnitude in ("colour", "both")
+    if by_magnitude:
         ink = to_linear(map_colours(relative_magnitude(flow, look), look.colour_map))
     else:
         ink = inks.at(np.zeros_like(tone), tone)
+    left = inks.inverted(_tones(tone, hand))
+    if not by_magnitude:
         left = 1 - inks.covering(inks.wanted(left), ink)
     paper = np.ones_like(tone)
     for line, share in enumerate(family_shares(flow, look, left)):
-        paper *= 1 - line_coverage(line, 1 - left**share, images, look, hand)
+        covered = 1 - left[line % len(left)] ** share
+        paper *= 1 - line_coverage(line, covered, images, look, hand)
     return ink, 1 - paper
 
 
@@ -132,13 +140,14 @@ def _many_inks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same with an ink for each family: each lets some light through, and they multiply."""
     inks = inks_of(look, inks_told(flow))
-    left = 1 - tone if inks.is_light else tone
+    left = inks.inverted(_tones(tone, hand))
     wanted = inks.wanted(left)
     paper = np.ones_like(tone)
     through = np.ones((len(tone), 3), dtype=np.float32)
     for line, share in enumerate(family_shares(flow, look, left)):
         ink = inks.at(families[line], tone)
-        coverage = line_coverage(line, inks.covering(wanted**share, ink), images, look, hand)
+        covered = inks.covering(wanted[line % len(wanted)] ** share, ink)
+        coverage = line_coverage(line, covered, images, look, hand)
         through *= 1 - coverage[:, None] * (1 - inks.through(ink))
         paper *= 1 - coverage
     colour = inks.inverted(inks.inverted(inks.paper) * through)
@@ -146,6 +155,11 @@ def _many_inks(
     # What is seen is paper and ink: the ink is what is left without the paper.
     ink = inks.paper + (colour - inks.paper) / np.maximum(coverage, LEAST)[:, None]
     return np.clip(ink, 0, 1), coverage
+
+
+def _tones(tone: np.ndarray, hand: Hand) -> np.ndarray:
+    """(M, P) the light that each line is to leave, or (1, P) if it is the same for all."""
+    return tone[None] if hand.tones is None else hand.tones
 
 
 def line_coverage(
@@ -189,6 +203,11 @@ def brokenness(covered: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
 def has_pieces(look: Look) -> bool:
     """Whether lines are made of pieces at all."""
     return look.ink == "hatch" and (look.breaks > 0 or look.wobble > 0)
+
+
+def runs_on(look: Look) -> bool:
+    """Whether lines run on past the borders of tones."""
+    return look.ink == "hatch" and look.overshoot > 0
 
 
 def has_tooth(look: Look) -> bool:
@@ -240,18 +259,32 @@ def _places(rank: np.ndarray, count: int) -> np.ndarray:
     return place
 
 
-def family_shares(flow: Flow, look: Look, tone: np.ndarray) -> list[np.ndarray]:
-    """M times (P,) float32: which share of the ink each line takes; they sum to 1.
+def family_shares(flow: Flow, look: Look, left: np.ndarray) -> list[np.ndarray]:
+    """M times (P,) float32: which share of the ink each line takes.
 
     By how many others are nearer to the guiding angle, as a number that goes over from one to the
-    next: where two families change places both take the same, and no seam shows.
+    next: where two families change places both take the same, and no seam shows. Of lines that are to
+    leave the same the shares sum to 1.
+
+    Parameters
+    ----------
+    flow : Flow
+    look : Look
+        Its `guiding_angle`, `layers` and `layering` count.
+    left : (M, P) or (1, P) ndarray
+        What each line, or all of them, are to leave of the paper's light.
     """
-    dark = 1 - tone
     onsets = [_onset(rank, look) for rank in _ranks(flow, look)]
     first = np.minimum.reduce(onsets)
-    shares = [_smooth_step((dark - onset + first + EARLY) / (JOINING + EARLY)) for onset in onsets]
-    total = np.add.reduce(shares)
-    return [share / total for share in shares]
+    later = [onset - first for onset in onsets]
+    found = []
+    for dark in 1 - left:
+        shares = [_smooth_step((dark - onset + EARLY) / (JOINING + EARLY)) for onset in later]
+        total = np.add.reduce(shares)
+        if len(left) == 1:
+            return [share / total for share in shares]
+        found.append(shares[len(found)] / total)
+    return found
 
 
 def _onset(rank: np.ndarray, look: Look) -> np.ndarray:

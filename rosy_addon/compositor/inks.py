@@ -7,7 +7,7 @@ multiply, as glazes do (on dark paper what they take away from the dark does: th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,8 +51,10 @@ class Inks:
     ----------
     paper : (3,) float32 ndarray
         Linear light.
-    dark, light : (n, 3) float32 ndarray
-        Linear light of each ink in the shadows, and in the lights.
+    dark, middle, light : (n, 3) float32 ndarray
+        Linear light of each ink in the shadows, at the tone `turn`, and in the lights.
+    turn : float
+        Between 0 and 1.
     is_light : bool
         Whether the ink is lighter than the paper, so that there is the more of it the more light.
     floor : float
@@ -62,7 +64,9 @@ class Inks:
 
     paper: np.ndarray
     dark: np.ndarray
+    middle: np.ndarray
     light: np.ndarray
+    turn: float
     is_light: bool
     floor: float
 
@@ -71,10 +75,13 @@ class Inks:
         below = np.minimum(number.astype(np.intp), len(self.dark) - 1)
         above = np.minimum(below + 1, len(self.dark) - 1)
         share = (number - below).astype(np.float32)[:, None]
-        dark, light = (
-            inks[below] + share * (inks[above] - inks[below]) for inks in (self.dark, self.light)
+        dark, middle, light = (
+            inks[below] + share * (inks[above] - inks[below])
+            for inks in (self.dark, self.middle, self.light)
         )
-        return dark + tone[:, None] * (light - dark)
+        lighter = np.clip((tone - np.float32(self.turn)) / np.float32(1 - self.turn), 0, 1)
+        darker = np.clip(1 - tone / np.float32(self.turn), 0, 1)
+        return middle + lighter[:, None] * (light - middle) + darker[:, None] * (dark - middle)
 
     def through(self, ink: np.ndarray) -> np.ndarray:
         """(..., 3): share of the paper's light that inks let through, channel by channel."""
@@ -110,9 +117,12 @@ def inks_of(look: Look, families: int = 1) -> Inks:
     paper = to_linear(from_hex(look.paper_colour))
     last = look.ink_colour_light if look.ink_ramp else look.ink_colour
     dark, light = (_inks_from(code, families) for code in (look.ink_colour, last))
-    inks = Inks(paper, dark, light, is_light(look), 0.0)
+    middle, turn = (dark + light) / 2, 0.5
+    if look.ink_ramp and look.ink_middle > 0:
+        middle, turn = _inks_from(look.ink_colour_middle, families), look.ink_middle
+    inks = Inks(paper, dark, middle, light, turn, is_light(look), 0.0)
     full = inks.light if inks.is_light else inks.dark
-    return Inks(paper, dark, light, inks.is_light, float(np.max(inks.left_by(full))))
+    return replace(inks, floor=float(np.max(inks.left_by(full))))
 
 
 def is_light(look: Look) -> bool:

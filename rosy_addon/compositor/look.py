@@ -38,7 +38,7 @@ def _colour(default: str, text: str) -> Any:
 class Look:
     """How a field is drawn: what a preset holds, and what the panel shows.
 
-    Lengths are in pixels of the finished picture. Each field's metadata says its range or options
+    Lengths are in pixels of the finished picture, or of as many Blender units as `unit_size` says. Each field's metadata says its range or options
     and what it does, in words a user meets; the panel's properties are made from it.
     """
 
@@ -67,6 +67,15 @@ class Look:
         "How the values of the faces become values of pixels",
         smooth="Averaged at the corners and interpolated",
         flat="Each face as it is",
+    )
+    unit: str = _choice(
+        "pixels",
+        "What lengths are counted in",
+        pixels="Pixels of the picture: lines are as wide from near as from afar",
+        world="Blender units: lines belong to the object, as if engraved, and are wider from near",
+    )
+    unit_size: float = _number(
+        0.01, 1e-6, 1e6, "Blender units that stand for a pixel where lengths are counted in these"
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     taper: bool = _switch(
@@ -184,6 +193,13 @@ class Look:
         False, "Let the ink's colour go over into another one from the shadows to the lights"
     )
     ink_colour_light: str = _colour("#b06a3c", "Colour of the ink in the lights")
+    ink_middle: float = _number(
+        0.0,
+        0.0,
+        0.99,
+        "Tone at which the ink has a third colour on its way from the shadows to the lights; 0: none",
+    )
+    ink_colour_middle: str = _colour("#6f2d4f", "Colour of the ink at that tone")
     paper_colour: str = _colour("#ffffff", "Colour of the paper")
     clear_paper: bool = _switch(False, "Leave the paper transparent, so that there is only ink")
     crispness: float = _number(0.7, 0.0, 1.0, "From soft grey streaks to lines with sharp borders")
@@ -193,6 +209,13 @@ class Look:
     )
     breaks: float = _number(
         0.0, 0.0, 1.0, "How much lines are broken along their length, first where it is light"
+    )
+    overshoot: float = _number(
+        0.0,
+        0.0,
+        256.0,
+        "How far lines run on past the borders of tones, thinning out, some farther than others, in "
+        "pixels",
     )
     wobble: float = _number(
         0.0, 0.0, 1.0, "How much lines waver in course and width, as drawn by hand"

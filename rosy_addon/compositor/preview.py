@@ -59,6 +59,7 @@ def _quick(look: Look) -> Look:
         {
             "method": "sheets" if look.method == "brute" else look.method,
             "supersampling": 1 if look.method == "members" else 2,
+            "unit": "pixels",
             "length": min(look.length, SIDE // 2),
             "grain": min(look.grain, SIDE / 2),
             "high_pass": min(look.high_pass, SIDE / 4),

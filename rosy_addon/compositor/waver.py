@@ -14,8 +14,10 @@ import numpy as np
 from ..projection.gbuffer import GBuffer
 from ..projection.rest import rest_places
 from ..trigonometry import cosine_sine, phase_of
+from .anchored import how_much_larger
 from .flow import Flow
 from .look import Look
+from .scale import unit_of
 
 #: Waves that a wavering is the sum of.
 WAVES = 7
@@ -64,7 +66,7 @@ def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
     gbuffer : GBuffer
         With its bodies, for a look anchored to the surface.
     look : Look
-        With its lengths in the pixels of the frame; its `anchor` and `grain` count.
+        With its lengths in the pixels of the frame; its `anchor`, `grain` and `unit` count.
 
     Returns
     -------
@@ -73,7 +75,10 @@ def waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """
     if look.anchor == "surface":
         places = rest_places(gbuffer)
-        place, size = places.at(0, 0), places.size
+        unit = unit_of(look)
+        least = unit["smallest"] / look.grain
+        larger = how_much_larger(gbuffer, places.size, unit["pixel"], least)
+        place, size = places.at(0, 0), places.size * larger
     else:
         row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
         place = np.stack([column, row, 0 * row]).astype(np.float32)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compositor.anchored import LOWEST, OCTAVES, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops
-from ..compositor.compose import noise_of, scaled_look
+from ..compositor.compose import noise_of
 from ..compositor.contrast import averaging_gain, expected_deviation, streaks_of
 from ..compositor.hatching import (
     EARLY,
@@ -26,6 +26,7 @@ from ..compositor.hatching import (
     has_pieces,
     has_tooth,
     piece_length,
+    runs_on,
     softness,
     statistics_of,
 )
@@ -35,6 +36,7 @@ from ..compositor.kernel import whole_samples
 from ..compositor.look import Look
 from ..compositor.noise import BLUR, DEVIATION, blur_reach, image_noise, streak_statistics
 from ..compositor.paper import TEETH, TOOTH, paper_tooth, stretch, surface_tooth
+from ..compositor.scale import measured_look, scaled_look, unit_of
 from ..compositor.shading import Light, lights_of
 from ..compositor.tone import Rendered, curve_of
 from ..compositor.waver import EVENED, SWAY, WAVELENGTH, WAVES, wave_table, wavers
@@ -312,18 +314,22 @@ class Card:
                 f"large for this graphics card, which draws up to {self.device.largest}"
             )
         yield Progress(0.0, "finding what is seen")
+        look = measured_look(look, camera, [entry.body for entry in placed])
         gbuffer = self._project(placed, camera, NO_PLANES if planes is None else planes)
         whole = look.supersampling == 1
         fine = self._image(("picture", name if whole else None), camera.width, camera.height)
         self.device.clear(fine)
         kinds = sorted({entry.kind for entry in placed} - {None}, key=lambda kind: kind.degree)
         if look.anchor == "surface":
-            noise = self._anchored(placed, camera, noise_of(scaled_look(look)), "noise")
+            finer = scaled_look(look)
+            noise = self._anchored(placed, camera, noise_of(finer) | unit_of(finer), "noise")
         else:
             noise = self._noise(camera.width, camera.height, look)
         tooth = None
         if has_tooth(look) and look.anchor == "surface":
-            tooth = self._anchored(placed, camera, surface_tooth(scaled_look(look)), "tooth")
+            finer = scaled_look(look)
+            wanted = surface_tooth(finer) | unit_of(finer)
+            tooth = self._anchored(placed, camera, wanted, "tooth")
         gbuffer["wavering"] = self._wavering(placed, camera, look)
         gbuffer["tones"] = self._tones(placed, camera, look, lights, rendered)
         for number, kind in enumerate(kinds):
@@ -468,6 +474,7 @@ class Card:
             "bright_below": round(density * 2**24),
             "channels": wanted["channels"],
             "seed": wanted["seed"],
+            "least_growth": wanted["smallest"] / wanted["grain"],
             "LOWEST": LOWEST,
             "OCTAVES": OCTAVES,
         }
@@ -481,6 +488,7 @@ class Card:
                 **_body_constants(number, entry, camera),
                 "corner": (left, bottom),
                 "unit_of_pixel": wanted["grain"] * SIDE / (camera.pixels_per_unit * entry.grown),
+                "unit_of_cell": wanted["grain"] * SIDE * wanted["pixel"] / entry.grown,
                 "identity": int(names[number]),
             }
             self.device.compute(
@@ -499,7 +507,8 @@ class Card:
         width, height = camera.width, camera.height
         wavering = self._image("wavering", width, height)
         waves = self._values("waves", None, lambda: wave_table()[None])
-        length = scaled_look(look).grain * WAVELENGTH
+        finer = scaled_look(look)
+        length, unit = finer.grain * WAVELENGTH, unit_of(finer)
         on_surface = look.anchor == "surface"
         for number, entry in enumerate(placed):
             left, bottom, right, top = box = _window(entry, camera)
@@ -512,6 +521,8 @@ class Card:
                 "corner": (left, bottom),
                 "on_surface": int(on_surface),
                 "unit_of_pixel": length / growing,
+                "unit_of_cell": length * unit["pixel"] * on_surface / entry.grown,
+                "least_growth": unit["smallest"] / finer.grain,
                 "wave_count": WAVES,
                 "evened": EVENED * SWAY,
             }
@@ -814,11 +825,11 @@ class Card:
         )
 
     def _inks(self, kind: Kind, look: Look) -> Any:
-        """`inks.Inks`: in the shadows, then in the lights."""
+        """`inks.Inks`: in the shadows, then between, then in the lights."""
         count = _ink_count(kind, look)
-        key = count, look.ink_colour, look.ink_ramp, look.ink_colour_light
         found = inks_of(look, count)
-        return self._table("inks", key, lambda: np.concatenate([found.dark, found.light]))
+        stops = np.concatenate([found.dark, found.middle, found.light])
+        return self._table("inks", stops.tobytes(), lambda: stops)
 
     def _tooth(self, width: int, height: int, look: Look, lines: int) -> Any:
         """`paper.paper_tooth` in the first channel, for a frame of this size and so many lines."""
@@ -909,6 +920,7 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "largest_known": look.magnitude_range,
         "paper_light": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
+        "ink_turn": inks.turn,
         "ink_floor": inks.floor,
         "hatch": int(look.ink == "hatch"),
         "light_ink": int(inks.is_light),
@@ -919,6 +931,7 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "deviation": statistics.deviation if statistics else 1.0,
         "breaks": look.breaks,
         "piece_length": piece_length(finer) if has_pieces(look) else 0,
+        "run_on": max(round(finer.overshoot / finer.step), 1) if runs_on(look) else 0,
         "piece_samples": whole_samples(replace(finer, length=piece_length(finer))),
         "piece_deviation": statistics.piece_deviation if statistics else 1.0,
         "wobble": look.wobble if wavers(look) else 0.0,

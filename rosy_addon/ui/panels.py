@@ -21,6 +21,8 @@ from .generators import settings_of_generator
 #: Settings of a look, in the groups in which a user looks for them.
 GROUPS = {
     "Streaks": (
+        "unit",
+        "unit_size",
         "length",
         "step",
         "grain",
@@ -45,12 +47,15 @@ GROUPS = {
         "ink_colour",
         "ink_ramp",
         "ink_colour_light",
+        "ink_middle",
+        "ink_colour_middle",
         "paper_colour",
         "clear_paper",
         "crispness",
         "layers",
         "layering",
         "breaks",
+        "overshoot",
         "wobble",
         "paper_grain",
     ),
@@ -87,7 +92,14 @@ SHORT_NAMES = {
     "tone_gamma": "Gamma",
     "ink_ramp": "Second Colour",
     "ink_colour_light": "In the Lights",
+    "ink_middle": "Third at Tone",
+    "ink_colour_middle": "Third Colour",
+    "unit_size": "Units a Pixel",
 }
+
+
+#: What the ink goes over into.
+INK_RAMP = {"ink_colour_light", "ink_middle", "ink_colour_middle"}
 
 
 #: What magnitude may drive so that its colours take the place of others.
@@ -433,14 +445,18 @@ def _matters(settings: Any, name: str) -> bool:
         return look.tone != "light"
     if name == "directory":
         return settings.store == "SAVED"
-    if name == "ink_colour_light" and not look.ink_ramp:
+    if name in INK_RAMP and not look.ink_ramp:
         return False
-    if name in {"ink_colour", "ink_ramp", "ink_colour_light"} and look.magnitude in COLOURING:
+    if name == "ink_colour_middle" and not look.ink_middle:
+        return False
+    if name in {"ink_colour", "ink_ramp", *INK_RAMP} and look.magnitude in COLOURING:
         return False
     if name in GROUPS["Ink"] and name != "ink":
         return look.ink == "hatch"
     if name == "crease_angle":
         return not look.cross_creases
+    if name == "unit_size":
+        return look.unit != "pixels"
     return True
 
 

@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
 from bench.parity import drawn_twice, rooms
-from rosy_addon.compositor.compose import scaled_look
 from rosy_addon.compositor.contrast import averaging_gain
 from rosy_addon.compositor.covering import sheets_around
 from rosy_addon.compositor.flow import surface_flow
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.scale import scaled_look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.compositor.tone import Rendered
 from rosy_addon.field.directions import directions_field, tensor_field
@@ -577,6 +577,42 @@ LOOKS = {
         "ink_colour": "#101848",
         "ink_colour_light": "#e08050",
         "shading": 1.0,
+    },
+    "hatched, through a third ink": {
+        "ink": "hatch",
+        "hue": "families",
+        "ink_ramp": True,
+        "ink_middle": 0.3,
+        "shading": 1.0,
+    },
+    "in Blender units": {"anchor": "surface", "unit": "world", "unit_size": 0.007},
+    "in Blender units, of the picture": {"unit": "world", "unit_size": 0.03, "supersampling": 2},
+    "hatched in Blender units, by hand": {
+        "anchor": "surface",
+        "unit": "world",
+        "unit_size": 0.012,
+        "ink": "hatch",
+        "wobble": 0.7,
+        "breaks": 0.4,
+        "paper_grain": 0.5,
+        "shading": 0.9,
+        "overshoot": 5.0,
+    },
+    "hatched, running on": {
+        "ink": "hatch",
+        "light": "lamp",
+        "shadows": True,
+        "shading": 1.0,
+        "overshoot": 9.0,
+        "length": 7,
+    },
+    "hatched light, running on by magnitude": {
+        "ink": "hatch",
+        "ink_colour": "#ffd060",
+        "paper_colour": "#101020",
+        "shading": 1.0,
+        "overshoot": 20.0,
+        "magnitude": "length",
     },
     "hatched, all at once": {
         "ink": "hatch",

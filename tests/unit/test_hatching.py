@@ -37,6 +37,7 @@ from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, p
 from rosy_addon.projection.gbuffer import Body
 from rosy_addon.projection.project import project
 from rosy_addon.projection.rest import rest_places
+from rosy_addon.projection.tone import SurfaceTone
 
 SIZE = 384
 PRESETS = {name: load_preset(name).look for name in preset_names()}
@@ -167,7 +168,8 @@ def test_shares_of_families_are_whole_and_continuous(degree, layers):
     flow = planar_flow(angles, degree)
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
     for tone in (0.02, 0.3, 0.7, 0.98):
-        shares = np.array(family_shares(flow, look, np.full(angles.size, tone, dtype=np.float32)))
+        left = np.full((1, angles.size), tone, dtype=np.float32)
+        shares = np.array(family_shares(flow, look, left))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
         # The members jump where the guide lies between two; the directions that get ink do not.
         ordered = np.sort(shares, axis=0)
@@ -348,7 +350,21 @@ COLOURED = {
     "families, coloured": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_colour": "#f0e8d0", "paper_colour": "#101418"},
     "families from one to another": {"hue": "families", "ink_ramp": True},
+    "through a third": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
 }
+
+
+def test_a_third_ink_is_on_the_way_from_one_to_the_other():
+    look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
+    codes = [look.ink_colour, look.ink_colour_middle, look.ink_colour_light]
+    dark, middle, light = (to_linear(from_hex(code)) for code in codes)
+    tones = np.array([0.0, 0.125, 0.25, 0.625, 1.0], dtype=np.float32)
+    found = inks_of(look).at(np.zeros(5), tones)
+    wanted = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+    # Without one it is as light as both together half way.
+    found = inks_of(replace(look, ink_middle=0.0)).at(np.zeros(5), tones)
+    np.testing.assert_allclose(found, dark + tones[:, None] * (light - dark), atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", COLOURED)
@@ -418,6 +434,59 @@ def test_ink_may_stand_for_the_magnitude():
     row = np.nonzero(rgba[..., 3] > 0.5)[0]
     grey = rgba[..., 0][rgba[..., 3] > 0.5]
     assert np.corrcoef(row, to_display(grey))[0, 1] > 0.95
+
+
+# --- over-shoot --------------------------------------------------------------------------------------
+
+#: Half the side of a wall, Blender units.
+HALF = 4.0
+
+
+def half_dark(method, overshoot):
+    """How light the columns and the single lines are of a wall whose left half is dark, the right white.
+
+    Lines run from left to right.
+    """
+    points = HALF * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
+    image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
+    uv = (wall.vertices[wall.corner_vertex][:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
+    field = axis_field(wall, 2, (1.0, 0, 0))
+    thing = Body(wall, np.eye(4), field, SurfaceTone(uv, image))
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
+    look = replace(
+        INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_colour="#000000"
+    )
+    # Images repeat: at the last column it gets dark again.
+    return drawn(thing, camera, look)[..., :-1, 0]
+
+
+@pytest.mark.parametrize("method", ["sheets", "members", "brute"])
+def test_lines_run_on_past_the_border_of_a_tone(method):
+    """So that each column has the mean tone of those as near: a ramp as wide as twice the over-shoot."""
+    reach = 24.0
+    light = half_dark(method, reach)
+    from_border = np.arange(SIZE - 1) + 0.5 - SIZE / 2
+    wanted = 0.3 + 0.7 * np.clip(0.5 + from_border / (2 * reach), 0, 1)
+    off = np.abs(gaussian_filter(light.mean(axis=0), 3) - wanted)
+    inner = np.abs(from_border) < SIZE / 2 - 20
+    assert off[inner].mean() < 0.03 and off[inner].max() < 0.12
+    beyond = (from_border > reach + 2) & (from_border < SIZE / 2 - reach - 4)
+    assert (light[:, beyond] > 0.999).all()
+    # Some run on farther than others.
+    past = [row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()]
+    ends = np.argmin(past, axis=1)
+    assert ends.max() > 0.5 * reach and np.std(ends) > 0.1 * reach
+
+
+def test_without_overshoot_lines_end_with_the_tone():
+    light = half_dark("sheets", 0.0)
+    assert (light[:, SIZE // 2 + 2 :] > 0.999).all()
+    assert abs(light[:, 20 : SIZE // 2 - 2].mean() - 0.3) < 0.04
+
+
+def test_lines_that_run_on_reproduce_a_ramp():
+    assert error_of_ramp(replace(INK, overshoot=12.0)) <= 0.04
 
 
 # --- stability ---------------------------------------------------------------------------------------
@@ -496,6 +565,48 @@ def test_lines_keep_their_width_through_a_zoom(grain):
         rgba = drawn(thing, camera, replace(INK, light="scene", shading=0.4, grain=grain))
         widths.append(width_of_lines(rgba[..., 0]))
     assert max(widths) / min(widths) < 1.15
+
+
+def test_lines_in_blender_units_are_wider_from_near():
+    """In proportion, and as they are seen in the middle where a pixel is so many units wide."""
+    points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
+    wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
+    thing = Body(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
+    look = replace(INK, light="scene", shading=0.4)
+    inked = replace(look, unit="world", unit_size=4 / SIZE)
+    widths = []
+    for zoom in (1.0, 1.4, 2.0, 2.8, 4.0):
+        camera = orthographic_camera(
+            look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=4 / zoom
+        )
+        widths.append(width_of_lines(drawn(thing, camera, inked)[..., 0]) / zoom)
+        if zoom == 1:
+            seen = width_of_lines(drawn(thing, camera, look)[..., 0])
+    assert max(widths) / min(widths) < 1.15
+    assert abs(widths[0] / seen - 1) < 0.15
+
+
+def test_near_lines_are_wider_than_far_ones_of_one_picture():
+    """Of two walls, one twice as far away; both are as dark as they are to be."""
+    points = np.array([[-1, 0, -2], [1, 0, -2], [1, 0, 2], [-1, 0, 2]], dtype=float)
+    walls = []
+    for number, (left, away) in enumerate(((-1.0, 4.0), (2.0, 8.0))):
+        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {number}")
+        matrix = np.diag([away / 4, 1.0, away / 4, 1.0])
+        matrix[:3, 3] = left, away, 0
+        walls.append(Body(wall, matrix, axis_field(wall, 2, (1.0, 0, 0))))
+    camera = perspective_camera(look_at((0, 0, 0), (0, 1, 0)), SIZE, SIZE, fov=2 * np.arctan(0.5))
+    look = replace(INK, light="scene", shading=0.5, unit="world", unit_size=0.04)
+    picture = compose(project(walls, finer(camera, 2)), look).rgba[..., 0]
+    near, far = picture[:, 8 : SIZE // 2 - 8], picture[:, SIZE // 2 + 8 : -8]
+    assert width_of_lines(near) / width_of_lines(far) == pytest.approx(2, rel=0.2)
+    assert abs(near.mean() - 0.5) < 0.05 and abs(far.mean() - 0.5) < 0.05
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_lines_in_blender_units_stay_on_the_surface(motion):
+    look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
+    assert likeness(*MOTIONS[motion](), look) >= 0.9
 
 
 def width_of_lines(picture):

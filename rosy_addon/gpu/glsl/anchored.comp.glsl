@@ -39,7 +39,8 @@ void main()
   float whole = middle.x + middle.y + middle.z;
   float depth = -dot(middle / (whole == 0.0 ? 1.0 : whole), vec3(a.z, b.z, c.z));
   float size = (perspective != 0 ? depth : 1.0) * unit_of_pixel;
-  float level = log2(max(size, 1e-30));
+  float larger = unit_of_cell > 0.0 ? max(unit_of_cell / max(size, 1e-30), least_growth) : 1.0;
+  float level = log2(max(size * larger, 1e-30));
   float finest = floor(level - (0.5 * float(OCTAVES) - 1.0));
   vec3 total = vec3(0.0);
   for (int tap = 0; tap < 4; ++tap) {
@@ -68,5 +69,7 @@ void main()
       }
     }
   }
-  imageStore(raw_noise, pixel, vec4(total * amplitude, 1.0));
+  // `anchored.EVENED`
+  float even = inversesqrt(clamp(larger, 0.25, 4.0));
+  imageStore(raw_noise, pixel, vec4(total * amplitude * even, 1.0));
 }

@@ -11,10 +11,12 @@ struct Sums {
   float square;
 };
 
-// Of one half of a streamline, and of its first steps alone, with weights of their own.
+// Of one half of a streamline, and of its first steps alone, with weights of their own; and the tones
+// of as many as lines run on.
 struct Half {
   Sums all;
   Sums near;
+  vec2 tones;
 };
 
 void add(inout Sums sums, vec3 noise_there, float weight)
@@ -47,15 +49,23 @@ float samples_of(Sums sums)
   return sums.weight * sums.weight / sums.square;
 }
 
-// The noise along one half of the streamline that leaves a pixel on a sheet, without the start.
-Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps, int near_steps)
+// The tone of a pixel.
+float tone_at(ivec2 pixel)
+{
+  vec3 light = texelFetch(tones, pixel, 0).xyz;
+  return clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
+}
+
+// What lies along one half of the streamline that leaves a pixel on a sheet, without the start.
+Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps, int near_steps, int beyond)
 {
   Half found;
   found.all = found.near = none();
+  found.tones = vec2(0.0);
   float fall = taper != 0 ? 1.0 / float(steps + 1) : 0.0;
   float near_fall = taper != 0 ? 1.0 / float(near_steps + 1) : 0.0;
   vec2 offset = vec2(0.0), before = vec2(0.0);
-  for (int count = 0; count < steps; ++count) {
+  for (int count = 0; count < max(steps, beyond); ++count) {
     bool opposite = sheet >= lines;
     vec4 way = texelFetch(turning, ivec3(pixel, opposite ? sheet - lines : sheet), 0);
     vec2 ahead = way.xy + dot(way.zw, offset) * vec2(-way.y, way.x);
@@ -78,7 +88,12 @@ Half followed(ivec2 pixel, int sheet, float sign_, vec4 cell, int steps, int nea
       sheet = wrapped(sheet + int(round(turn - cell.x)), around);
     }
     float away = float(count + 1);
-    add(found.all, cell.yzw, 1.0 - away * fall);
+    if (count < steps) {
+      add(found.all, cell.yzw, 1.0 - away * fall);
+    }
+    if (count < beyond) {
+      found.tones += vec2(tone_at(pixel), 1.0);
+    }
     if (count < near_steps) {
       add(found.near, cell.yzw, 1.0 - away * near_fall);
     }
@@ -161,17 +176,28 @@ float onset_of(int line, float first)
   return place_of(rank, layers) * layering + 2.0 * too_many;
 }
 
-// An ink by its number, or between two, in the shadows and in the lights (`inks.Inks`).
-vec3 ink_at(float number, float tone)
+// How far a line has joined in that does so later than the first one, where all leave so much light.
+float joined_in(float later, float left)
+{
+  return smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY));
+}
+
+// An ink by its number, or between two, where the table of the shadows, or another one, begins.
+vec3 ink_of(float number, int start)
 {
   int below = min(int(number), ink_count - 1);
   int above = min(below + 1, ink_count - 1);
-  float share = number - float(below);
-  vec3 dark = mix(texelFetch(inks, ivec2(below, 0), 0).xyz, texelFetch(inks, ivec2(above, 0), 0).xyz, share);
-  below += ink_count;
-  above += ink_count;
-  vec3 light = mix(texelFetch(inks, ivec2(below, 0), 0).xyz, texelFetch(inks, ivec2(above, 0), 0).xyz, share);
-  return mix(dark, light, tone);
+  vec3 low = texelFetch(inks, ivec2(start + below, 0), 0).xyz;
+  return mix(low, texelFetch(inks, ivec2(start + above, 0), 0).xyz, number - float(below));
+}
+
+// The same at a tone (`inks.Inks.at`).
+vec3 ink_at(float number, float tone)
+{
+  vec3 middle = ink_of(number, ink_count);
+  float lighter = clamp((tone - ink_turn) / (1.0 - ink_turn), 0.0, 1.0);
+  float darker = clamp(1.0 - tone / ink_turn, 0.0, 1.0);
+  return middle + lighter * (ink_of(number, 2 * ink_count) - middle) + darker * (ink_of(number, 0) - middle);
 }
 
 vec3 inverted(vec3 light)
@@ -239,12 +265,9 @@ void main()
     told = known == vec2(0.0) ? 1 : families;
   }
   vec3 light = texelFetch(tones, pixel, 0).xyz;
-  // What light the ink is to leave, and between how many lines that is shared.
-  float tone_here = clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
-  float left = light_ink != 0 ? 1.0 - tone_here : tone_here;
-  float wanted = ink_floor + left * (1.0 - ink_floor);
+  float tone_here = tone_at(pixel);
   bool by_magnitude = magnitude_drives == 1 || magnitude_drives == 3;
-  float nearest = angle_of(z) / float(degree), soonest = 10.0, sharers = 0.0, paper = 1.0;
+  float nearest = angle_of(z) / float(degree), soonest = 10.0, paper = 1.0;
   vec3 one_ink = vec3(0.0), through = vec3(1.0);
   if (hatch != 0) {
     if (by_magnitude) {
@@ -252,32 +275,42 @@ void main()
     }
     else if (ink_count == 1) {
       one_ink = ink_at(0.0, tone_here);
-      left = 1.0 - covering(wanted, one_ink);
     }
     for (int line = 0; line < lines; ++line) {
       soonest = min(soonest, onset_of(line, nearest));
     }
-    for (int line = 0; line < lines; ++line) {
-      float later = onset_of(line, nearest) - soonest;
-      sharers += smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY));
-    }
   }
-  int near_steps = piece_length;
+  int near_steps = piece_length, beyond = run_on;
   if (magnitude_drives >= 2) {
     near_steps = int(round(float(near_steps) * relative));
+    beyond = int(round(float(beyond) * relative));
   }
+  // What light the ink is to leave, and between how many lines that is shared.
+  float wanted = 1.0, left = 1.0, sharers = 1.0;
   vec3 blend = vec3(0.0), hue = vec3(0.0);
   float samples = 0.0, weights = 0.0;
   for (int line = 0; line < lines; ++line) {
     bool paired = around == 2 * lines;
     int back = paired ? line + lines : line;
-    Half ahead = followed(pixel, line, 1.0, cell, steps, near_steps);
-    Half behind = followed(pixel, back, paired ? 1.0 : -1.0, cell, steps, near_steps);
+    Half ahead = followed(pixel, line, 1.0, cell, steps, near_steps, beyond);
+    Half behind = followed(pixel, back, paired ? 1.0 : -1.0, cell, steps, near_steps, beyond);
     Sums sums = whole_of(cell.yzw, ahead.all, behind.all);
     vec3 mean = evened_out(sums, whole_samples);
     if (hatch != 0) {
-      float later = onset_of(line, nearest) - soonest;
-      float own = smooth_step((1.0 - left - later + EARLY) / (JOINING + EARLY)) / sharers;
+      if (line == 0 || run_on > 0) {
+        vec2 along = vec2(tone_here, 1.0) + ahead.tones + behind.tones;
+        float light_left = along.x / along.y;
+        left = light_ink != 0 ? 1.0 - light_left : light_left;
+        wanted = ink_floor + left * (1.0 - ink_floor);
+        if (ink_count == 1 && !by_magnitude) {
+          left = 1.0 - covering(wanted, one_ink);
+        }
+        sharers = 0.0;
+        for (int other = 0; other < lines; ++other) {
+          sharers += joined_in(onset_of(other, nearest) - soonest, left);
+        }
+      }
+      float own = joined_in(onset_of(line, nearest) - soonest, left) / sharers;
       float covered = 1.0 - pow(left, own);
       vec3 ink = one_ink;
       if (ink_count > 1) {

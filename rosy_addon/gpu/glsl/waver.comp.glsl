@@ -45,6 +45,7 @@ void main()
     weights /= whole == 0.0 ? 1.0 : whole;
     float depth = -dot(weights, vec3(a.z, b.z, c.z));
     size *= perspective != 0 ? depth : 1.0;
+    size *= unit_of_cell > 0.0 ? max(unit_of_cell / max(size, 1e-30), least_growth) : 1.0;
     place = weights.x * rest0 + weights.y * rest1 + weights.z * rest2;
   }
   imageStore(wavering, pixel, vec4(waves_at(place, log2(max(size, 1e-30))), 0.0, 0.0, 1.0));

@@ -47,11 +47,20 @@ INKS = {
         "engraving",
         {"ink_ramp": True, "ink_colour": "#141a3c", "ink_colour_light": "#b0703c"},
     ),
-    "ink_ramp, charcoal to sanguine": (
+    "ink_ramp, through a third ink": (
         "charcoal",
-        {"ink_ramp": True, "ink_colour": "#1c1418", "ink_colour_light": "#b5543a"},
+        {
+            "ink_ramp": True,
+            "ink_colour": "#14213c",
+            "ink_middle": 0.45,
+            "ink_colour_middle": "#8c2f45",
+            "ink_colour_light": "#d29a3c",
+        },
     ),
 }
+
+#: From how far away lines are seen that are counted in pixels and in Blender units.
+AWAY = (3.6, 7.2, 14.4)
 
 
 def write() -> None:
@@ -79,18 +88,50 @@ def write() -> None:
             for label, (preset, settings) in panels.items()
         ]
         save(sheet([shown[start : start + 2] for start in (0, 2)]), IMAGES / f"{name}.png")
-    save(sheet(_tones(monkey, field)), IMAGES / "hatching-tone.png")
+    bare = _on_a_table(monkey, field)
+    save(sheet(_tones(bare)), IMAGES / "hatching-tone.png")
+    save(sheet([_ends(bare)]), IMAGES / "hatching-ends.png")
+    save(sheet(_units(monkey, field)), IMAGES / "hatching-units.png")
 
 
-def _tones(monkey: Surface, field: RosyField) -> list[list[Panel]]:
-    """One thing after another that tones come from, on Suzanne and on a ball that stand on a table."""
+def _on_a_table(monkey: Surface, field: RosyField) -> list[Body]:
+    """Suzanne and a ball."""
     ball, table = sphere(), plane(24)
     fields = field, smoothest_field(ball, 4), axis_field(table, 4, (1.0, 0.25, 0.0))
     surfaces, places = (
         (monkey, ball, table),
         (_at(0, 0, 0.985), _at(1.55, -0.75, 0.5, 0.5), _at(0, 0, 0, 7.0)),
     )
-    bare = [Body(*entry) for entry in zip(surfaces, places, fields, strict=True)]
+    return [Body(*entry) for entry in zip(surfaces, places, fields, strict=True)]
+
+
+def _ends(bodies: list[Body]) -> list[Panel]:
+    """Lines that end with a shadow, and those that run on."""
+    look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
+    return [
+        _tone_panel(bodies, replace(look, overshoot=length), f"overshoot {length:g}")
+        for length in (0.0, 14.0)
+    ]
+
+
+def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
+    """Lines counted in pixels and in Blender units, from near and from afar."""
+    rows = []
+    for unit in ("pixels", "world"):
+        look = replace(load_preset("engraving").look, unit=unit, unit_size=0.008)
+        row = []
+        for away in AWAY:
+            side = THIRD * look.supersampling
+            place = look_at((-0.35 * away, -0.9 * away, 0.25 * away), (0, 0, 0))
+            camera = perspective_camera(place, side, side, fov=np.radians(24))
+            shown = compose(project([Body(monkey, np.eye(4), field)], camera), look)
+            row.append(Panel(display(shown.rgba), f"unit: {unit}"))
+        rows.append(row)
+    return rows
+
+
+def _tones(bare: list[Body]) -> list[list[Panel]]:
+    """One thing after another that tones come from."""
     hidden = [
         replace(body, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]), carried={})
         for number, body in enumerate(bare)

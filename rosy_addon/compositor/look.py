@@ -21,6 +21,13 @@ def _angle(default: float, low: float, high: float, text: str) -> Any:
     )
 
 
+def _distance(default: float, low: float, high: float, text: str) -> Any:
+    """Blender units; the panel shows them as the scene counts."""
+    return field(
+        default=default, metadata={"low": low, "high": high, "text": text, "unit": "length"}
+    )
+
+
 def _choice(default: str, text: str, **options: str) -> Any:
     return field(default=default, metadata={"options": options, "text": text})
 
@@ -74,7 +81,7 @@ class Look:
         pixels="Pixels of the picture: lines are as wide from near as from afar",
         world="Blender units: lines belong to the object, as if engraved, and are wider from near",
     )
-    unit_size: float = _number(
+    unit_size: float = _distance(
         0.01, 1e-6, 1e6, "Blender units that stand for a pixel where lengths are counted in these"
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")

@@ -94,7 +94,7 @@ SHORT_NAMES = {
     "ink_colour_light": "In the Lights",
     "ink_middle": "Third at Tone",
     "ink_colour_middle": "Third Colour",
-    "unit_size": "Units a Pixel",
+    "unit_size": "Pixel Size",
 }
 
 

@@ -85,9 +85,10 @@ def pixels(image):
     return values.reshape(image.size[1], image.size[0], 4)
 
 
-def render(scene, path, *, samples=16, box=True):
-    """What Cycles makes of the scene, (H, W, 4) linear values, not premultiplied."""
-    scene.render.engine = "CYCLES"
+def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
+    """What Cycles makes of the scene, or another, (H, W, 4) linear values, not premultiplied."""
+    scene.render.engine = engine
+    scene.display.render_aa = "32"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.seed = "CPU", samples, 1
     cycles.use_denoising = cycles.use_adaptive_sampling = False

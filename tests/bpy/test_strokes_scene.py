@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from itertools import pairwise
 
 import bpy
@@ -147,6 +149,32 @@ def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "kept.exr", samples=8)[..., 3]
     assert alpha[covered].mean() > 0.1
+
+
+@pytest.fixture(scope="module")
+def workbench():
+    """Skip where there is nothing that this module of Blender could draw with."""
+    if bpy.app.version >= (4, 3):
+        pytest.skip("full Blenders draw the new kind of Grease Pencil, in their own tests")
+    trial = (
+        "import bpy; bpy.context.scene.render.engine = 'BLENDER_WORKBENCH';"
+        "bpy.context.scene.render.resolution_percentage = 1; bpy.ops.render.render()"
+    )
+    if subprocess.run([sys.executable, "-c", trial], capture_output=True, check=False).returncode:
+        pytest.skip("no graphics context without a window on this machine")
+
+
+def test_workbench_shows_grease_pencil_of_the_old_kind(workbench, monkey, camera, scene, tmp_path):
+    made = sketch(scene, kind="PENCIL", manner=Manner(spacing=6), pen=Pen(width=3.0))
+    eye = view(scene)
+    monkey.hide_render = True
+    alpha = render(scene, tmp_path / "pencil.exr", engine="BLENDER_WORKBENCH")[..., 3]
+    strokes = made.drawn.strokes
+    radius = pixel_size(strokes.points, eye) * strokes.width * 3 / 2
+    expected = coverage(strokes.points, strokes.start, radius, eye)
+    assert expected.mean() > 0.05
+    assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.95
+    assert np.isclose(alpha.mean(), expected.mean(), rtol=0.1)
 
 
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])

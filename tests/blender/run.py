@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Install the built zip into an empty Blender and test it there, headless and in a window.
 
-    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--no-window] [-- PYTEST...]
+    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--no-window] [--vulkan] [PYTEST...]
 
 REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. The screenshots of the panel
 go to DIR. The exit status is 0 only if all tests passed; the last line sums up, as pytest does.
@@ -56,6 +56,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
     parser.add_argument("--no-window", action="store_true")
     parser.add_argument("--only-window", action="store_true")
+    parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
     if not options.zip.is_file():
         parser.error(f"{options.zip} is not a file: build it first")
@@ -76,6 +77,9 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         PYTHONDONTWRITEBYTECODE="1",
     )
 
+    environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
+    backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
+
     def blender(verb: str, *command: str, timeout: float = 240.0, **more) -> Any:
         words = [str(options.real_blender), verb, options.which, *command]
         return subprocess.run(
@@ -92,7 +96,7 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     if not options.only_window:
         results = folder / "results.xml"
         blender(
-            "run", "--python-exit-code", "1", "-P", str(HERE / "inside.py"), "--",
+            "run", *backend, "--python-exit-code", "1", "-P", str(HERE / "inside.py"), "--",
             "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
             *(options.pytest or [str(HERE)]),
         )  # fmt: skip
@@ -106,7 +110,8 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             environment["ROSY_RESULTS"] = str(said)
             patience = 900 if "ROSY_LIVE_MANY" in environment else 420
             done = blender(
-                "gui", "-s", str(patience), "--enable-event-simulate", "--python-exit-code", "1",
+                "gui", "-s", str(patience), *backend,
+                "--enable-event-simulate", "--python-exit-code", "1",
                 "-P", str(HERE / script),
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience + 60.0,
             )  # fmt: skip

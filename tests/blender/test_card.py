@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 from conftest import EXTENSION
@@ -51,6 +53,10 @@ def card(rosy):
 def surface_of(rosy):
     bpy.ops.wm.read_homefile(use_empty=True)
     return lru_cache(lambda name: surface_named(rosy, name))
+
+
+def test_it_is_drawn_with_what_was_asked_for(card):
+    assert gpu.platform.backend_type_get() == os.environ["ROSY_BACKEND"].upper()
 
 
 @pytest.mark.parametrize("degree", DEGREES)

@@ -4,6 +4,7 @@
 #   make test      unit tests with new numpy, the quick ones with old numpy, and tests with
 #                  Blender 4.2's Python module
 #   make test-all  the same, and Blender 4.5's and 5.0's modules
+#   make test-long what else there is to be tested, in minutes rather than seconds a test
 #   make check     formatting, lint, import rules and unit tests: seconds
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
@@ -20,7 +21,7 @@ BPY42  = .venv-bpy42/bin/python
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: demo test test-all test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery bench clean distclean
+.PHONY: demo test test-all test-long test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -30,17 +31,21 @@ test: test-unit test-numpy1 test-bpy42
 
 test-all: test test-bpy45 test-bpy50
 
+test-long: .venv/ready .venv-bpy42/ready
+	$(UNIT) $(PYTEST) -m long tests/unit
+	$(BPY42) $(PYTEST) -m long tests/bpy
+
 test-unit: .venv/ready .venv-numpy1/ready
 	ROSY_OTHER_PYTHON=$(abspath $(NUMPY1)) $(UNIT) $(PYTEST) tests/unit
 
 test-numpy1: .venv-numpy1/ready
-	$(NUMPY1) $(PYTEST) -m "not slow" tests/unit
+	$(NUMPY1) $(PYTEST) -m "not slow and not long" tests/unit
 
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/bin/python $(PYTEST) tests/bpy
 
 check: lint
-	$(UNIT) $(PYTEST) -m "not slow" tests/unit
+	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit
 
 lint: .venv/ready
 	.venv/bin/ruff format --check .

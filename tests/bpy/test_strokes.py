@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import bpy
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ from rosy.rosy_addon.strokes.evenness import side_gaps
 from rosy.rosy_addon.strokes.ground import lay_ground
 from rosy.rosy_addon.strokes.trace import trace
 
-pytestmark = pytest.mark.skipif("ROSY_LONG" not in os.environ, reason="set ROSY_LONG")
+pytestmark = pytest.mark.long
 
 
 def suzanne(levels=2):

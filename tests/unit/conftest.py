@@ -5,13 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from rosy_addon.errors import RosyError
+
+#: Machines are busy at times: no example is wrong for being slow.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 ROOT = Path(__file__).resolve().parents[2]
 
 #: Modules that draw many pictures and measure them; `make check` leaves them out.
 SLOW = {"test_compositor", "test_hatching", "test_occlusion", "test_pictures", "test_tone"}
+
+
+def long(*cases):
+    """Cases of a test that `make test-long` adds to the usual ones."""
+    return [pytest.param(case, marks=pytest.mark.long) for case in cases]
 
 
 def pytest_collection_modifyitems(items):

@@ -145,7 +145,7 @@ def conjugate_field(surface):
 
 
 @given(surfaces(), st.sampled_from([1, 2, 5]), st.sampled_from(["smooth", "flat"]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_records_are_what_numpy_has_at_the_corners(surface, degree, display):
     field = axis_field(surface, degree, AXIS)
     assume(np.abs(surface.vertices[:-1]).max() < 1e7)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import long
 from planar_fields import pair_angle, pixel_centres, swirl_angle
 from scipy import ndimage
 
@@ -125,7 +126,7 @@ def test_any_member_stands_for_the_field(degree, method):
 
 
 @pytest.mark.parametrize("noise", [{}, {"high_pass": 16.0, "density": 0.1}, {"taper": True}])
-@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6, 7])
+@pytest.mark.parametrize("degree", [4, 7, *long(2, 3, 5, 6)])
 @pytest.mark.parametrize("method", ["members", "sheets"])
 def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
     size = 512
@@ -173,7 +174,7 @@ def along_field_autocorrelation(image, angles, chosen, lag):
         {"method": "sheets"},
     ],
 )
-@pytest.mark.parametrize("degree", [2, 3, 4, 6])
+@pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
 def test_breaking_points_do_not_show(degree, way):
     size, guides = 384, 6
     x, _ = pixel_centres(size)

@@ -54,7 +54,7 @@ def fan_of(surface, angles, lengths):
 # --- the algebra ---------------------------------------------------------------------------------
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(2, 7), st.integers(0, 10**6), st.integers(0, 6))
 def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
     random = np.random.default_rng(seed)
@@ -74,7 +74,7 @@ def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
         assert np.allclose(a, b, atol=2e-4)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(1, 7), st.integers(0, 10**6))
 def test_what_is_taken_apart_comes_together(degree, seed):
     surface = icosphere(1)

@@ -80,7 +80,7 @@ def test_a_field_follows_strokes_within_two_degrees():
             guides[near] = unit(np.cross(axis, centre[near]))
             stroke[near] = stroke.max() + 1
     assert stroke.max() == 9
-    for degree in (1, 2, 4, 6):
+    for degree in (1, 4):
         field = guided_field(surface, degree, guides, 1 / 0.01**2)
         apart = angles_apart(surface, field.vectors, guides, degree)
         for number in range(10):
@@ -109,7 +109,7 @@ def test_ten_strokes_on_the_bunny():
             continue
         tangent = along - (surface.face_normal[near] @ along)[:, None] * surface.face_normal[near]
         guides[near], stroke[near] = unit(tangent), stroke.max() + 1
-    for degree in (1, 2, 4, 6):
+    for degree in (1, 4):
         field = guided_field(surface, degree, guides, 1 / (0.002 * size) ** 2)
         apart = np.degrees(angles_apart(surface, field.vectors, guides, degree))
         for number in range(10):

@@ -43,7 +43,7 @@ def test_large_triangles_among_small_ones():
     assert triangle[1] < len(ball.triangles) and np.isclose(distance[1], 0.1, atol=0.002)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.floats(-3, 3), min_size=12, max_size=12))
 def test_distances_are_those_of_a_fine_net_of_points(numbers):
     point, corners = np.array(numbers[:3]), np.array(numbers[3:]).reshape(3, 3)

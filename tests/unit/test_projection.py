@@ -152,7 +152,7 @@ def test_values_are_continuous_across_edges_of_triangles():
     assert np.median(change[~same]) < 1.2 * np.median(change[same])
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
 def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, display):
     random = np.random.default_rng(seed)
@@ -178,7 +178,7 @@ def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, displ
     assert np.abs(one.representation).max() > 0.1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
 def test_turning_everything_together_changes_nothing(seed, degree, perspective, display):
     random = np.random.default_rng(seed)

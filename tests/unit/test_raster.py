@@ -69,7 +69,7 @@ def cast(points, triangles, camera):
     return owner, weights, depth, doubtful
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seeds, st.booleans())
 def test_sees_what_a_ray_caster_sees(seed, perspective):
     """Triangles anywhere: before, behind and around the eye, across both clip planes."""
@@ -124,7 +124,7 @@ def coverage(clip, triangles, width=WIDTH, height=HEIGHT):
     return count.reshape(height, width)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds, st.integers(1, 6), st.sampled_from([0, 2, 4]))
 def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
     """Half-open: pixel centres on the left and lower border are in, the others out."""
@@ -136,7 +136,7 @@ def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
     assert (count == expected).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_no_cracks_where_the_near_plane_cuts(seed):
     """A floor that passes under the eye, cut at random: below the horizon all is covered once."""
@@ -174,7 +174,7 @@ def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
     np.testing.assert_allclose(seen.depth, depth, atol=1e-9)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_order_of_triangles_and_corners_does_not_matter(seed):
     random = np.random.default_rng(seed)

@@ -53,7 +53,7 @@ def star(random, corners):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds, st.integers(4, 24), st.booleans())
 def test_star_shaped_polygons_are_filled(seed, corners, backward):
     random = np.random.default_rng(seed)
@@ -122,7 +122,7 @@ def test_convex_faces_are_fans_around_their_first_corner():
     assert face.tolist() == [0, 0, 1, 1, 1, 1, 2]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seeds)
 def test_a_polygon_in_space_is_cut_as_in_the_plane(seed):
     """Turned anywhere, moved far away, and a little out of its plane."""

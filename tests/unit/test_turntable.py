@@ -30,7 +30,7 @@ def frames_of(data):
     return film, found
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 3), st.integers(1, 90), st.integers(1, 70), st.integers(0, 10**6))
 def test_grey_pictures_come_back_as_they_are(count, width, height, seed):
     random = np.random.default_rng(seed)

@@ -510,6 +510,7 @@ def _coarser(look: Look, coarseness: int) -> dict[str, Any]:
         "grain": max(look.grain / coarseness, 0.75),
         "high_pass": look.high_pass / coarseness,
         "overshoot": look.overshoot / coarseness,
+        "outline": look.outline / coarseness,
         "supersampling": 1,
     }
 

@@ -14,9 +14,19 @@ from ..projection.gbuffer import GBuffer
 from .anchored import surface_noise
 from .brute import brute_images
 from .colour import map_colours, to_linear
+from .contour import contour
 from .contrast import averaging_gain, blend_gain, scale_contrast
 from .flow import Flow, planar_flow, surface_flow
-from .hatching import Hand, has_pieces, has_tooth, hatched, piece_length, runs_on, statistics_of
+from .hatching import (
+    Hand,
+    has_outline,
+    has_pieces,
+    has_tooth,
+    hatched,
+    piece_length,
+    runs_on,
+    statistics_of,
+)
 from .hues import family_hues
 from .images import Images, relative_magnitude
 from .look import Look
@@ -64,6 +74,7 @@ AFTERWARDS = (
     "breaks",
     "overshoot",
     "paper_grain",
+    "outline",
 )
 
 
@@ -211,7 +222,17 @@ def _hand(gbuffer: GBuffer, flow: Flow, look: Look, tone: np.ndarray) -> Work[Ha
         tooth = _tooth(gbuffer, flow, look)
     if runs_on(look):
         tones = yield from _tones_along(flow, look, tone)
-    return Hand(pieces, tooth, tones)
+    outline = _outline(gbuffer, flow, look) if has_outline(look) else None
+    return Hand(pieces, tooth, tones, outline)
+
+
+def _outline(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray:
+    """(P,) `contour` at the pixels of a flow, or that made for the last look if it would be the same."""
+    key = look.outline, look.crease_angle, look.cross_creases
+    made = gbuffer.made.get("contour")
+    if made is None or made[0] != key:
+        made = gbuffer.made["contour"] = key, contour(gbuffer, look)
+    return made[1][np.searchsorted(gbuffer.pixel, flow.pixel)]
 
 
 def _tones_along(flow: Flow, look: Look, tone: np.ndarray) -> Work[np.ndarray]:

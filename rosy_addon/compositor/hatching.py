@@ -67,11 +67,15 @@ class Hand(NamedTuple):
     tones : (M, P) float32 ndarray or None
         The light that each line is to leave, if that is not the tone alone: its mean along the line,
         so that lines run on past the borders of tones, thinning out, the strongest farthest.
+
+    outline : (P,) float32 ndarray or None
+        How much of each pixel is covered by lines along silhouettes and creases.
     """
 
     pieces: Images | None = None
     tooth: np.ndarray | None = None
     tones: np.ndarray | None = None
+    outline: np.ndarray | None = None
 
 
 def hatched(
@@ -127,6 +131,8 @@ def _one_ink(
     for line, share in enumerate(family_shares(flow, look, left)):
         covered = 1 - left[line % len(left)] ** share
         paper *= 1 - line_coverage(line, covered, images, look, hand)
+    if hand.outline is not None:
+        paper *= 1 - hand.outline
     return ink, 1 - paper
 
 
@@ -150,6 +156,10 @@ def _many_inks(
         coverage = line_coverage(line, covered, images, look, hand)
         through *= 1 - coverage[:, None] * (1 - inks.through(ink))
         paper *= 1 - coverage
+    if hand.outline is not None:
+        ink = inks.at(np.zeros_like(tone), tone)
+        through *= 1 - hand.outline[:, None] * (1 - inks.through(ink))
+        paper *= 1 - hand.outline
     colour = inks.inverted(inks.inverted(inks.paper) * through)
     coverage = 1 - paper
     # What is seen is paper and ink: the ink is what is left without the paper.
@@ -208,6 +218,11 @@ def has_pieces(look: Look) -> bool:
 def runs_on(look: Look) -> bool:
     """Whether lines run on past the borders of tones."""
     return look.ink == "hatch" and look.overshoot > 0
+
+
+def has_outline(look: Look) -> bool:
+    """Whether there are lines along silhouettes and creases."""
+    return look.ink == "hatch" and look.outline > 0
 
 
 def has_tooth(look: Look) -> bool:

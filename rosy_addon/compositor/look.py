@@ -233,6 +233,12 @@ class Look:
         1.0,
         "How much the ink catches on the tooth of the paper, as pencil and charcoal do",
     )
+    outline: float = _number(
+        0.0,
+        0.0,
+        64.0,
+        "Width of lines of ink along silhouettes, borders and sharp creases, in pixels; 0: none",
+    )
     supersampling: int = _number(1, 1, 4, "Samples of a pixel along each side")
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from ..projection.shadows import bounds_of
 from .look import Look
 
 #: The settings that are lengths.
-LENGTHS = ("length", "grain", "high_pass", "overshoot")
+LENGTHS = ("length", "grain", "high_pass", "overshoot", "outline")
 
 #: Steps of an octave in which lengths follow a camera: tables of a look last for a while.
 STEPS = 32

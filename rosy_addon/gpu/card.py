@@ -16,6 +16,7 @@ import numpy as np
 from ..compositor.anchored import LOWEST, OCTAVES, SIDE, TAPS, identities, lattice_axes
 from ..compositor.colour import colour_stops
 from ..compositor.compose import noise_of
+from ..compositor.contour import IN_FRONT
 from ..compositor.contrast import averaging_gain, expected_deviation, streaks_of
 from ..compositor.hatching import (
     EARLY,
@@ -932,6 +933,8 @@ def _look_constants(kind: Kind, look: Look) -> dict[str, Any]:
         "breaks": look.breaks,
         "piece_length": piece_length(finer) if has_pieces(look) else 0,
         "run_on": max(round(finer.overshoot / finer.step), 1) if runs_on(look) else 0,
+        "outline": finer.outline,
+        "IN_FRONT": IN_FRONT,
         "piece_samples": whole_samples(replace(finer, length=piece_length(finer))),
         "piece_deviation": statistics.piece_deviation if statistics else 1.0,
         "wobble": look.wobble if wavers(look) else 0.0,

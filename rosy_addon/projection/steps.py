@@ -115,6 +115,25 @@ def links(buffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarr
     return bits
 
 
+def nearness(buffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
+    """How near what the pixels show is, in what `links` measures depth in, and its tolerance.
+
+    Parameters
+    ----------
+    buffer : GBuffer
+
+    Returns
+    -------
+    near, tolerance : (P,) float32 ndarray
+        The nearer the larger; by how much it may be off a pixel away.
+    """
+    near, tolerance = np.empty((2, len(buffer.pixel)), dtype=np.float32)
+    for start in range(0, len(buffer.pixel), BLOCK):
+        part = slice(start, start + BLOCK)
+        near[part], _, _, tolerance[part] = _slopes(buffer, part)
+    return near, tolerance
+
+
 class _Window(NamedTuple):
     """Some rows of the frame, as far as a G-buffer covers it.
 

@@ -58,6 +58,7 @@ GROUPS = {
         "overshoot",
         "wobble",
         "paper_grain",
+        "outline",
     ),
     "Quality": ("supersampling", "display", "method", "anchor", "seed"),
 }

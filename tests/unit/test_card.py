@@ -598,6 +598,16 @@ LOOKS = {
         "shading": 0.9,
         "overshoot": 5.0,
     },
+    "hatched, with an outline": {"ink": "hatch", "shading": 0.9, "outline": 2.3},
+    "hatched by families, with an outline": {
+        "ink": "hatch",
+        "hue": "families",
+        "shading": 0.9,
+        "outline": 1.5,
+        "supersampling": 2,
+        "ink_colour": "#ffe0b0",
+        "paper_colour": "#102030",
+    },
     "hatched, running on": {
         "ink": "hatch",
         "light": "lamp",
@@ -803,6 +813,8 @@ def test_creases_of_a_cube(card, crossing, degree, display):
     look = replace(LOOK, cross_creases=crossing, display=display)
     for perspective in (True, False):
         alike(card, [body], view(perspective=perspective, distance=8.0), look)
+        outlined = replace(look, ink="hatch", outline=3.0)
+        alike(card, [body], view(perspective=perspective, distance=8.0), outlined)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4])

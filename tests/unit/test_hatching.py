@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from conftest import long
 from scipy.ndimage import gaussian_filter, map_coordinates
+from shapes import cube
 
 from rosy_addon.compositor.anchored import identities, surface_noise
 from rosy_addon.compositor.colour import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose, look_noise
+from rosy_addon.compositor.contour import contour
 from rosy_addon.compositor.flow import planar_flow
 from rosy_addon.compositor.hatching import (
     Hand,
@@ -668,3 +670,67 @@ def test_clear_paper_is_ink_alone():
     whole = full[..., 3] == 1
     on_white = clear[..., :3] * clear[..., 3:] + 1 - clear[..., 3:]
     np.testing.assert_allclose(on_white[whole], full[whole][:, :3], atol=2e-3)
+
+
+# --- outlines ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.5, 6.0])
+def test_an_outline_is_as_wide_as_it_is_to_be(width):
+    """Around a ball: of so much ink is a ring of that width, and it lies along the border."""
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
+    gbuffer = project([body(ball())], camera)
+    covered = contour(gbuffer, Look(outline=width))
+    radius = SIZE / 2.4
+    ring = np.pi * (radius**2 - (radius - width) ** 2)
+    assert covered.sum() == pytest.approx(ring, rel=0.06 if width > 1 else 0.15)
+    from_middle = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1]) * radius
+    assert (covered[from_middle < radius - width - 2] == 0).all()
+    assert (covered[(from_middle > radius - width + 2)] == 1).all()
+
+
+def test_outlines_are_of_what_is_nearer():
+    """Two walls, one before the other; the one behind has no line where the other hides it."""
+    points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
+    walls = []
+    for number, (left, away) in enumerate(((0.0, 0.0), (0.7, 1.0))):
+        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {number}")
+        matrix = np.eye(4)
+        matrix[:3, 3] = left, away, 0.3 * number
+        walls.append(Body(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
+    gbuffer = project(walls, camera)
+    covered = contour(gbuffer, Look(outline=3.0))
+    first, second = gbuffer.body == 0, gbuffer.body == 1
+    x, y = gbuffer.position[:, 0] * 60, gbuffer.position[:, 1] * 60
+    to_border = 60 - np.maximum(np.abs(x), np.abs(y))
+    assert (covered[first] == (to_border[first] < 3)).all()
+    hidden_by = second & (np.maximum(np.abs(x), np.abs(y)) < 65) & (x > -14) & (y > -38)
+    assert hidden_by.sum() > 300 and (covered[hidden_by] == 0).all()
+
+
+def test_creases_have_lines_half_on_either_side():
+    """The edge of a cube that is seen at equal angles; none if streaks are to cross it."""
+    soft = cube()
+    box = build_surface(soft.vertices, soft.corner_vertex, soft.face_start, sharp_angle=1.0)
+    camera = orthographic_camera(look_at((4.5, -3.5, 0.5), (0.5, 0.5, 0.5)), 240, 240, scale=2.0)
+    gbuffer = project([Body(box, np.eye(4), axis_field(box, 4, (0, 0, 1.0)))], camera)
+    x = (gbuffer.position @ np.eye(3)[0]) * 120
+    middle = np.abs(x) < 20
+    covered = contour(gbuffer, Look(outline=4.0))
+    inner = middle & (np.abs(gbuffer.position[:, 1] * 120) < 40)
+    assert (covered[inner] == (np.abs(x[inner]) < 2)).all()
+    assert not contour(gbuffer, Look(outline=4.0, cross_creases=True))[inner].any()
+
+
+def test_outlines_are_drawn_in_ink():
+    plain = replace(INK, light="scene", shading=0.0)  # no light that would ask for lines
+    bare, lined = (
+        drawn(body(ball()), eye(), replace(plain, outline=width)) for width in (0.0, 2.0)
+    )
+    changed = np.abs(lined - bare)[..., 0] > 1e-3
+    assert changed.sum() > 500
+    ink = to_linear(from_hex(plain.ink_colour))
+    whole = lined[..., 3] == 1
+    darkest = lined[changed & whole].min(axis=0)[:3]
+    np.testing.assert_allclose(darkest, ink, atol=1e-3)

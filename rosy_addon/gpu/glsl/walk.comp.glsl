@@ -233,6 +233,61 @@ float threshold_of(float covered)
   return mix(low, texelFetch(thresholds, ivec2(below + 1, 0), 0).x, place - float(below));
 }
 
+// How wide the line is along a pixel beside which its surface ends and nothing nearer begins
+// (`contour._edges`).
+float line_at(ivec2 pixel, vec4 value, vec4 slope)
+{
+  float width = 0.0;
+  int bits = joined_to(texelFetch(cells, pixel, 0).x);
+  if (bits == 511 || value.xy == vec2(0.0)) {
+    return width;
+  }
+  for (int side = 0; side < 4; ++side) {
+    ivec2 move = side == 0 ? ivec2(1, 0) : side == 1 ? ivec2(-1, 0) : side == 2 ? ivec2(0, 1) : ivec2(0, -1);
+    ivec2 there = pixel + move;
+    bool inside = all(greaterThanEqual(there, ivec2(0))) && all(lessThan(there, imageSize(picture)));
+    if (!inside || ((bits >> (move.x + 3 * move.y + 4)) & 1) == 1) {
+      continue;
+    }
+    vec4 other = texelFetch(values_seen, there, 0);
+    float jump = (texelFetch(slopes, there, 0).x - slope.x) / (IN_FRONT * slope.w);
+    bool goes_on = other.w == value.w && other.xy == vec2(0.0);
+    if (other.w == 0.0 || jump < -1.0) {
+      width = goes_on ? width : outline;
+    }
+    else if (jump <= 1.0 && !goes_on) {
+      width = max(width, 0.5 * outline);
+    }
+  }
+  return width;
+}
+
+// How much of a pixel lines along silhouettes and creases cover (`contour.contour`).
+float contour_at(ivec2 pixel, vec4 value)
+{
+  float near = texelFetch(slopes, pixel, 0).x, covered = 0.0;
+  int reach = int(ceil(outline));
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      ivec2 there = pixel + ivec2(dx, dy);
+      float away = length(vec2(dx, dy));
+      bool inside = all(greaterThanEqual(there, ivec2(0))) && all(lessThan(there, imageSize(picture)));
+      if (!inside || outline - away <= covered) {
+        continue;
+      }
+      vec4 other = texelFetch(values_seen, there, 0), slope = texelFetch(slopes, there, 0);
+      float behind = IN_FRONT * slope.w * max(away, 1.0);
+      if (other.w == value.w && near >= slope.x - behind) {
+        float line_there = line_at(there, other, slope);
+        if (line_there > 0.0) {
+          covered = max(covered, clamp(line_there - away, 0.0, 1.0));
+        }
+      }
+    }
+  }
+  return covered;
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + corner;
@@ -346,6 +401,13 @@ void main()
       hue += shine * texelFetch(palette, ivec2(family, 0), 0).xyz;
       weights += shine;
     }
+  }
+  if (hatch != 0 && outline > 0.0) {
+    float coverage = contour_at(pixel, value);
+    vec3 ink = ink_count > 1 ? ink_at(0.0, tone_here) : one_ink;
+    vec3 passed = inverted(ink) / max(inverted(paper_light.xyz), 1e-3);
+    through *= 1.0 - coverage * (1.0 - passed);
+    paper *= 1.0 - coverage;
   }
   blend /= float(lines);
   samples /= float(lines);

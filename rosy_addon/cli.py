@@ -747,6 +747,14 @@ def _add_strokes(verbs: Any) -> None:
         help="over which strokes get thinner toward their ends (%(default)g)",
     )
     verb.add_argument(
+        "--overshoot",
+        type=_number(0.0, 1e3),
+        default=0.0,
+        metavar="PX",
+        help="by which strokes run on, at most, where the surface or the shade ends or something is "
+        "in front",
+    )
+    verb.add_argument(
         "--gaps",
         type=_number(0.0, 1.0),
         default=0.0,

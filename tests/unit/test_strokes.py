@@ -742,6 +742,16 @@ def test_command_line(tmp_path, capsys):
     assert out.read_bytes() == once
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
+    for words, wanted in (
+        (["--camera", "Close"], "ball.obj: --camera is for .blend files"),
+        (["--frames", "1-3"], "ball.obj: --frames is for .blend files"),
+        (["--tone", "--light", "scene"], "ball.obj: has no lights"),
+    ):
+        assert main([*command, "-o", str(out), *words]) == 2
+        assert wanted in capsys.readouterr().err
+    for wanted, words in (("give a mesh file", []), ("needs Blender", ["scene.blend"])):
+        assert main(["strokes", *words, "-o", str(out)]) == 2
+        assert wanted in capsys.readouterr().err
 
 
 # --- what is wrong is said ---------------------------------------------------------------------------

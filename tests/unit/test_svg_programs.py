@@ -149,6 +149,26 @@ def test_programs_draw_the_strokes_where_the_camera_sees_them(
     assert abs(found.sum() / expected.sum() - 1) < 0.01
 
 
+@pytest.mark.parametrize("program", [browser, inkscape])
+def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
+    """As lines that come back to where they began."""
+    body, camera = scene
+    rings = Body(body.surface, body.matrix, generate(body.surface, "axis", 4))
+    lines = seen(trace(rings, pixel_spacing(rings, camera, 14.0)), [rings], camera)
+    lines = Strokes.joined(lines, seen(outline(body, camera), [body], camera))
+    assert lines.closed.sum() >= 3
+    pictures = []
+    for name, strokes in (
+        ("closed", lines),
+        ("open", replace(lines, closed=np.zeros_like(lines.closed))),
+    ):
+        write_svg(tmp_path / f"{name}.svg", strokes, camera, Pen(width=4.0))
+        program(tmp_path / f"{name}.svg", tmp_path / f"{name}.png")
+        pictures.append(ink_of(tmp_path / f"{name}.png"))
+    assert (tmp_path / "closed.svg").read_text().count("Z") == lines.closed.sum()
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.02
+
+
 @needs_inkscape
 def test_inkscape_finds_a_layer_a_family(drawn, scene, tmp_path):
     svg = tmp_path / "a.svg"

@@ -20,7 +20,8 @@ from rosy_addon.field.generate import Recipe, generate
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import Body
 from rosy_addon.projection.project import project
-from rosy_addon.strokes.density import by_tone, lambert, pixel_spacing
+from rosy_addon.strokes.density import pixel_spacing
+from rosy_addon.strokes.draw import Manner, draw
 from rosy_addon.strokes.outline import outline
 from rosy_addon.strokes.seen import seen
 from rosy_addon.strokes.strokes import Strokes
@@ -225,17 +226,15 @@ def test_lines_run_as_in_the_render(program, scene, tmp_path):
 @pytest.mark.parametrize("program", [browser, inkscape])
 def test_strokes_are_as_dark_as_the_render(program, scene, tmp_path):
     body, camera = scene
-    toward = camera.view[:3, :3].T @ LAMP.vector
-    spacing = by_tone(pixel_spacing(body, camera, 4.0), lambert(body, toward))
-    write_svg(
-        tmp_path / "a.svg", seen(trace(body, spacing), [body], camera), camera, Pen(width=2.0)
-    )
+    manner = Manner(spacing=4.0, tone=True, light="lamp")
+    drawn = draw([body], camera, manner, lights=[LAMP]).strokes
+    write_svg(tmp_path / "a.svg", drawn, camera, Pen(width=2.0))
     program(tmp_path / "a.svg", tmp_path / "a.png")
     strokes = ink_of(tmp_path / "a.png")
     picture, inside = rendered(scene, Look(ink="hatch", shading=1.0, light="lamp"), border=4)
     share = np.maximum(gaussian_filter(inside * 1.0, 12), 1e-9)
     far = [gaussian_filter(np.where(inside, ink, 0), 12) / share for ink in (strokes, 1 - picture)]
-    assert np.corrcoef(far[0][inside], far[1][inside])[0, 1] > 0.7
+    assert np.corrcoef(far[0][inside], far[1][inside])[0, 1] > 0.9
 
 
 def rendered(scene, look, border):

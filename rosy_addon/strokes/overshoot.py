@@ -19,7 +19,7 @@ from .strokes import COLUMNS, Strokes, arcs
 LEAST = 0.3
 
 #: Pixels before an end at which a stroke goes straight on, and for how many its direction is
-#: taken before; at most so large a share of it. Right at a silhouette all lines turn along it.
+#: taken before; at most so large a share of it each.
 BACK, BACK_SHARE = 6.0, 0.25
 
 #: Strokes run on at either end by at most so large a share of what they are long.
@@ -71,27 +71,48 @@ def overshot(
     """
     if bodies is None:
         strokes = densified(strokes, camera)
-    flat, depth = on_screen(strokes.points, camera)
-    arc = arcs(np.nan_to_num(np.column_stack([flat, np.zeros(len(flat))])), strokes.start)
+    flat = np.nan_to_num(on_screen(strokes.points, camera)[0])
+    arc = arcs(np.column_stack([flat, np.zeros(len(flat))]), strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     loose = strokes.is_loose & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(loose & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    back = np.minimum(BACK, BACK_SHARE * total)
-    leave = end if bodies is None else _before_end(arc, strokes, end, back)
-    before = _before_end(arc, strokes, end, back + np.abs(arc[end] - arc[leave]))
-    if bodies is None:
-        origin, way = strokes.points[end], unit(strokes.points[end] - strokes.points[before])
-        way *= pixel_size(origin, camera)[:, None]
-    else:
-        origin = _at_depth(strokes.points[leave], depth[leave], depth[end], camera)
-        way = _across(unit(flat[leave] - flat[before]), depth[end], camera)
+    ahead = _in_space if bodies is None else _in_picture
+    leave, origin, way = ahead(strokes, arc, end, np.minimum(BACK, BACK_SHARE * total), camera)
     length = np.minimum(pixels * _shares(len(strokes))[stroke, side], LONGEST * total)
     length = length + np.abs(arc[end] - arc[leave])
     goes = way.any(axis=1) & np.isfinite(way).all(axis=1)
     tails = _Tails(*(column[goes] for column in (leave, side, origin, way, length)))
     longer, along = _with_tails(strokes, tails)
     return longer if bodies is None else _on_what_is_there(longer, along, bodies, camera)
+
+
+def _in_space(
+    strokes: Strokes, arc: np.ndarray, end: np.ndarray, back: np.ndarray, camera: Camera
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of (k,) ends the points that they are left at, where that is, and which way for a pixel.
+
+    The direction is that over the last (k,) pixels before.
+    """
+    before, origin = _before_end(arc, strokes, end, back), strokes.points[end]
+    way = pixel_size(origin, camera)[:, None] * unit(origin - strokes.points[before])
+    return end, origin, way
+
+
+def _in_picture(
+    strokes: Strokes, arc: np.ndarray, end: np.ndarray, back: np.ndarray, camera: Camera
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same in the plane of the ends that is parallel to the picture.
+
+    They are left so many pixels early: right at a silhouette all lines turn along it.
+    """
+    leave = _before_end(arc, strokes, end, back)
+    before = _before_end(arc, strokes, end, back + np.abs(arc[end] - arc[leave]))
+    here, depth = on_screen(strokes.points[leave], camera)
+    there, _ = on_screen(strokes.points[before], camera)
+    _, far = on_screen(strokes.points[end], camera)
+    origin = _at_depth(strokes.points[leave], depth, far, camera)
+    return leave, origin, _across(unit(here - there), far, camera)
 
 
 def _before_end(arc: np.ndarray, strokes: Strokes, end: np.ndarray, far: np.ndarray) -> np.ndarray:

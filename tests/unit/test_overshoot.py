@@ -233,6 +233,16 @@ def test_kept_behind_they_run_on_in_space():
     assert out.min() > 0.01 * LEAST * FAR - 1e-6 and out.max() <= 0.01 * FAR + 1e-6
 
 
+def test_beside_and_behind_the_eye_nothing_breaks():
+    surface = plane(20, 20, size=40.0)
+    floor = Body(surface, STILL, generate(surface, ALONG_X, 2))
+    camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
+    for more in ({}, {"hidden": True}):
+        made = draw([floor], camera, Manner(spacing=20, overshoot=FAR, **more), framed=False)
+        assert np.isfinite(made.strokes.points).all() and np.isfinite(made.strokes.width).all()
+        assert np.abs(made.strokes.points[:, 2]).max() < 1e-3
+
+
 def test_plotters_and_strokes_that_are_too_short():
     longer = draw([BALL], FRONT, Manner(spacing=9, overshoot=FAR)).strokes
     assert svg_text(longer, FRONT, Pen(plotter=True)).count("<path") == len(longer)

@@ -7,10 +7,8 @@ from collections.abc import Iterable
 import bpy
 
 from ..rosy_addon.bake import Source
-from ..rosy_addon.errors import RosyError
 from ..rosy_addon.progress import Work
-from ..rosy_addon.scene.bodies import rosy_objects
-from ..rosy_addon.scene.strokes import remove_strokes, stroke_objects
+from ..rosy_addon.scene.strokes import remove_strokes, stroke_objects, wanted_objects
 from ..rosy_addon.sketch import Sketch, sketching
 from ..rosy_addon.ui.properties import STROKE_CAMERAS, STROKE_KINDS
 from .bake import view_camera
@@ -68,13 +66,7 @@ class ROSY_OT_strokes(Ticking, bpy.types.Operator):
             self.report({"WARNING"}, note)
 
     def _objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
-        found = rosy_objects(context.view_layer)
-        if not context.scene.rosy.strokes.selected:
-            return found
-        chosen = [thing for thing in found if thing.select_get(view_layer=context.view_layer)]
-        if not chosen:
-            raise RosyError("none of the selected objects has a field: select one that has")
-        return chosen
+        return wanted_objects(context.scene, context.view_layer)
 
     def _camera(self, context: bpy.types.Context) -> Source | None:
         given = self.properties.is_property_set("camera")

@@ -1,6 +1,7 @@
 """The command line, the same in Blender and in plain Python.
 
-``render``, ``strokes``, ``field``, ``info`` and ``presets`` need numpy alone; ``bake`` needs a Blender, or its Python module.
+``render``, ``strokes`` of mesh files, ``field``, ``info`` and ``presets`` need numpy alone; ``bake``, and
+``strokes`` of .blend files, need a Blender, or its Python module.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +64,15 @@ DONE, WRONG, STOPPED = 0, 2, 130
 #: Looking down a little from the front left, as portraits are taken.
 DEFAULT_VIEW = (-25.0, 20.0)
 DEFAULT_SIZE, DEFAULT_FILM_SIZE = (1024, 1024), (512, 512)
+
+#: Options of `strokes` that are for mesh files, and for Blender files, alone, and what they are if
+#: they are not given.
+OF_MESHES = {
+    **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
+    **dict.fromkeys(("uv", "undefined", "ortho"), False),
+    "view": DEFAULT_VIEW,
+}
+OF_SCENES = dict.fromkeys(("object", "camera", "frames"))
 
 #: What colours of vertices are called, as in Blender.
 COLOUR = "Color"
@@ -141,31 +152,107 @@ def turntable(options: argparse.Namespace) -> None:
 
 
 def strokes(options: argparse.Namespace) -> None:
-    """Cover a mesh file with evenly spaced strokes along its field, as lines in an .svg file."""
+    """Cover meshes with evenly spaced strokes along their fields, as lines in an .svg file."""
     if options.output.suffix.lower() != ".svg":
         raise RosyError(f"{options.output}: strokes are written to .svg files")
     check_writable(options.output)
-    pen = Pen(
-        width=options.width,
-        colours=options.colours.split(","),
-        paper=None if options.no_paper or options.plotter else "#ffffff",
-        millimetres=options.mm,
-        plotter=options.plotter,
-    )
+    if options.mesh is None and "bpy" not in sys.modules:
+        raise RosyError("there is nothing to draw: give a mesh file, or SCENE.blend")
+    if options.mesh is None or options.mesh.suffix.lower() == ".blend":
+        _check_not_given(options, OF_MESHES, "mesh files")
+        _strokes_of_scene(options)
+        return
+    _check_not_given(options, OF_SCENES, ".blend files")
+    manner, pen = _manner(options, Manner()), _pen(options, Pen())
+    if manner.light == "scene":
+        raise RosyError(f"{options.mesh}: has no lights: --light headlight or lamp")
     surface, field = _mesh_and_field(options)
     matrix = UPRIGHT[options.up or UP[options.mesh.suffix.lower()]]
     camera = _camera(options, surface.vertices @ matrix[:3, :3].T, 1)
-    manner = _manner(options)
     drawn = draw([Body(surface, matrix, field)], camera, manner, lights=lights_of(manner, ()))
     write_svg(options.output, drawn.strokes, camera, pen)
 
 
-def _manner(options: argparse.Namespace) -> Manner:
+def _strokes_of_scene(options: argparse.Namespace) -> None:
+    """Of a Blender file, by its own settings unless options say otherwise; at one frame or many."""
+    frames = [None] if options.frames is None else list(frame_range(options.frames))
+    if len(frames) > 1 and "#" not in options.output.name:
+        raise RosyError(
+            f"{options.output}: of several frames, # in the name are to stand for the number"
+        )
+    scene = _opened_scene("strokes", options.mesh)
+    for frame in frames:
+        if frame is None:
+            _sketch(options, scene, options.output)
+            continue
+        scene.frame_set(frame)
+        try:
+            _sketch(options, scene, _numbered(options.output, frame))
+        except RosyError as error:
+            raise RosyError(f"frame {frame}: {error}") from None
+
+
+def _numbered(path: Path, frame: int) -> Path:
+    """With the number of a frame for rows of # in the name."""
+    return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
+
+
+def _sketch(options: argparse.Namespace, scene: Any, path: Path) -> None:
+    """What the button does, with other settings where options are given."""
+    import bpy
+
+    from .scene.bodies import rosy_objects
+    from .scene.cameras import frame_camera
+    from .scene.strokes import manner_of, pen_of, wanted_objects
+    from .sketch import sketch
+
+    if options.camera is not None:
+        camera = _camera_object(scene, options.camera)
+    else:
+        camera = None if options.frames is None else frame_camera(scene, scene.frame_current)
+    settings, layer = scene.rosy.strokes, bpy.context.view_layer
+    named = options.object is not None
+    made = sketch(
+        scene,
+        kind="SVG",
+        path=path.resolve(),
+        objects=rosy_objects(layer, options.object) if named else wanted_objects(scene, layer),
+        camera=camera,
+        manner=_manner(options, manner_of(settings)),
+        pen=_pen(options, pen_of(settings)),
+        size=options.size,
+    )
+    print(f"{made.camera}: {made.path}", flush=True)
+
+
+def _check_not_given(options: argparse.Namespace, defaults: dict[str, Any], others: str) -> None:
+    """Refuse what is not for the kind of file that is drawn."""
+    for name, default in defaults.items():
+        if getattr(options, name) != default:
+            option = "FIELD" if name == "field" else "--" + name.replace("_", "-")
+            raise RosyError(f"{options.mesh or 'what is open'}: {option} is for {others}")
+
+
+def _manner(options: argparse.Namespace, base: Manner) -> Manner:
     """How strokes are laid, by the options that are named as its fields."""
-    wished = {entry.name: getattr(options, entry.name, entry.default) for entry in fields(Manner)}
-    if options.distance is None:
-        return Manner(**{**wished, "unit": "pixels", "distance": Manner.distance})
-    return Manner(**{**wished, "unit": "length"})
+    given = vars(options)
+    wished = {entry.name: given[entry.name] for entry in fields(Manner) if entry.name in given}
+    if "spacing" in given or "distance" in given:
+        wished["unit"] = "length" if "distance" in given else "pixels"
+    return replace(base, **wished)
+
+
+def _pen(options: argparse.Namespace, base: Pen) -> Pen:
+    """How strokes are drawn."""
+    given = vars(options)
+    wished = {name: given[name] for name in ("width", "millimetres", "plotter") if name in given}
+    if "colours" in given:
+        wished |= {"colours": given["colours"].split(","), "outline": None}
+    if given.get("plotter"):
+        wished["paper"] = None
+    elif "paper" in given:
+        wished["paper"] = Pen.paper if given["paper"] else None
+    return replace(base, **wished)
 
 
 def _encoder(path: Path) -> Encoder | None:
@@ -280,24 +367,15 @@ def bake(options: argparse.Namespace) -> None:
         _spread(options)
         if not options.save:
             return
-    try:
-        import bpy
-    except ImportError:
-        raise RosyError(
-            "bake needs Blender: start it as `blender -b SCENE.blend --command rosy bake`, "
-            "or install its Python module, bpy"
-        ) from None
+    scene = _opened_scene("bake", options.scene)
+    import bpy
+
     from .bake import bake as bake_scene
     from .scene.apply import settings_of
     from .scene.bodies import rosy_objects
-    from .scene.files import open_file, save_file
+    from .scene.files import save_file
     from .scene.looks import look_of
-    from .ui.properties import ensure_registered
 
-    ensure_registered()
-    if options.scene is not None:
-        open_file(options.scene)
-    scene = bpy.context.scene
     settings = settings_of(scene)
     if options.device is not None:
         settings = replace(settings, device=options.device)
@@ -321,6 +399,24 @@ def bake(options: argparse.Namespace) -> None:
         print(f"{picture.camera}: {place}")
     if options.save:
         print(save_file())
+
+
+def _opened_scene(verb: str, path: Path | None) -> Any:
+    """The scene of a Blender file, or of what is open."""
+    try:
+        import bpy
+    except ImportError:
+        raise RosyError(
+            f"{verb} needs Blender: start it as `blender -b SCENE.blend --command rosy {verb}`, "
+            "or install its Python module, bpy"
+        ) from None
+    from .scene.files import open_file
+    from .ui.properties import ensure_registered
+
+    ensure_registered()
+    if path is not None:
+        open_file(path)
+    return bpy.context.scene
 
 
 def _check_frames(options: argparse.Namespace) -> None:
@@ -437,14 +533,16 @@ def _cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
 
     if options.all_cameras:
         return scene_cameras(scene)
-    if options.camera is None:
-        return None
-    if options.camera not in scene.objects:
+    return None if options.camera is None else [_camera_object(scene, options.camera)]
+
+
+def _camera_object(scene: Any, name: str) -> Any:
+    if name not in scene.objects:
         names = ", ".join(f"'{thing.name}'" for thing in scene.objects if thing.type == "CAMERA")
         raise RosyError(
-            f"there is no camera '{options.camera}' in scene '{scene.name}', only {names or 'none'}"
+            f"there is no camera '{name}' in scene '{scene.name}', only {names or 'none'}"
         )
-    return [scene.objects[options.camera]]
+    return scene.objects[name]
 
 
 def _mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
@@ -558,7 +656,7 @@ def _setting(text: str) -> tuple[str, Any]:
 
 
 def _camera(options: argparse.Namespace, points: np.ndarray, supersampling: int) -> Camera:
-    width, height = check_size(*options.size)
+    width, height = check_size(*(options.size or DEFAULT_SIZE))
     return orbit_camera(
         points,
         *options.view,
@@ -691,90 +789,111 @@ def _add_tone(verb: argparse.ArgumentParser) -> None:
 
 def _add_strokes(verbs: Any) -> None:
     verb = _verb(verbs, "strokes", strokes)
-    _add_mesh(verb)
+    verb.description += " What is not said of a .blend file is as its scene says."
+    _add_mesh(verb, or_scene=True)
     verb.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
-    _add_view(verb, DEFAULT_SIZE)
+    _add_view(verb, None)
+    verb.add_argument("--object", nargs="+", metavar="NAME", help="of a .blend file, these alone")
+    verb.add_argument("--camera", metavar="NAME", help="of a .blend file; its own if not given")
     verb.add_argument(
+        "--frames",
+        metavar="A-B[:STEP]",
+        help="of a .blend file: a drawing of each, whose number # in the name OUT stand for",
+    )
+    _add_manner(verb)
+    _add_pen(verb)
+
+
+def _add_manner(verb: argparse.ArgumentParser) -> None:
+    """Options named as the fields of `Manner`; those that are not given are not there."""
+    add = partial(verb.add_argument, default=argparse.SUPPRESS)
+    add(
         "--spacing",
         type=_number(0.5, 1e4),
-        default=8.0,
         metavar="PX",
-        help="pixels of the picture between strokes of a family (%(default)g)",
+        help=f"pixels of the picture between strokes of a family ({Manner.spacing:g})",
     )
-    verb.add_argument(
+    add(
         "--distance",
         type=_number(1e-6, 1e6),
         metavar="UNITS",
         help="between strokes of a family in units of the mesh, instead of pixels",
     )
-    verb.add_argument(
+    add(
         "--tone",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
         help="nearer where a light leaves the surface darker, thinner and none where it is bright",
     )
-    verb.add_argument(
+    add(
         "--layering",
         type=_number(0.0, 1.0),
-        default=Manner.layering,
         metavar="AMOUNT",
-        help="with --tone, how much darker it has to be for the next family to begin (%(default)g)",
+        help="with --tone, how much darker it has to be for the next family to begin "
+        f"({Manner.layering:g})",
     )
-    verb.add_argument(
+    add(
         "--light",
-        choices=("headlight", "lamp"),
-        default="headlight",
-        help="the light of --tone: at the camera, or a lamp over the left shoulder (%(default)s)",
+        choices=("headlight", "lamp", "scene"),
+        help="the light of --tone: at the camera, a lamp over the left shoulder, or the lights of a "
+        f".blend file ({Manner.light})",
     )
-    verb.add_argument(
+    add(
         "--curvature",
         type=_number(0.0, 1.0),
-        default=0.0,
         metavar="AMOUNT",
         help="nearer where the surface bends more: 0 to 1",
     )
-    verb.add_argument(
-        "--width",
-        type=_number(0.01, 1e3),
-        default=1.0,
-        metavar="PX",
-        help="of strokes (%(default)g)",
-    )
-    verb.add_argument(
+    add(
         "--taper",
         type=_number(0.0, 1e3),
-        default=0.8,
         metavar="SPACINGS",
-        help="over which strokes get thinner toward their ends (%(default)g)",
+        help=f"over which strokes get thinner toward their ends ({Manner.taper:g})",
     )
-    verb.add_argument(
+    add(
+        "--overshoot",
+        type=_number(0.0, 1e3),
+        metavar="PX",
+        help="by which strokes run on, at most, where the surface or the shade ends or something is "
+        "in front",
+    )
+    add(
         "--gaps",
         type=_number(0.0, 1.0),
-        default=0.0,
         metavar="SPACINGS",
         help="that the lower of two strokes leaves where they cross",
     )
-    verb.add_argument(
-        "--outline", action="store_true", help="silhouettes, creases and borders, as layers"
+    switch = partial(add, action=argparse.BooleanOptionalAction)
+    switch("--outline", help="silhouettes, creases and borders, as layers")
+    switch("--hidden", help="draw what is hidden as well")
+    switch("--cross-creases", help="let strokes go on over sharp edges")
+
+
+def _add_pen(verb: argparse.ArgumentParser) -> None:
+    """Options for the fields of `Pen`; those that are not given are not there."""
+    add = partial(verb.add_argument, default=argparse.SUPPRESS)
+    add(
+        "--width",
+        type=_number(0.01, 1e3),
+        metavar="PX",
+        help=f"of strokes ({Pen.width:g}; of a .blend file, the scene's)",
     )
-    verb.add_argument("--hidden", action="store_true", help="draw what is hidden as well")
-    verb.add_argument(
-        "--cross-creases", action="store_true", help="let strokes go on over sharp edges"
-    )
-    verb.add_argument(
+    add(
         "--plotter",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
         help="lines of one width, in an order in which a pen travels little, without paper",
     )
-    verb.add_argument(
-        "--mm", type=_number(1.0, 1e5), metavar="WIDTH", help="width of the page in millimetres"
+    add(
+        "--mm",
+        dest="millimetres",
+        type=_number(1.0, 1e5),
+        metavar="WIDTH",
+        help="width of the page in millimetres",
     )
-    verb.add_argument(
-        "--colours", default="#000000", metavar="C,C,...", help="of the layers, as SVG names them"
-    )
-    verb.add_argument("--no-paper", action="store_true", help="nothing behind the strokes")
+    add("--colours", metavar="C,C,...", help="of the layers, as SVG names them (#000000)")
+    add("--paper", action=argparse.BooleanOptionalAction, help="white behind the strokes")
 
 
-def _add_view(verb: argparse.ArgumentParser, size: tuple[int, int]) -> None:
+def _add_view(verb: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
     verb.add_argument(
         "--view",
         type=_numbers(2, "AZ,EL"),
@@ -852,8 +971,12 @@ def _verb(verbs: Any, name: str, function: Callable) -> argparse.ArgumentParser:
     return verb
 
 
-def _add_mesh(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("mesh", type=Path, metavar="MESH", help=".obj, .off, .ply or .stl")
+def _add_mesh(verb: argparse.ArgumentParser, *, or_scene: bool = False) -> None:
+    if or_scene:
+        kinds = ".obj, .off, .ply, .stl or .blend; in Blender the open file if not given"
+        verb.add_argument("mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=kinds)
+    else:
+        verb.add_argument("mesh", type=Path, metavar="MESH", help=".obj, .off, .ply or .stl")
     verb.add_argument("field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ))
     verb.add_argument(
         "--degree", type=int, metavar="N", help="1 to 12; 4, or the file's, if not given"

@@ -15,11 +15,12 @@ from mathutils import Matrix
 
 from ..compositor.colour import to_hex
 from ..compositor.hues import PALETTE
+from ..errors import RosyError
 from ..projection.camera import Camera
 from ..strokes.draw import Drawn, Manner, as_lines
 from ..strokes.svg import Pen
 from .apply import all_or_nothing
-from .bodies import MADE
+from .bodies import MADE, rosy_objects
 from .curves import new_curves
 from .looks import exact
 from .pencil import new_pencil
@@ -46,6 +47,25 @@ def pen_of(settings: bpy.types.PropertyGroup) -> Pen:
         plotter=settings.plotter,
         outline=to_hex(settings.outline_colour) if settings.inks == "FAMILIES" else one,
     )
+
+
+def wanted_objects(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
+) -> list[bpy.types.Object]:
+    """The objects that strokes are to be drawn on: all with a field, or those that are selected.
+
+    Raises
+    ------
+    RosyError
+        If none of the selected ones has a field.
+    """
+    found = rosy_objects(view_layer)
+    if not scene.rosy.strokes.selected:
+        return found
+    chosen = [thing for thing in found if thing.select_get(view_layer=view_layer)]
+    if not chosen:
+        raise RosyError("none of the selected objects has a field: select one that has")
+    return chosen
 
 
 def put_strokes(

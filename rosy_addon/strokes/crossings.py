@@ -176,4 +176,4 @@ def cut(strokes: Strokes, stroke: np.ndarray, low: np.ndarray, high: np.ndarray)
         start=np.concatenate([[0], np.cumsum(size)]),
     )
     # A run ends at each stretch, however short.
-    return fuller.runs(kept, split=np.cumsum(kind == -1))
+    return fuller.runs(kept, split=np.cumsum(kind == -1), loose=False)

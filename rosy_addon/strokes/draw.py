@@ -28,7 +28,8 @@ from .density import (
 from .families import label_families
 from .ground import lay_ground
 from .outline import KINDS, outline
-from .seen import on_screen, pixel_size, seen
+from .overshoot import loose_at_edges, overshot
+from .seen import in_frame, on_screen, pixel_size, seen
 from .strokes import COLUMNS, Strokes
 from .svg import Pen, simplified
 from .trace import tracing
@@ -104,6 +105,14 @@ class Manner:
     )
     taper: float = _setting(
         0.8, "Over how many spacings strokes get thinner toward their ends", low=0.0, high=1e3
+    )
+    overshoot: float = _setting(
+        0.0,
+        "Up to how many pixels strokes run on where the surface or the shade ends, or something "
+        "is in front",
+        low=0.0,
+        high=1e3,
+        unit="pixels",
     )
     outline: bool = _setting(False, "Draw silhouettes, creases and borders, too")
     hidden: bool = _setting(False, "Keep what the camera does not see")
@@ -200,6 +209,8 @@ def drawing(
     if framed or not manner.hidden:
         yield Progress(0.85, "finding what is seen")
         strokes = seen(strokes, bodies, camera, hide=not manner.hidden)
+    if manner.overshoot:
+        strokes = _run_on(strokes, bodies, camera, manner, framed)
     if not len(strokes):
         raise RosyError(f"camera '{camera.name}' sees none of the strokes")
     counts = [len(one.names) for one in parts]
@@ -217,16 +228,32 @@ def _on_body(body: Body, camera: Camera, manner: Manner, lights: Sequence[Lamp])
         spacing = by_curvature(body.surface, spacing, manner.curvature)
     strokes = yield from tracing(body, spacing, cross_creases=manner.cross_creases)
     strokes = label_families(strokes, lay_ground(body), camera.view[0, :3])
+    if manner.overshoot:
+        strokes = loose_at_edges(strokes, lay_ground(body, cross_creases=manner.cross_creases))
     if tone is not None:
         here = at_points(strokes, body.surface, tone)
         strokes = weighed_by_tone(strokes, here, manner.layering)
     if manner.gaps:
         strokes = with_gaps(strokes, manner.gaps, weave=True)
     if manner.taper:
-        strokes = strokes.tapered(manner.taper, LEAST_WIDTH)
+        # Those that are to run on get thinner there.
+        at = ~strokes.is_loose if manner.overshoot else None
+        strokes = strokes.tapered(manner.taper, LEAST_WIDTH, at)
     if manner.outline:
         strokes = Strokes.joined(strokes, outline(body, camera))
     return strokes
+
+
+def _run_on(
+    strokes: Strokes, bodies: Sequence[Body], camera: Camera, manner: Manner, framed: bool
+) -> Strokes:
+    """Loose ends run on, up to the frame."""
+    over = None if manner.hidden else bodies
+    strokes = overshot(strokes, camera, manner.overshoot, over)
+    if framed or not manner.hidden:
+        inside = in_frame(on_screen(strokes.points, camera)[0], camera)
+        strokes = strokes.runs(inside, loose=False)
+    return strokes.tapered(manner.taper, LEAST_WIDTH, strokes.is_loose)
 
 
 def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
@@ -239,8 +266,7 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
     spacing = foreshortened(body, camera, pixel_spacing(body, camera, manner.spacing))
     points = body.world_points()
     pixels, _ = on_screen(points, camera)
-    with np.errstate(invalid="ignore"):
-        inside = ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
+    inside = in_frame(pixels, camera)
     if not camera.is_perspective:
         return spacing
     if inside.any():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,12 +85,18 @@ def seen(strokes: Strokes, bodies: Sequence[Body], camera: Camera, *, hide: bool
     """
     strokes = densified(strokes, camera)
     pixels, _ = on_screen(strokes.points, camera)
-    with np.errstate(invalid="ignore"):
-        shown = (pixels >= 0).all(axis=1) & (pixels <= (camera.width, camera.height)).all(axis=1)
+    inside = in_frame(pixels, camera)
+    shown = inside.copy()
     if hide:
-        shown[shown] = ~_hidden(strokes, pixels, shown, bodies, camera)
+        shown[shown] = ~_hidden(strokes, pixels, shown, sight(bodies, camera), camera)
         shown = _without_specks(shown, pixels, strokes.start)
-    return strokes.runs(shown)
+    return strokes.runs(shown, loose=inside)
+
+
+def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
+    """(n,) bool: which of the (n, 2) pixels of `on_screen` are in the frame."""
+    with np.errstate(invalid="ignore"):
+        return ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
 
 
 def densified(strokes: Strokes, camera: Camera) -> Strokes:
@@ -102,6 +109,43 @@ def densified(strokes: Strokes, camera: Camera) -> Strokes:
     return strokes.densified(np.clip(pieces, 1, 4096))
 
 
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What a camera sees at the centres of its pixels, of T triangles, in camera space.
+
+    Attributes
+    ----------
+    triangle : (height, width) int32 ndarray
+        -1 where there is none.
+    depth : (height, width) float64 ndarray
+        Along the camera's axis; infinite where there is none.
+    normal : (T, 3) float64 ndarray
+        Unit, from the order of the corners.
+    offset : (T,) float64 ndarray
+        Of their planes along it.
+    """
+
+    triangle: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    offset: np.ndarray
+
+
+def sight(bodies: Sequence[Body], camera: Camera) -> Sight:
+    """Find what a camera sees of bodies."""
+    corners = np.concatenate([_triangles(body, camera) for body in bodies])
+    flat = corners.reshape(-1, 3)
+    clip = flat @ camera.projection[:, :3].T + camera.projection[:, 3]
+    numbers = np.arange(len(flat), dtype=np.int32).reshape(-1, 3)
+    found = rasterise(clip, numbers, camera.width, camera.height)
+    triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
+    triangle.flat[found.pixel] = found.triangle
+    depth = np.full(triangle.shape, np.inf)
+    depth.flat[found.pixel] = -dot(found.barycentric, corners[found.triangle, :, 2])
+    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return Sight(triangle, depth, normal, dot(normal, corners[:, 0]))
+
+
 def _on_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
     matrix = camera.projection @ camera.view
     return points @ matrix[:, :3].T + matrix[:, 3]
@@ -111,24 +155,13 @@ def _hidden(
     strokes: Strokes,
     pixels: np.ndarray,
     shown: np.ndarray,
-    bodies: Sequence[Body],
+    there: Sight,
     camera: Camera,
 ) -> np.ndarray:
     """For the points that are in the frame."""
-    corners = np.concatenate([_triangles(body, camera) for body in bodies])
-    flat = corners.reshape(-1, 3)
-    clip = flat @ camera.projection[:, :3].T + camera.projection[:, 3]
-    triangles = np.arange(len(flat), dtype=np.int32).reshape(-1, 3)
-    fragments = rasterise(clip, triangles, camera.width, camera.height)
-    owner = np.full(camera.width * camera.height, -1, dtype=np.int32)
-    owner[fragments.pixel] = fragments.triangle
-
     view = camera.view
     points = strokes.points[shown] @ view[:3, :3].T + view[:3, 3]
     normals = strokes.normal[shown] @ view[:3, :3].T
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    plane = unit(cross)
-    offset = dot(plane, corners[:, 0])
     eye = -points if camera.is_perspective else np.broadcast_to((0.0, 0.0, 1.0), points.shape)
     footprint = pixel_size(strokes.points[shown], camera)
     # Outlines follow no member; they are on both sides at once.
@@ -139,11 +172,11 @@ def _hidden(
         for up in (0, 1):
             column = np.clip(low[:, 0] + right, 0, camera.width - 1)
             row = np.clip(low[:, 1] + up, 0, camera.height - 1)
-            triangle = owner[row * camera.width + column]
+            triangle = there.triangle[row, column]
             some = np.maximum(triangle, 0)
-            across = dot(plane[some], eye)
+            across = dot(there.normal[some], eye)
             # How far the point is behind the plane, along the ray.
-            behind = offset[some] - dot(plane[some], points)
+            behind = there.offset[some] - dot(there.normal[some], points)
             length = np.sqrt(dot(eye, eye))
             with np.errstate(divide="ignore", invalid="ignore"):
                 distance = np.where(across != 0, behind / across, 0) * length

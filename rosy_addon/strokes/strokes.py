@@ -54,6 +54,9 @@ class Strokes:
     opacity : (n,) float64 ndarray
     closed : (S,) bool ndarray
         Whether the last point is the first again.
+    loose : (S, 2) bool ndarray or None
+        Whether the line would go on at its first and its last point: something hides it there, its
+        surface ends, or the light lifts the pen. None if all are as long as they are to be.
     """
 
     points: np.ndarray
@@ -69,6 +72,7 @@ class Strokes:
     width: np.ndarray
     opacity: np.ndarray
     closed: np.ndarray
+    loose: np.ndarray | None = None
 
     def __len__(self) -> int:
         """S."""
@@ -89,6 +93,11 @@ class Strokes:
         """(S,) float64."""
         return self.arc[self.start[1:] - 1]
 
+    @property
+    def is_loose(self) -> np.ndarray:
+        """(S, 2) bool: `loose`, also if it is None."""
+        return np.zeros((len(self), 2), dtype=bool) if self.loose is None else self.loose
+
     def between(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(n,) float64: how far pairs of points of a stroke are apart along it, world space.
 
@@ -107,17 +116,27 @@ class Strokes:
         start = np.concatenate([[0], np.cumsum(count)])
         point = np.arange(start[-1]) + np.repeat(self.start[:-1][strokes] - start[:-1], count)
         return replace(
-            self._at(point), start=start, family=self.family[strokes], closed=self.closed[strokes]
+            self._at(point),
+            start=start,
+            family=self.family[strokes],
+            closed=self.closed[strokes],
+            loose=self.is_loose[strokes],
         )
 
     def _at(self, point: np.ndarray) -> Strokes:
         """Columns of the points at some of them; strokes are left as they are."""
         return replace(self, **{name: getattr(self, name)[point] for name in COLUMNS})
 
-    def runs(self, kept: np.ndarray, split: np.ndarray | None = None) -> Strokes:
+    def runs(
+        self,
+        kept: np.ndarray,
+        split: np.ndarray | None = None,
+        loose: np.ndarray | bool = True,
+    ) -> Strokes:
         """What is left of strokes where (n,) points are kept: runs of two points or more.
 
-        Runs also end where the (n,) numbers of `split` change.
+        Runs also end where the (n,) numbers of `split` change. Next to points that are left out
+        they are loose if these, or all, are said to be.
         """
         stroke = self.stroke
         begins = kept.copy()
@@ -131,16 +150,21 @@ class Strokes:
         point = np.flatnonzero(kept)
         point = point[long[run[point]]]
         first = np.flatnonzero(begins)[long]
-        whole = count[long] == np.diff(self.start)[stroke[first]]
+        owner = stroke[first]
+        ends = np.stack([first, first + count[long] - 1], axis=1)
+        own = np.stack([self.start[owner], self.start[owner + 1] - 1], axis=1)
+        beside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
+        whole = count[long] == np.diff(self.start)[owner]
         return replace(
             self._at(point),
             start=np.concatenate([[0], np.cumsum(count[long])]),
-            family=self.family[stroke[first]],
-            closed=self.closed[stroke[first]] & whole,
+            family=self.family[owner],
+            closed=self.closed[owner] & whole,
+            loose=np.where(ends == own, self.is_loose[owner], (loose & ~kept)[beside]),
         )
 
-    def tapered(self, length: float, least: float = 0.0) -> Strokes:
-        """Thinner toward both ends.
+    def tapered(self, length: float, least: float = 0.0, at: np.ndarray | None = None) -> Strokes:
+        """Thinner toward their ends.
 
         Parameters
         ----------
@@ -148,11 +172,14 @@ class Strokes:
             Over which the width grows, in spacings; at most half of the stroke.
         least : float
             Width at the very ends, from 0 to 1.
+        at : (S, 2) bool ndarray, optional
+            At which of the ends; at both if not given.
         """
         arc, stroke = self.arc, self.stroke
         total = self.length[stroke]
         reach = np.minimum(length * self.spacing, total / 2)
-        to_end = np.minimum(arc, total - arc)
+        first, last = (True, True) if at is None else at[stroke].T
+        to_end = np.minimum(np.where(first, arc, np.inf), np.where(last, total - arc, np.inf))
         share = np.clip(to_end / np.where(reach > 0, reach, 1), 0, 1)
         share[self.closed[stroke] | (reach <= 0)] = 1
         smooth = share * share * (3 - 2 * share)
@@ -187,11 +214,13 @@ class Strokes:
     @staticmethod
     def joined(some: Strokes, more: Strokes) -> Strokes:
         """Both, the families of the second counted on from those of the first."""
+        loose = np.concatenate([some.is_loose, more.is_loose])
         return Strokes(
             points=np.concatenate([some.points, more.points]),
             start=np.concatenate([some.start, more.start[1:] + some.start[-1]]),
             family=np.concatenate([some.family, more.family + len(some.names)]),
             names=some.names + more.names,
+            loose=loose,
             **{
                 name: np.concatenate([getattr(some, name), getattr(more, name)])
                 for name in (*COLUMNS[1:], "closed")

@@ -149,7 +149,8 @@ def _plotted(pixels: np.ndarray, strokes: Strokes) -> list[str]:
     for stroke, back in zip(order.tolist(), turned.tolist(), strict=True):
         part = slice(strokes.start[stroke], strokes.start[stroke + 1])
         points = pixels[part][kept[part]]
-        paths.append(f'<path d="{_path(points[::-1] if back else points)}"/>')
+        points = points[::-1] if back else points
+        paths.append(f'<path d="{_path(points, strokes.closed[stroke])}"/>')
     return paths
 
 
@@ -176,7 +177,8 @@ def _drawn(pixels: np.ndarray, strokes: Strokes, width: float, colour: str) -> l
         if whole[piece] and most[piece] - least[piece] <= SAME_WIDTH * width / 2:
             wide = 2 * most[piece]
             more += "" if wide > (1 - SAME_WIDTH) * width else f' stroke-width="{wide:.3g}"'
-            paths.append(f'<path{more} d="{_path(flat[part])}"/>')
+            closed = strokes.closed[strokes.stroke[first[piece]]]
+            paths.append(f'<path{more} d="{_path(flat[part], closed)}"/>')
         else:
             more += f' fill={quoteattr(colour)} stroke="none"'
             ends = radius[part][[0, -1]] * whole[piece]
@@ -248,8 +250,9 @@ def _turn(radius: float) -> str:
     return f"A{radius:.2f},{radius:.2f} 0 0 1 " if radius >= 0.05 else "L"
 
 
-def _path(points: np.ndarray) -> str:
-    return f"M{_listed(points)}"
+def _path(points: np.ndarray, closed: bool) -> str:
+    """A line; of a closed one the last point is the first and is not said again."""
+    return f"M{_listed(points[:-1])}Z" if closed else f"M{_listed(points)}"
 
 
 def _listed(points: np.ndarray) -> str:

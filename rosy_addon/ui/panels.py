@@ -512,7 +512,7 @@ STROKE_ICONS = {
 #: Settings of strokes that are folded away.
 STROKE_GROUPS = {
     "Density": ("tone", "light", "layering", "curvature"),
-    "Ends": ("taper", "gaps", "cross_creases"),
+    "Ends": ("taper", "overshoot", "gaps", "cross_creases"),
     "Inks": ("inks", "ink_colour", "outline_colour"),
 }
 

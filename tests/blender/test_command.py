@@ -59,6 +59,18 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path, words, named):
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_strokes_of_the_file(saved, tmp_path):
+    bpy.context.scene.rosy.strokes.spacing = 9.0
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.rosy.strokes(kind="SVG", filepath=str(tmp_path / "button.svg"))
+    for words, scene in (([], saved), ([saved], None)):
+        out = tmp_path / "out.svg"
+        status, said = command("strokes", *words, "-o", out, scene=scene)
+        assert status == 0, said
+        assert out.read_bytes() == (tmp_path / "button.svg").read_bytes()
+        out.unlink()
+
+
 def test_an_unknown_verb_is_refused():
     status, said = command("paint")
     assert status == 2

@@ -50,8 +50,10 @@ def ink_of_svg(path, width, height, fine=6):
     for group in ElementTree.parse(path).getroot().findall(SVG + "g"):
         for line in group.findall(SVG + "path"):
             r = float(line.get("stroke-width", group.get("stroke-width"))) / 2 * fine
-            text = line.get("d")[1:].split()
+            text = line.get("d")[1:].removesuffix("Z").split()
             points = np.array([[float(v) for v in pair.split(",")] for pair in text]) * fine
+            if line.get("d").endswith("Z"):
+                points = np.concatenate([points, points[:1]])
             for a, b in pairwise(points):
                 steps = int(np.hypot(*(b - a)) / 2) + 1
                 for at in a + np.linspace(0, 1, steps + 1)[:, None] * (b - a):

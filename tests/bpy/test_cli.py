@@ -1,4 +1,4 @@
-"""``bake`` on the command line, in Python with Blender's module and in processes of their own."""
+"""``bake`` and ``strokes`` of Blender files on the command line, in Python with Blender's module and in processes of their own."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from pathlib import Path
 
 import bpy
 import pytest
+from rosy.rosy_addon.sketch import sketch
+from rosy.rosy_addon.strokes.svg import Pen
 from scenes import add_camera
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def rosy(*words) -> subprocess.CompletedProcess:
-    """Run ``python -m rosy_addon bake``."""
-    command = [sys.executable, "-m", "rosy_addon", "bake", *map(str, words)]
+def rosy(*words, verb="bake") -> subprocess.CompletedProcess:
+    """Run ``python -m rosy_addon bake``, or another verb."""
+    command = [sys.executable, "-m", "rosy_addon", verb, *map(str, words)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
@@ -83,3 +85,105 @@ def test_what_was_never_saved_cannot_be_saved():
     done = rosy("--save")
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture
+def drawable(saved):
+    """The same file, with settings of strokes that are not those of the command line."""
+    settings = bpy.context.scene.rosy.strokes
+    settings.spacing, settings.width, settings.tone, settings.light = 9.0, 1.7, True, "lamp"
+    settings.inks, settings.outline, settings.overshoot = "FAMILIES", True, 6.0
+    bpy.ops.wm.save_mainfile()
+    return saved
+
+
+def test_strokes_of_a_file_are_what_the_button_draws(drawable, tmp_path):
+    scene = bpy.context.scene
+    before = drawable.read_bytes()
+    for words, more in (
+        ([], {}),
+        (["--camera", "Side", "--size", "120x90"], {"camera": "Side", "size": (120, 90)}),
+    ):
+        wanted = {**more, "camera": scene.objects[more.get("camera", "Camera")]}
+        sketch(scene, kind="SVG", path=tmp_path / "button.svg", **wanted)
+        done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
+        assert done.returncode == 0, done.stderr
+        assert f"{more.get('camera', 'Camera')}: {tmp_path / 'out.svg'}" in done.stdout
+        assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
+    assert drawable.read_bytes() == before
+
+
+def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
+    scene = bpy.context.scene
+    settings = scene.rosy.strokes
+    words = ["--distance", "0.2", "--no-tone", "--taper", "0", "--overshoot", "0"]
+    words += ["--plotter", "--colours", "red,blue"]
+    done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
+    assert done.returncode == 0, done.stderr
+    settings.unit, settings.distance, settings.tone = "length", 0.2, False
+    settings.taper, settings.overshoot = 0.0, 0.0
+    pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
+    sketch(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)
+    assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
+
+
+def test_only_what_is_selected_is_drawn_on_if_the_scene_says_so(drawable, tmp_path):
+    bpy.context.scene.rosy.strokes.selected = True
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.ops.wm.save_mainfile()
+    done = rosy(drawable, "-o", tmp_path / "out.svg", verb="strokes")
+    assert done.returncode == 2 and "none of the selected objects has a field" in done.stderr
+    done = rosy(drawable, "-o", tmp_path / "out.svg", "--object", "Suzanne", verb="strokes")
+    assert done.returncode == 0, done.stderr
+
+
+def test_strokes_of_frames(drawable, tmp_path):
+    monkey = bpy.data.objects["Suzanne"]
+    for frame, turn in ((1, 0.0), (3, 1.0)):
+        monkey.rotation_euler.z = turn
+        monkey.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.wm.save_mainfile()
+    words = "--spacing", "20", "--frames", "1-3:2", "--size", "120x90"
+    done = rosy(drawable, "-o", tmp_path / "out-###.svg", *words, verb="strokes")
+    assert done.returncode == 0, done.stderr
+    drawn = sorted(tmp_path.glob("out-*.svg"))
+    assert [path.name for path in drawn] == ["out-001.svg", "out-003.svg"]
+    assert drawn[0].read_bytes() != drawn[1].read_bytes()
+    alone = rosy(
+        drawable, "-o", tmp_path / "alone.svg", *words[:3], "3", *words[4:], verb="strokes"
+    )
+    assert alone.returncode == 0, alone.stderr
+    assert (tmp_path / "alone.svg").read_bytes() == drawn[1].read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
+        (["--object", "Nobody"], "there is no object 'Nobody'"),
+        (["field.rosy"], "suzanne.blend: FIELD is for mesh files"),
+        (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh is for mesh files"),
+        (["--view", "0,90"], "suzanne.blend: --view is for mesh files"),
+        (["--frames", "1-3"], "out.svg: of several frames, # in the name"),
+        (
+            ["--frames", "9", "--spacing", "9999", "--no-outline"],
+            "frame 9: there is no room for a stroke",
+        ),
+        (["-o", "a.png"], "a.png: strokes are written to .svg files"),
+        (["-o", "/nowhere/a.svg"], "there is no folder /nowhere"),
+    ],
+)
+def test_bad_input_for_strokes_is_one_line(words, wanted, drawable, tmp_path):
+    out = [] if "-o" in words else ["-o", tmp_path / "out.svg"]
+    done = rosy(drawable, *words, *out, verb="strokes")
+    assert done.returncode == 2
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("rosy: ")]
+    assert wanted in line and "Traceback" not in done.stderr
+    assert not (tmp_path / "out.svg").exists()
+
+
+def test_strokes_of_files_that_are_not_there(tmp_path):
+    done = rosy(tmp_path / "none.blend", "-o", tmp_path / "out.svg", verb="strokes")
+    assert done.returncode == 2 and "none.blend: cannot be read: no such file" in done.stderr
+    done = rosy("-o", tmp_path / "out.svg", verb="strokes")
+    assert done.returncode == 2 and "give a mesh file, or SCENE.blend" in done.stderr

@@ -177,6 +177,24 @@ def test_workbench_shows_grease_pencil_of_the_old_kind(workbench, monkey, camera
     assert np.isclose(alpha.mean(), expected.mean(), rtol=0.1)
 
 
+def test_strokes_that_run_on_are_covered_by_nothing(monkey, camera, scene, tmp_path):
+    """Past silhouettes and on what is in front, with that still there."""
+    wall = add_plane("Wall", size=0.5)
+    wall.location = (0.5, -2.0, 0.3)
+    bpy.context.view_layer.update()
+    manner = Manner(spacing=7, overshoot=15)
+    made = sketch(scene, kind="CURVES", manner=manner, pen=Pen(width=2.0))
+    wall.is_holdout = monkey.is_holdout = True
+    alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
+    strokes, eye = made.drawn.strokes, view(scene)
+    radius = pixel_size(strokes.points, eye) * strokes.width
+    expected = coverage(strokes.points, strokes.start, radius, eye)
+    assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
+    assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
+    short = sketch(scene, kind="CURVES", manner=Manner(spacing=7)).drawn.strokes
+    assert len(short) == len(strokes) and strokes.length.sum() > 1.05 * short.length.sum()
+
+
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
 def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
     before = contents()

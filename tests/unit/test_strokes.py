@@ -657,6 +657,28 @@ def test_svg_has_a_layer_a_family_and_a_path_a_stroke():
         assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
+@pytest.mark.parametrize("plotter", [False, True])
+def test_closed_strokes_are_closed_paths(plotter):
+    body = Body(icosphere(4), STILL, axis_field(icosphere(4), 4, (0, 0, 1)))
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
+    drawn = seen(trace(body, 0.15), [body], camera)
+    assert drawn.closed.any() and not drawn.closed.all()
+
+    def paths(strokes):
+        text = svg_text(strokes, camera, Pen(plotter=plotter))
+        return [path.get("d") for path in ElementTree.fromstring(text).iter() if path.get("d")]
+
+    for closed in (True, False):
+        own = drawn.chosen(drawn.closed == closed)
+        assert all(path.endswith("Z") == closed for path in paths(own))
+        for path in paths(own):
+            points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", path), dtype=float)
+            assert not (points[0] == points[-1]).all()
+    # What is cut is open.
+    half = drawn.runs(drawn.points[:, 0] > 0)
+    assert not any(path.endswith("Z") for path in paths(half))
+
+
 def test_outlines_hold_as_much_ink_as_their_strokes():
     """In closed form: the mean width times the length; the round ends are left out."""
     root, drawn = svg_of(width=3.0, paper=None)
@@ -742,6 +764,16 @@ def test_command_line(tmp_path, capsys):
     assert out.read_bytes() == once
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
+    for words, wanted in (
+        (["--camera", "Close"], "ball.obj: --camera is for .blend files"),
+        (["--frames", "1-3"], "ball.obj: --frames is for .blend files"),
+        (["--tone", "--light", "scene"], "ball.obj: has no lights"),
+    ):
+        assert main([*command, "-o", str(out), *words]) == 2
+        assert wanted in capsys.readouterr().err
+    for wanted, words in (("give a mesh file", []), ("needs Blender", ["scene.blend"])):
+        assert main(["strokes", *words, "-o", str(out)]) == 2
+        assert wanted in capsys.readouterr().err
 
 
 # --- what is wrong is said ---------------------------------------------------------------------------

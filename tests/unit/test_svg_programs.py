@@ -20,7 +20,8 @@ from rosy_addon.field.generate import Recipe, generate
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import Body
 from rosy_addon.projection.project import project
-from rosy_addon.strokes.density import by_tone, lambert, pixel_spacing
+from rosy_addon.strokes.density import pixel_spacing
+from rosy_addon.strokes.draw import Manner, draw
 from rosy_addon.strokes.outline import outline
 from rosy_addon.strokes.seen import seen
 from rosy_addon.strokes.strokes import Strokes
@@ -149,6 +150,26 @@ def test_programs_draw_the_strokes_where_the_camera_sees_them(
     assert abs(found.sum() / expected.sum() - 1) < 0.01
 
 
+@pytest.mark.parametrize("program", [browser, inkscape])
+def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
+    """As lines that come back to where they began."""
+    body, camera = scene
+    rings = Body(body.surface, body.matrix, generate(body.surface, "axis", 4))
+    lines = seen(trace(rings, pixel_spacing(rings, camera, 14.0)), [rings], camera)
+    lines = Strokes.joined(lines, seen(outline(body, camera), [body], camera))
+    assert lines.closed.sum() >= 3
+    pictures = []
+    for name, strokes in (
+        ("closed", lines),
+        ("open", replace(lines, closed=np.zeros_like(lines.closed))),
+    ):
+        write_svg(tmp_path / f"{name}.svg", strokes, camera, Pen(width=4.0))
+        program(tmp_path / f"{name}.svg", tmp_path / f"{name}.png")
+        pictures.append(ink_of(tmp_path / f"{name}.png"))
+    assert (tmp_path / "closed.svg").read_text().count("Z") == lines.closed.sum()
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.02
+
+
 @needs_inkscape
 def test_inkscape_finds_a_layer_a_family(drawn, scene, tmp_path):
     svg = tmp_path / "a.svg"
@@ -205,17 +226,15 @@ def test_lines_run_as_in_the_render(program, scene, tmp_path):
 @pytest.mark.parametrize("program", [browser, inkscape])
 def test_strokes_are_as_dark_as_the_render(program, scene, tmp_path):
     body, camera = scene
-    toward = camera.view[:3, :3].T @ LAMP.vector
-    spacing = by_tone(pixel_spacing(body, camera, 4.0), lambert(body, toward))
-    write_svg(
-        tmp_path / "a.svg", seen(trace(body, spacing), [body], camera), camera, Pen(width=2.0)
-    )
+    manner = Manner(spacing=4.0, tone=True, light="lamp")
+    drawn = draw([body], camera, manner, lights=[LAMP]).strokes
+    write_svg(tmp_path / "a.svg", drawn, camera, Pen(width=2.0))
     program(tmp_path / "a.svg", tmp_path / "a.png")
     strokes = ink_of(tmp_path / "a.png")
     picture, inside = rendered(scene, Look(ink="hatch", shading=1.0, light="lamp"), border=4)
     share = np.maximum(gaussian_filter(inside * 1.0, 12), 1e-9)
     far = [gaussian_filter(np.where(inside, ink, 0), 12) / share for ink in (strokes, 1 - picture)]
-    assert np.corrcoef(far[0][inside], far[1][inside])[0, 1] > 0.7
+    assert np.corrcoef(far[0][inside], far[1][inside])[0, 1] > 0.9
 
 
 def rendered(scene, look, border):

@@ -238,7 +238,7 @@ def _manner(options: argparse.Namespace, base: Manner) -> Manner:
     given = vars(options)
     wished = {entry.name: given[entry.name] for entry in fields(Manner) if entry.name in given}
     if "spacing" in given or "distance" in given:
-        wished["unit"] = "length" if "distance" in given else "pixels"
+        wished["unit"] = "world" if "distance" in given else "pixels"
     return replace(base, **wished)
 
 

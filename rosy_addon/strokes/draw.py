@@ -64,7 +64,7 @@ class Manner:
         "What the spacing is counted in",
         options={
             "pixels": "Pixels of the picture",
-            "length": "Blender units, on the surface",
+            "world": "Blender units, on the surface",
         },
     )
     spacing: float = _setting(
@@ -261,7 +261,7 @@ def _spacing(body: Body, camera: Camera, manner: Manner) -> np.ndarray:
 
     Else what is beside the eye, or behind it, would be covered with strokes without end.
     """
-    if manner.unit == "length":
+    if manner.unit == "world":
         return np.full(len(body.surface.vertices), manner.distance)
     spacing = foreshortened(body, camera, pixel_spacing(body, camera, manner.spacing))
     points = body.world_points()

@@ -120,7 +120,7 @@ def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
     words += ["--plotter", "--colours", "red,blue"]
     done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
     assert done.returncode == 0, done.stderr
-    settings.unit, settings.distance, settings.tone = "length", 0.2, False
+    settings.unit, settings.distance, settings.tone = "world", 0.2, False
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
     sketch(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)

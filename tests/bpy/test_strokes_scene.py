@@ -348,7 +348,7 @@ def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
         ("", {"kind": "SVG", "path": "/tmp/a.png"}, "/tmp/a.png: strokes are written to .svg"),
         ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "there is no folder /nowhere"),
         ("", {"manner": Manner(spacing=1e4)}, "no room for a stroke"),
-        ("", {"manner": Manner(unit="length", distance=1e-6)}, "too many"),
+        ("", {"manner": Manner(unit="world", distance=1e-6)}, "too many"),
     ],
 )
 def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoil, more, wanted):

@@ -58,7 +58,7 @@ def test_a_floor_that_runs_on_behind_the_eye_is_drawn():
 def test_spacings_in_units_do_not_ask_the_camera(distance):
     square = Body(plane(8, 8), STILL, generate(plane(8, 8), ALONG_X, 2))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
-    made = draw([square], camera, Manner(unit="length", distance=distance, hidden=True))
+    made = draw([square], camera, Manner(unit="world", distance=distance, hidden=True))
     # The area, 2 by 2, over the distance.
     assert np.isclose(made.strokes.length.sum(), 4 / distance, rtol=0.12)
 
@@ -80,7 +80,7 @@ def test_light_is_that_of_lambert():
 
 
 def test_light_makes_room():
-    manner = Manner(unit="length", distance=0.05, tone=True)
+    manner = Manner(unit="world", distance=0.05, tone=True)
     made = draw([BALL], CAMERA, manner, lights=[LAMP]).strokes
     light = unit(made.points) @ (CAMERA.view[:3, :3].T @ LAMP.vector)
     assert made.spacing[light > 0.8].mean() > 2.5 * made.spacing[light < 0.0].mean()

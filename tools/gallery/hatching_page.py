@@ -91,6 +91,7 @@ def write() -> None:
     bare = _on_a_table(monkey, field)
     save(sheet(_tones(bare)), IMAGES / "hatching-tone.png")
     save(sheet([_ends(bare)]), IMAGES / "hatching-ends.png")
+    save(sheet(_outlines(bare, monkey, field)), IMAGES / "hatching-outline.png")
     save(sheet(_units(monkey, field)), IMAGES / "hatching-units.png")
 
 
@@ -111,6 +112,28 @@ def _ends(bodies: list[Body]) -> list[Panel]:
     return [
         _tone_panel(bodies, replace(look, overshoot=length), f"overshoot {length:g}")
         for length in (0.0, 14.0)
+    ]
+
+
+def _outlines(bodies: list[Body], monkey: Surface, field: RosyField) -> list[list[Panel]]:
+    """Without and with lines along silhouettes, and in other inks."""
+    look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
+    others = {
+        "white-on-black": {"outline": 2.0, "hue": "families"},
+        "engraving": {"outline": 2.0},
+    }
+    return [
+        [
+            _tone_panel(bodies, replace(look, outline=width), f"outline {width:g}")
+            for width in (0.0, 1.6)
+        ],
+        [
+            Panel(
+                _closer(monkey, field, replace(load_preset(name).look, **settings)),
+                f"{name}, outline 2",
+            )
+            for name, settings in others.items()
+        ],
     ]
 
 

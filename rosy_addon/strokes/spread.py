@@ -33,7 +33,7 @@ REACH, COVERED = 1.6, 1.5
 ABEAM = 0.36
 
 #: Shares of the spacing: so near strokes come that meet head on.
-HEAD_ON = 0.55
+HEAD_ON = 0.35
 
 #: A head that may not go a whole step tries halves of it, down to this share.
 LEAST_PACE = 0.2
@@ -73,7 +73,7 @@ class Rules:
 
     nearest: float = 0.75
     farthest: float = 1.24
-    shortest: float = 2.5
+    shortest: float = 1.5
     longest: float = np.inf
 
     def __post_init__(self) -> None:

@@ -27,9 +27,9 @@ WIDEST, NARROWEST = 96.0, 6.0
 #: Share of the heads that are not waited for when new seeds are sown.
 STRAGGLERS = 0.1
 
-#: At first strokes are to be longer than the shortest by so much; what is left of the gaps in the
-#: end is filled with strokes that are nearer by so much than the nearest.
-LONG, TIGHT = 2.0, 0.85
+#: Strokes are to be longer than the shortest by so much at first, and in between; what is left of
+#: the gaps in the end is filled with strokes that are nearer by so much than the nearest.
+LONG, MIDDLE, TIGHT = 3.3, 1.7, 0.85
 
 
 def trace(body: Body, spacing: np.ndarray | float, **more) -> Strokes:
@@ -92,10 +92,10 @@ def growing(growth: Growth) -> Work[None]:
             break
         apart /= 4
         walkers = walkers.take(empty(growth, walkers))
-    growth.reopen(rules)
+    growth.reopen(replace(rules, shortest=MIDDLE * rules.shortest))
     yield from _until_grown(growth, label, STRAGGLERS)
     last = replace(rules, nearest=TIGHT * rules.nearest, farthest=np.inf)
-    growth.resume(last)
+    growth.resume(replace(last, shortest=MIDDLE * rules.shortest))
     yield from _until_grown(growth, label, STRAGGLERS)
     growth.reopen(last)
     yield from _until_grown(growth, label)

@@ -56,6 +56,8 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
         What is left of a stroke and has fewer spacings goes, too.
     """
     bent = (turning(strokes) > MUCH) | (field_turning(ground, strokes) > MUCH)
+    if not len(strokes):
+        return strokes
     # Over folds, too, ends are nearer than they were along the surface.
     bent[strokes.start[:-1]] = bent[strokes.start[1:] - 1] = True
     some = np.unique(strokes.stroke[_around(strokes, bent)])

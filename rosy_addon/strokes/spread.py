@@ -436,6 +436,16 @@ class Growth:
         np.add.at(t.heads, stroke, 1)
         self._join(_Heads(heads, stroke.astype(np.int32), s.arc[number], np.ones(len(stroke))))
 
+    def rest(self) -> None:
+        """End all strokes as if they had given way; nobody is sown beside them before `reopen`."""
+        heads = self.heads
+        end = np.where(heads.walkers.sign > 0, 1, 0)
+        self.strokes.gave_way[heads.stroke, end] = True
+        self._finish(heads.stroke, heads.walkers.sign)
+        self.heads = heads.take(np.empty(0, dtype=np.intp))
+        self.doubtful.append(np.unique(self.open >> 1))
+        self.open = np.empty(0, dtype=np.int64)
+
     def reopen(self, rules: Rules) -> None:
         """Look again, by other rules, where no stroke came to stay."""
         self.rules = rules

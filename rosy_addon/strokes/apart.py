@@ -2,8 +2,8 @@
 
 While strokes grow, their samples keep a distance, half a spacing from one to the next. Where strokes
 bend much within that, at singularities above all, they may come nearer between samples, or change
-from one family to another next to each other. There they are looked at closely when all is drawn,
-and of two that are too near the shorter one gives way.
+from one family to another next to each other. There, and at their ends, they are looked at closely
+when all is drawn, and of two that are too near the shorter one gives way.
 """
 
 from __future__ import annotations
@@ -56,9 +56,10 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
         What is left of a stroke and has fewer spacings goes, too.
     """
     bent = (turning(strokes) > MUCH) | (field_turning(ground, strokes) > MUCH)
-    bent[_meeting_ends(strokes)] = True
-    if not bent.any():
+    if not len(strokes):
         return strokes
+    # Over folds, too, ends are nearer than they were along the surface.
+    bent[strokes.start[:-1]] = bent[strokes.start[1:] - 1] = True
     some = np.unique(strokes.stroke[_around(strokes, bent)])
     point = np.concatenate(
         [np.arange(strokes.start[number], strokes.start[number + 1]) for number in some]
@@ -106,14 +107,6 @@ def field_turning(ground: Ground, strokes: Strokes) -> np.ndarray:
     across = np.einsum("nk,nk->n", slope.imag, z) * here.conj()
     size = np.maximum(ground.degree * np.abs(here) ** 2, 1e-300)
     return strokes.spacing * np.hypot(along.imag, across.imag) / size
-
-
-def _meeting_ends(strokes: Strokes) -> np.ndarray:
-    """Numbers of the last points of strokes that end not far from where they began."""
-    first, last = strokes.start[:-1], strokes.start[1:] - 1
-    gap = strokes.points[last] - strokes.points[first]
-    meets = dot(gap, gap) < (OWN * strokes.spacing[last]) ** 2
-    return last[meets & ~strokes.closed & (strokes.length > 2 * OWN * strokes.spacing[last])]
 
 
 def _around(strokes: Strokes, bent: np.ndarray) -> np.ndarray:

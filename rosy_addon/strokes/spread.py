@@ -33,7 +33,7 @@ REACH, COVERED = 1.6, 1.5
 ABEAM = 0.36
 
 #: Shares of the spacing: so near strokes come that meet head on.
-HEAD_ON = 0.55
+HEAD_ON = 0.35
 
 #: A head that may not go a whole step tries halves of it, down to this share.
 LEAST_PACE = 0.2
@@ -73,7 +73,7 @@ class Rules:
 
     nearest: float = 0.75
     farthest: float = 1.24
-    shortest: float = 2.5
+    shortest: float = 1.5
     longest: float = np.inf
 
     def __post_init__(self) -> None:
@@ -435,6 +435,16 @@ class Growth:
         t.parent[stroke[t.heads[stroke] == 0]] = -1
         np.add.at(t.heads, stroke, 1)
         self._join(_Heads(heads, stroke.astype(np.int32), s.arc[number], np.ones(len(stroke))))
+
+    def rest(self) -> None:
+        """End all strokes as if they had given way; nobody is sown beside them before `reopen`."""
+        heads = self.heads
+        end = np.where(heads.walkers.sign > 0, 1, 0)
+        self.strokes.gave_way[heads.stroke, end] = True
+        self._finish(heads.stroke, heads.walkers.sign)
+        self.heads = heads.take(np.empty(0, dtype=np.intp))
+        self.doubtful.append(np.unique(self.open >> 1))
+        self.open = np.empty(0, dtype=np.int64)
 
     def reopen(self, rules: Rules) -> None:
         """Look again, by other rules, where no stroke came to stay."""

@@ -14,6 +14,7 @@ from .apart import kept_apart
 from .families import label_families
 from .ground import lay_ground, nearest_member, on_corners
 from .loops import closed_up
+from .poles import around_singularities
 from .spread import FEW, PAUSE, Growth, Rules
 from .strokes import Strokes
 from .walk import Walkers
@@ -27,9 +28,13 @@ WIDEST, NARROWEST = 96.0, 6.0
 #: Share of the heads that are not waited for when new seeds are sown.
 STRAGGLERS = 0.1
 
-#: At first strokes are to be longer than the shortest by so much; what is left of the gaps in the
-#: end is filled with strokes that are nearer by so much than the nearest.
-LONG, TIGHT = 2.0, 0.85
+#: Strokes are to be longer than the shortest by so much at first, and in between; what is left of
+#: the gaps in the end is filled with strokes that are nearer by so much than the nearest.
+LONG, MIDDLE, TIGHT = 3.3, 1.7, 0.85
+
+#: Steps that strokes around singularities go at first, and shares of the spacing that they are apart
+#: until then, at least.
+AWAY, CROWDED = 6, 0.6
 
 
 def trace(body: Body, spacing: np.ndarray | float, **more) -> Strokes:
@@ -82,7 +87,14 @@ def growing(growth: Growth) -> Work[None]:
     """Sow, and let grow, until there is no room left."""
     label = "growing strokes"
     rules = growth.rules
+    growth.rules = replace(rules, nearest=min(CROWDED, rules.nearest), farthest=np.inf)
+    growth.sow(around_singularities(growth.ground, growth.spacing))
+    for _ in range(AWAY):
+        if len(growth.heads.stroke):
+            growth.step()
+    growth.rest()
     walkers = probes(growth)
+    walkers = walkers.take(empty(growth, walkers))
     apart = WIDEST
     growth.rules = replace(rules, shortest=LONG * rules.shortest)
     while len(walkers):
@@ -92,10 +104,10 @@ def growing(growth: Growth) -> Work[None]:
             break
         apart /= 4
         walkers = walkers.take(empty(growth, walkers))
-    growth.reopen(rules)
+    growth.reopen(replace(rules, shortest=MIDDLE * rules.shortest))
     yield from _until_grown(growth, label, STRAGGLERS)
     last = replace(rules, nearest=TIGHT * rules.nearest, farthest=np.inf)
-    growth.resume(last)
+    growth.resume(replace(last, shortest=MIDDLE * rules.shortest))
     yield from _until_grown(growth, label, STRAGGLERS)
     growth.reopen(last)
     yield from _until_grown(growth, label)

@@ -37,6 +37,7 @@ from rosy_addon.strokes.evenness import side_gaps
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.ground import lay_ground
 from rosy_addon.strokes.outline import outline
+from rosy_addon.strokes.poles import singularities
 from rosy_addon.strokes.seen import on_screen, seen
 from rosy_addon.strokes.spread import Rules
 from rosy_addon.strokes.strokes import Strokes
@@ -309,6 +310,59 @@ def test_none_is_too_near_around_singularities(degree):
     body = body_of(icosphere(4), degree, kind="smoothest")
     drawn = trace(body, 0.09)
     assert not len(too_near(drawn, degree // 2))
+
+
+def singular_body(degree, sign, at, phase):
+    """In the plane, with one singularity, of index sign / degree: z^(sign / degree)."""
+    surface = plane(50, 50)
+    middle = surface.vertices[surface.corner_vertex].reshape(-1, 4, 3).mean(axis=1)
+    around = np.arctan2(middle[:, 1] - at[1], middle[:, 0] - at[0])
+    angle = sign * around / degree + phase
+    way = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    return Body(surface, STILL, RosyField(degree, way))
+
+
+def nearest_passes(strokes, at):
+    """Where strokes pass a point: by how many spacings, and on which side of it (radians)."""
+    found = []
+    for points, _, _, spacing, _, _ in _cut_finely(strokes):
+        off = points[:, :2] - at
+        radius = np.linalg.norm(off, axis=1) / spacing
+        least = int(np.argmin(radius))
+        if 0 < least < len(radius) - 1:
+            found.append((radius[least], np.arctan2(off[least, 1], off[least, 0])))
+    return np.array(sorted(found)).reshape(-1, 2)
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("phase", [0.3, 1.1])
+def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
+    """In closed form: N - 1 or N + 1 sectors, turned by equal angles, each with a stroke as near."""
+    body = singular_body(degree, sign, (0.013, -0.007), phase)
+    ground, drawn = lay_ground(body), trace(body, 0.08)
+    triangle, weights, index = singularities(ground)
+    assert np.allclose(index, sign / degree) and len(index) == 1
+    at = ground.place(triangle, weights)[0, :2]
+    assert np.linalg.norm(at - (0.013, -0.007)) < 0.02
+    sectors = degree - sign
+    radius, side = nearest_passes(drawn, at)[:sectors].T
+    assert len(radius) == sectors
+    assert radius.max() < 1.2 and radius.max() / radius.min() < 1.05
+    turn = np.diff(np.sort(side), append=np.sort(side)[0] + 2 * np.pi)
+    assert np.abs(np.degrees(turn) - 360 / sectors).max() < 8
+    gaps = side_gaps(ground, drawn)
+    near = np.linalg.norm(drawn.points[gaps.point, :2] - at, axis=1) < 5 * 0.08
+    gap = gaps.gap[near][gaps.free[near]]
+    assert np.mean(np.abs(gap - 1) <= 0.25) > (0.6 if degree == 2 else 0.8)
+    assert not len(too_near(drawn, degree // 2))
+
+
+def test_singularities_are_found():
+    """Their indices sum up to what Poincare and Hopf say."""
+    for degree in (1, 2, 3, 4, 6):
+        ground = lay_ground(body_of(icosphere(3), degree, kind="smoothest"))
+        assert np.isclose(singularities(ground)[2].sum(), 2)
 
 
 def test_what_is_too_near_is_cut_back():

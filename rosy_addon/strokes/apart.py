@@ -2,8 +2,9 @@
 
 While strokes grow, their samples keep a distance, half a spacing from one to the next. Where strokes
 bend much within that, at singularities above all, they may come nearer between samples, or change
-from one family to another next to each other. There, and at their ends, they are looked at closely
-when all is drawn, and of two that are too near the shorter one gives way.
+from one family to another next to each other; over folds they are nearer than they were along the
+surface. There, and where ends may meet, they are looked at closely when all is drawn, and of two that
+are too near the shorter one gives way.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ FINE = 0.1
 #: Radians by which a stroke, or the field, turns within a spacing where it is looked at closely.
 MUCH = np.radians(18)
 
+#: The same of the surface under them, and that under their ends.
+FOLD, FOLD_AT_END = np.radians(40), np.radians(12)
+
 #: Around such places others are looked at within so many spacings.
 REACH = 1.0
 
@@ -55,17 +59,16 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
     shortest : float
         What is left of a stroke and has fewer spacings goes, too.
     """
-    bent = (turning(strokes) > MUCH) | (field_turning(ground, strokes) > MUCH)
-    if not len(strokes):
+    bent = _looked_at(ground, strokes)
+    if not bent.any():
         return strokes
-    # Over folds, too, ends are nearer than they were along the surface.
-    bent[strokes.start[:-1]] = bent[strokes.start[1:] - 1] = True
-    some = np.unique(strokes.stroke[_around(strokes, bent)])
+    around = _around(strokes, bent)
+    some = np.unique(strokes.stroke[around])
     point = np.concatenate(
         [np.arange(strokes.start[number], strokes.start[number + 1]) for number in some]
     )
     close = strokes.chosen(some)
-    fine, whence = _fine(close)
+    fine, whence = _fine(close, np.isin(point, around))
     too_near = _too_near(ground, fine, bent[point][whence], close.length)
     if not too_near.any():
         return strokes
@@ -84,6 +87,26 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
     whole[some[hit]] = False
     joined = Strokes.joined(strokes.chosen(whole), left)
     return replace(joined, family=np.zeros(len(joined), dtype=np.int32), names=strokes.names)
+
+
+def _looked_at(ground: Ground, strokes: Strokes) -> np.ndarray:
+    """(n,) bool: the points of strokes beside which others may be too near."""
+    fold = surface_turning(ground, strokes)
+    bent = (turning(strokes) > MUCH) | (field_turning(ground, strokes) > MUCH) | (fold > FOLD)
+    ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
+    gap = strokes.points[ends[:, 1]] - strokes.points[ends[:, 0]]
+    near = OWN * strokes.spacing[ends[:, 1]]
+    meets = (dot(gap, gap) < near**2) & (strokes.length > 2 * near) & ~strokes.closed
+    bent[ends] |= (fold[ends] > FOLD_AT_END) | meets[:, None]
+    return bent
+
+
+def surface_turning(ground: Ground, strokes: Strokes) -> np.ndarray:
+    """(n,) radians by which shading normals turn within a spacing, whichever way one goes."""
+    slope, normal = ground.gradient[strokes.triangle], ground.corner_normal[strokes.triangle]
+    along = np.einsum("nk,nki->ni", slope.real, normal)
+    across = np.einsum("nk,nki->ni", slope.imag, normal)
+    return strokes.spacing * np.sqrt(dot(along, along) + dot(across, across))
 
 
 def turning(strokes: Strokes) -> np.ndarray:
@@ -121,10 +144,11 @@ def _around(strokes: Strokes, bent: np.ndarray) -> np.ndarray:
     return np.flatnonzero(np.isin(cells @ stride, np.unique(middle[:, None] + offset)))
 
 
-def _fine(strokes: Strokes) -> tuple[Strokes, np.ndarray]:
-    """With points at most `FINE` spacings apart; and the point at or after each, as it was."""
+def _fine(strokes: Strokes, where: np.ndarray) -> tuple[Strokes, np.ndarray]:
+    """With points at most `FINE` spacings apart around some; and the point at or after each, as it was."""
     step = np.diff(strokes.arc, prepend=0)
     step[strokes.start[:-1]] = 0
+    step[1:][~(where[1:] | where[:-1])] = 0
     pieces = np.ceil(step / (FINE * strokes.spacing)).clip(1, 1000).astype(np.int64)
     return strokes.densified(pieces), np.repeat(np.arange(len(pieces)), pieces)
 

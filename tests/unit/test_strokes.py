@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
@@ -414,7 +413,7 @@ def test_circles_of_latitude_close():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("ROSY_LONG" not in os.environ, reason="minutes: set ROSY_LONG")
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [2, 4, 6])
 def test_spacing_on_the_bunny(shared_data, degree):
     surface = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")

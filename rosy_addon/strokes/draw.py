@@ -25,6 +25,7 @@ from .density import (
     pixel_spacing,
     weighed_by_tone,
 )
+from .ends import meeting
 from .families import label_families
 from .ground import lay_ground
 from .outline import KINDS, outline
@@ -104,7 +105,10 @@ class Manner:
         0.0, "Gap in the lower of two strokes where they cross, in spacings", low=0.0, high=1.0
     )
     taper: float = _setting(
-        0.8, "Over how many spacings strokes get thinner toward their ends", low=0.0, high=1e3
+        0.8,
+        "Over how many spacings strokes get thinner toward their ends, but where two meet head on",
+        low=0.0,
+        high=1e3,
     )
     overshoot: float = _setting(
         0.0,
@@ -236,8 +240,10 @@ def _on_body(body: Body, camera: Camera, manner: Manner, lights: Sequence[Lamp])
     if manner.gaps:
         strokes = with_gaps(strokes, manner.gaps, weave=True)
     if manner.taper:
-        # Those that are to run on get thinner there.
-        at = ~strokes.is_loose if manner.overshoot else None
+        at = ~meeting(strokes)
+        if manner.overshoot:
+            # Those that are to run on get thinner there.
+            at &= ~strokes.is_loose
         strokes = strokes.tapered(manner.taper, LEAST_WIDTH, at)
     if manner.outline:
         strokes = Strokes.joined(strokes, outline(body, camera))

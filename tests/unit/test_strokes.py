@@ -32,6 +32,7 @@ from rosy_addon.strokes.density import (
     pixel_spacing,
     weighed_by_tone,
 )
+from rosy_addon.strokes.ends import meeting
 from rosy_addon.strokes.evenness import side_gaps
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.ground import lay_ground
@@ -364,6 +365,26 @@ def test_singularities_are_found():
         assert np.isclose(singularities(ground)[2].sum(), 2)
 
 
+def by_hand(lines, ways, spacing):
+    """Strokes in a plane, of (S, n, 3) points and (S n, 3) directions."""
+    count, size = len(lines), lines.shape[0] * lines.shape[1]
+    return Strokes(
+        points=lines.reshape(-1, 3),
+        start=np.arange(count + 1) * lines.shape[1],
+        family=np.zeros(count, dtype=np.int32),
+        names=("family 1",),
+        face=np.zeros(size, dtype=np.int32),
+        triangle=np.zeros(size, dtype=np.int32),
+        weights=np.full((size, 3), 1 / 3),
+        normal=np.tile((0, 0, 1.0), (size, 1)),
+        member=ways,
+        spacing=np.full(size, spacing),
+        width=np.ones(size),
+        opacity=np.ones(size),
+        closed=np.zeros(count, dtype=bool),
+    )
+
+
 def test_what_is_too_near_is_cut_back():
     """Concentric arcs put by hand, 0.3 and 0.8 spacings apart: the shorter of the first two goes."""
     body = body_of(plane(), 2)
@@ -372,21 +393,7 @@ def test_what_is_too_near_is_cut_back():
     radius = spacing * np.array([1.0, 1.3, 2.1])
     arcs = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     ways = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=1)
-    lines = Strokes(
-        points=(radius[:, None, None] * arcs).reshape(-1, 3),
-        start=np.arange(4) * 200,
-        family=np.zeros(3, dtype=np.int32),
-        names=("family 1",),
-        face=np.zeros(600, dtype=np.int32),
-        triangle=np.zeros(600, dtype=np.int32),
-        weights=np.full((600, 3), 1 / 3),
-        normal=np.tile((0, 0, 1.0), (600, 1)),
-        member=np.tile(ways, (3, 1)),
-        spacing=np.full(600, spacing),
-        width=np.ones(600),
-        opacity=np.ones(600),
-        closed=np.zeros(3, dtype=bool),
-    )
+    lines = by_hand(radius[:, None, None] * arcs, np.tile(ways, (3, 1)), spacing)
     assert len(too_near(lines, 1))
     left = kept_apart(ground, lines, 0.5)
     assert not len(too_near(left, 1))
@@ -606,6 +613,30 @@ def test_taper_and_closed_strokes():
     drawn = trace(body_of(plane(), 2), 0.1).tapered(2.0, 0.2)
     assert np.allclose(drawn.width[drawn.start[:-1]], 0.2)
     assert drawn.width.max() == 1.0 and (drawn.width >= 0.2 - 1e-9).all()
+
+
+def test_ends_that_meet_head_on_are_not_thinned():
+    """Of two strokes nearly in line, half a spacing apart, one beside them, and one across."""
+    along = np.linspace(0, 1, 11)[:, None] * np.array([1.0, 0, 0])
+    spacing, off = 0.1, (0, 0.05, 0)
+    lines = [
+        along,
+        along + (1.05, 0, 0) + off,
+        along + (0, 0.1, 0),
+        along[:, [1, 0, 2]] + (1.02, 0, 0),
+    ]
+    ways = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
+    strokes = by_hand(np.array(lines), ways, spacing)
+    # The third one's last end is beside that of the first, and meets the second one as well.
+    assert meeting(strokes).tolist() == [
+        [False, True],
+        [True, False],
+        [False, True],
+        [False, False],
+    ]
+    thin = strokes.tapered(2.0, 0.2, ~meeting(strokes))
+    ends = np.stack([thin.width[thin.start[:-1]], thin.width[thin.start[1:] - 1]], axis=1)
+    assert np.allclose(ends, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])
 
 
 def test_gaps_at_crossings():

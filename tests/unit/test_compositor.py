@@ -176,7 +176,7 @@ def along_field_autocorrelation(image, angles, chosen, lag):
 )
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
 def test_breaking_points_do_not_show(degree, way):
-    size, guides = 384, 6
+    size, guides = 384, 4
     x, _ = pixel_centres(size)
     # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
     angles = 3 * 2 * np.pi / degree * x / size

@@ -464,7 +464,7 @@ def half_dark(method, overshoot):
     return drawn(thing, camera, look)[..., :-1, 0]
 
 
-@pytest.mark.parametrize("method", ["sheets", "members", "brute"])
+@pytest.mark.parametrize("method", ["sheets", *long("members", "brute")])
 def test_lines_run_on_past_the_border_of_a_tone(method):
     """So that each column has the mean tone of those as near: a ramp as wide as twice the over-shoot."""
     reach = 24.0
@@ -531,7 +531,7 @@ MOTIONS = {
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("ink", ["soft", "hatch", "uneven"])
+@pytest.mark.parametrize("ink", ["hatch", *long("soft", "uneven")])
 def test_streaks_stay_on_the_surface(motion, ink):
     # Even light: what moves with the lamp is not what is asked about.
     look = replace(INK, light="scene", shading=0.35, gain=1.2, crispness=0.5)
@@ -562,7 +562,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     thing = Body(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     widths = []
-    for zoom in 2.0 ** np.arange(0, 4.01, 0.5):
+    for zoom in 2.0 ** np.array([0, 0.3, 0.7, 1.5, 2.75, 4]):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
@@ -607,7 +607,9 @@ def test_near_lines_are_wider_than_far_ones_of_one_picture():
     assert abs(near.mean() - 0.5) < 0.05 and abs(far.mean() - 0.5) < 0.05
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(
+    "motion", ["zoomed", *long(*(name for name in MOTIONS if name != "zoomed"))]
+)
 def test_lines_in_blender_units_stay_on_the_surface(motion):
     look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
     assert likeness(*MOTIONS[motion](), look) >= 0.9

@@ -112,7 +112,7 @@ def autocorrelations(image, angle, lags):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
+@pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
 def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
     lags = np.array([1.0, 2.0, 3.0, 4.0])
     spread, curves = [], []

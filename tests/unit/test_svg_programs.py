@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import long
 from PIL import Image
 from scipy.ndimage import binary_erosion, gaussian_filter, sobel
 from shapes import plane, torus
@@ -210,7 +211,7 @@ def test_where_strokes_are_half_clear_there_is_half_the_ink(program, tmp_path):
     assert abs(right.sum() / left.sum() - 0.5) < 0.02
 
 
-@pytest.mark.parametrize("program", [browser, inkscape])
+@pytest.mark.parametrize("program", [browser, *long(inkscape)])
 def test_lines_run_as_in_the_render(program, scene, tmp_path):
     body, camera = scene
     lines = seen(trace(body, pixel_spacing(body, camera, 5.0)), [body], camera)
@@ -223,7 +224,7 @@ def test_lines_run_as_in_the_render(program, scene, tmp_path):
     assert np.cos(np.radians(2 * off)).mean() > 0.93
 
 
-@pytest.mark.parametrize("program", [browser, inkscape])
+@pytest.mark.parametrize("program", [inkscape, *long(browser)])
 def test_strokes_are_as_dark_as_the_render(program, scene, tmp_path):
     body, camera = scene
     manner = Manner(spacing=4.0, tone=True, light="lamp")

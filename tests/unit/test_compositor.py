@@ -174,7 +174,7 @@ def along_field_autocorrelation(image, angles, chosen, lag):
         {"method": "sheets"},
     ],
 )
-@pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
+@pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
 def test_breaking_points_do_not_show(degree, way):
     size, guides = 384, 4
     x, _ = pixel_centres(size)

@@ -94,6 +94,7 @@ def test_a_plane_beneath_a_ball():
     assert np.abs(found - wanted).max() < 0.05
 
 
+@pytest.mark.long
 def test_turned_and_moved_it_is_the_same():
     surface, _ = trough(8)
     turned = np.array([[0, 0, 1.0, 5], [1, 0, 0, -3], [0, 1, 0, 9], [0, 0, 0, 1]])

@@ -84,7 +84,7 @@ def test_the_adjoint():
     np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
-@pytest.mark.parametrize("degree", [1, 4, 6])
+@pytest.mark.parametrize("degree", [4, *long(1, 6)])
 def test_cycles_of_multigrid_approach_the_solution(degree):
     connection = connect(bumpy(icosphere(5)))
     matrix = laplacian(connection, degree, 0.1)
@@ -135,7 +135,7 @@ def test_vertices_where_umbrellas_meet_are_cut():
 def test_energies_on_the_unit_sphere():
     """The smallest eigenvalue on the round sphere is N."""
     connection = connect(random_sphere(25_000))
-    for degree in (1, 2, 4, 6):
+    for degree in (1, 4):
         _, energy = drain(smallest(connection, degree))
         assert energy == pytest.approx(degree, rel=0.01)
 

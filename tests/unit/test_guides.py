@@ -51,7 +51,7 @@ def test_strokes_on_a_sphere_are_followed(degree):
     assert max(off_stroke(BALL, soft, stroke) for stroke in strokes) < 2
 
 
-@pytest.mark.parametrize("reach", [0.0, *long(0.003)])
+@pytest.mark.parametrize("reach", long(0.0, 0.003))
 def test_ten_strokes_on_the_bunny(shared_data, reach):
     bunny = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
     random = np.random.default_rng(3)

@@ -50,12 +50,12 @@ class ROSY_OT_strokes(Ticking, bpy.types.Operator):
             context.scene,
             kind=self.kind if given("kind") else None,
             path=self.filepath if given("filepath") else None,
-            objects=self._objects(context),
+            objects=wanted_objects(context.scene, context.view_layer),
             camera=self._camera(context),
         )
 
     def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return self._objects(context)
+        return wanted_objects(context.scene, context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: Sketch) -> None:
         where = f"'{result.thing.name}'" if result.path is None else str(result.path)
@@ -64,9 +64,6 @@ class ROSY_OT_strokes(Ticking, bpy.types.Operator):
         )
         for note in result.notes:
             self.report({"WARNING"}, note)
-
-    def _objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
-        return wanted_objects(context.scene, context.view_layer)
 
     def _camera(self, context: bpy.types.Context) -> Source | None:
         given = self.properties.is_property_set("camera")

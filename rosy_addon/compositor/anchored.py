@@ -86,8 +86,8 @@ def surface_noise(
         lattice = [_turned(part.at(*tap)) for tap in TAPS]
         _add_cells(total[:, block], lattice, level[block], identity[block], seed, density)
     # Means over so many cells vary as those over as many of the size that is asked for.
-    total /= np.sqrt(np.clip(larger, *EVENED))
-    total *= np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
+    spread = np.float32(DEVIATION / np.sqrt(density * (1 - density)) / len(TAPS))
+    total *= spread / np.sqrt(np.clip(larger, *EVENED))
     if high_pass:
         for values in total:
             values -= _broad(gbuffer, values, BLUR * high_pass)

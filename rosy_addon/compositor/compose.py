@@ -179,26 +179,28 @@ def compose_planar(
     return Picture(_frame(flow.pixel, colour, opaque, flow.width, flow.height, 1), (layers,))
 
 
-def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
-    """`surface_flow`, or that made for the last look if it would be the same."""
-    key = look.crease_angle, look.cross_creases
-    made = gbuffer.made.get(("flow", degree))
+def _kept(gbuffer: GBuffer, name: Any, key: Any, make: Callable[[], Any]) -> Any:
+    """What was made under a name for the last look, or made anew if it would not be the same."""
+    made = gbuffer.made.get(name)
     if made is None or made[0] != key:
-        made = key, surface_flow(gbuffer, degree, look.crease_angle, look.cross_creases)
-        gbuffer.made["flow", degree] = made
+        made = gbuffer.made[name] = key, make()
+    return made[1]
+
+
+def _flow(gbuffer: GBuffer, degree: int, look: Look) -> Flow:
+    """`surface_flow` of a degree, its course wavering if the look's does."""
+    key = look.crease_angle, look.cross_creases
+    flow = _kept(gbuffer, ("flow", degree), key, lambda: surface_flow(gbuffer, degree, *key))
     if not wavers(look):
-        return made[1]
-    own = np.searchsorted(gbuffer.pixel, made[1].pixel)
-    return swayed(made[1], np.float32(look.wobble) * _waver(gbuffer, look)[own])
+        return flow
+    own = np.searchsorted(gbuffer.pixel, flow.pixel)
+    return swayed(flow, np.float32(look.wobble) * _waver(gbuffer, look)[own])
 
 
 def _waver(gbuffer: GBuffer, look: Look) -> np.ndarray:
-    """`waver`, or that made for the last look if it would be the same."""
+    """(P,) `waver` of a look."""
     key = look.anchor, look.grain, look.unit, look.unit_size
-    made = gbuffer.made.get("waver")
-    if made is None or made[0] != key:
-        made = gbuffer.made["waver"] = key, waver(gbuffer, look)
-    return made[1]
+    return _kept(gbuffer, "waver", key, lambda: waver(gbuffer, look))
 
 
 def _images_of(gbuffer: GBuffer, flow: Flow, look: Look, name: str = "images") -> Work[Images]:
@@ -227,18 +229,17 @@ def _hand(gbuffer: GBuffer, flow: Flow, look: Look, tone: np.ndarray) -> Work[Ha
 
 
 def _outline(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray:
-    """(P,) `contour` at the pixels of a flow, or that made for the last look if it would be the same."""
+    """(P,) `contour` at the pixels of a flow."""
     key = look.outline, look.crease_angle, look.cross_creases
-    made = gbuffer.made.get("contour")
-    if made is None or made[0] != key:
-        made = gbuffer.made["contour"] = key, contour(gbuffer, look)
-    return made[1][np.searchsorted(gbuffer.pixel, flow.pixel)]
+    drawn = _kept(gbuffer, "contour", key, lambda: contour(gbuffer, look))
+    return drawn[np.searchsorted(gbuffer.pixel, flow.pixel)]
 
 
 def _tones_along(flow: Flow, look: Look, tone: np.ndarray) -> Work[np.ndarray]:
     """(M, P) means of (P,) tones along lines, as far each way as these run on."""
     near = replace(look, length=max(round(look.overshoot / look.step), 1), taper=False)
-    # What evening out does to means along streamlines that end early, it does to ones as well.
+    # What evening out does to means along streamlines that end early, it does to ones as well. Of
+    # channels there are one or three.
     ones = np.ones_like(tone)
     images = yield from METHODS[look.method](flow, near, np.stack([tone, ones, ones], axis=1))
     spread = images.members - np.float32(MEAN)
@@ -266,11 +267,8 @@ def _noise(gbuffer: GBuffer, flow: Flow, look: Look) -> np.ndarray | None:
 
 
 def _on_surfaces(gbuffer: GBuffer, flow: Flow, name: str, key: dict[str, Any]) -> np.ndarray:
-    """(P, K) `surface_noise` at the pixels of a flow, or that made for the last look."""
-    made = gbuffer.made.get(name)
-    if made is None or made[0] != key:
-        made = gbuffer.made[name] = key, surface_noise(gbuffer, **key)
-    noise = made[1]
+    """(P, K) `surface_noise` at the pixels of a flow."""
+    noise = _kept(gbuffer, name, key, lambda: surface_noise(gbuffer, **key))
     if len(flow.pixel) == len(gbuffer.pixel):
         return noise
     return noise[np.searchsorted(gbuffer.pixel, flow.pixel)]

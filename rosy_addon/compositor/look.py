@@ -10,22 +10,10 @@ from typing import Any
 from ..errors import RosyError
 
 
-def _number(default: float, low: float, high: float, text: str) -> Any:
-    return field(default=default, metadata={"low": low, "high": high, "text": text})
-
-
-def _angle(default: float, low: float, high: float, text: str) -> Any:
-    """Radians here; the panel may show degrees."""
-    return field(
-        default=default, metadata={"low": low, "high": high, "text": text, "unit": "angle"}
-    )
-
-
-def _distance(default: float, low: float, high: float, text: str) -> Any:
-    """Blender units; the panel shows them as the scene counts."""
-    return field(
-        default=default, metadata={"low": low, "high": high, "text": text, "unit": "length"}
-    )
+def _number(default: float, low: float, high: float, text: str, unit: str = "") -> Any:
+    """In radians if its unit is "angle", in Blender units if it is "length": the panel shows others."""
+    rules = {"low": low, "high": high, "text": text, "unit": unit}
+    return field(default=default, metadata=rules)
 
 
 def _choice(default: str, text: str, **options: str) -> Any:
@@ -81,8 +69,12 @@ class Look:
         pixels="Pixels of the picture: lines are as wide from near as from afar",
         world="Blender units: lines belong to the object, as if engraved, and are wider from near",
     )
-    unit_size: float = _distance(
-        0.01, 1e-6, 1e6, "Blender units that stand for a pixel where lengths are counted in these"
+    unit_size: float = _number(
+        0.01,
+        1e-6,
+        1e6,
+        "Blender units that stand for a pixel where lengths are counted in these",
+        "length",
     )
     length: int = _number(40, 1, 8000, "Steps of a streamline each way")
     taper: bool = _switch(
@@ -129,15 +121,23 @@ class Look:
     )
     seed: int = _number(0, 0, 2**31 - 1, "Which noise")
     gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
-    guiding_angle: float = _angle(
-        0.0, -3.1416, 3.1416, "Direction in the picture nearest to which the first member is chosen"
+    guiding_angle: float = _number(
+        0.0,
+        -3.1416,
+        3.1416,
+        "Direction in the picture nearest to which the first member is chosen",
+        "angle",
     )
     foreshorten: bool = _switch(
         False, "Let streaks shorten where the surface turns away, instead of keeping their length"
     )
     cross_creases: bool = _switch(False, "Let streaks run across sharp creases")
-    crease_angle: float = _angle(
-        0.7, 0.0, 3.1416, "Angle between neighbouring pixels' normals that is a sharp crease"
+    crease_angle: float = _number(
+        0.7,
+        0.0,
+        3.1416,
+        "Angle between neighbouring pixels' normals that is a sharp crease",
+        "angle",
     )
     magnitude: str = _choice(
         "none",

@@ -321,14 +321,13 @@ class Card:
         fine = self._image(("picture", name if whole else None), camera.width, camera.height)
         self.device.clear(fine)
         kinds = sorted({entry.kind for entry in placed} - {None}, key=lambda kind: kind.degree)
+        finer = scaled_look(look)
         if look.anchor == "surface":
-            finer = scaled_look(look)
             noise = self._anchored(placed, camera, noise_of(finer) | unit_of(finer), "noise")
         else:
             noise = self._noise(camera.width, camera.height, look)
         tooth = None
         if has_tooth(look) and look.anchor == "surface":
-            finer = scaled_look(look)
             wanted = surface_tooth(finer) | unit_of(finer)
             tooth = self._anchored(placed, camera, wanted, "tooth")
         gbuffer["wavering"] = self._wavering(placed, camera, look)

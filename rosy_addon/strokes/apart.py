@@ -77,7 +77,7 @@ def kept_apart(ground: Ground, strokes: Strokes, shortest: float) -> Strokes:
     too_near[fine.start[:-1][opened]] = too_near[fine.start[1:][opened] - 1] = True
     too_near = _widened(fine, too_near)
     hit = np.unique(fine.stroke[too_near])
-    left = fine.runs(~too_near)
+    left = fine.runs(~too_near, loose=False)
     whose = np.repeat(False, len(some))
     whose[hit] = True
     left = left.chosen(whose[_origin(fine, ~too_near)])

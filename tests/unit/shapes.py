@@ -94,6 +94,13 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     return from_triangles(vertices, triangles, name="sphere")
 
 
+def moved(x=0.0, y=0.0, z=0.0) -> np.ndarray:
+    """The matrix that shifts by so much."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
 def cube() -> Surface:
     """A unit cube of six quads."""
     points, faces = awkward.cube()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import icosphere, plane
+from shapes import icosphere, moved, plane
 
 from rosy_addon.compositor.shading import LAMP, Light
 from rosy_addon.field.frames import dot, unit
@@ -20,12 +20,6 @@ STILL = np.eye(4)
 ALONG_X = Recipe("axis", (1.0, 0.0, 0.0))
 BALL = Body(icosphere(3), STILL, generate(icosphere(3), "smoothest", 4))
 CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.radians(40))
-
-
-def moved(x=0.0, y=0.0, z=0.0):
-    matrix = np.eye(4)
-    matrix[:3, 3] = x, y, z
-    return matrix
 
 
 def test_families_of_several_bodies_are_one_by_name():

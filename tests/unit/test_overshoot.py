@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import cube, icosphere, plane
+from shapes import cube, icosphere, moved, plane
 
 from rosy_addon.field.frames import dot, unit
 from rosy_addon.field.generate import Recipe, axis_field, generate
@@ -26,12 +26,6 @@ ABOVE = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, 
 
 BALL = Body(icosphere(4), STILL, generate(icosphere(4), "smoothest", 4))
 FRONT = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 400, 360, fov=np.radians(40))
-
-
-def moved(x=0.0, y=0.0, z=0.0):
-    matrix = np.eye(4)
-    matrix[:3, 3] = x, y, z
-    return matrix
 
 
 def both(bodies, camera, **more):

@@ -1,48 +1,57 @@
 # `make demo` and `make test` need Python 3.11, make and git; the rest is set up in .venv* here.
 #
 #   make demo      Suzanne with a 4-RoSy field, baked and rendered: demo.png
-#   make test      unit tests with new numpy, the quick ones with old numpy, and tests with
+#   make check     format, lint and the quick unit tests
+#   make test      all unit tests, the quick ones with old numpy as well, and the tests with
 #                  Blender 4.2's Python module
-#   make test-all  the same, and Blender 4.5's and 5.0's modules
-#   make test-long what else there is to be tested, in minutes rather than seconds a test
-#   make check     formatting, lint, import rules and unit tests: seconds
+#   make smoke     the main job with Blender 4.5's and 5.0's modules
+#   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
+#   make test-long further cases of some tests, which take minutes
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
-#   make clean     everything made here, but for the environments (make distclean: these too)
+#   make clean     remove what was made here, but not the environments (make distclean: these too)
 
 PYTHON ?= python3.11
-PYTEST  = -m pytest -p no:cacheprovider
+# Processes of a test run: `make test JOBS=1` for one, `auto` for one per core.
+JOBS   ?= auto
+PYTEST  = -m pytest -p no:cacheprovider --numprocesses $(JOBS)
 
-UNIT   = .venv/bin/python
-NUMPY1 = .venv-numpy1/bin/python
-BPY42  = .venv-bpy42/bin/python
+UNIT  = .venv/bin/python
+BPY42 = .venv-bpy42/bin/python
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
-.PHONY: demo test test-all test-long test-unit test-numpy1 test-bpy42 test-bpy45 test-bpy50 check lint format zip gallery bench clean distclean
+.PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long zip gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
 	$(BPY42) examples/demo.py demo.png
 
-test: test-unit test-numpy1 test-bpy42
+test: test-unit test-old-numpy test-bpy42
 
 test-all: test test-bpy45 test-bpy50
+
+smoke: smoke-bpy45 smoke-bpy50
 
 test-long: .venv/ready .venv-bpy42/ready
 	$(UNIT) $(PYTEST) -m long tests/unit
 	$(BPY42) $(PYTEST) -m long tests/bpy
 
-test-unit: .venv/ready .venv-numpy1/ready
-	ROSY_OTHER_PYTHON=$(abspath $(NUMPY1)) $(UNIT) $(PYTEST) tests/unit
+test-unit: .venv/ready .venv-bpy42/ready
+	ROSY_OTHER_PYTHON=$(abspath $(BPY42)) $(UNIT) $(PYTEST) tests/unit
 
-test-numpy1: .venv-numpy1/ready
-	$(NUMPY1) $(PYTEST) -m "not slow and not long" tests/unit
+# Blender 4.2 has the oldest numpy that RoSy supports.
+test-old-numpy: .venv-bpy42/ready
+	$(BPY42) $(PYTEST) -m "not slow and not long" tests/unit
 
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/bin/python $(PYTEST) tests/bpy
+
+smoke-bpy45 smoke-bpy50: smoke-bpy%: .venv-bpy%/ready
+	.venv-bpy$*/bin/python $(PYTEST) --numprocesses 0 tests/bpy/test_smoke.py
 
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit

@@ -1,11 +1,11 @@
 """RoSy as Blender sees it: what to register when the extension is switched on, and nothing else."""
 
-_cli = None
+_cli_command = None
 
 
 def register() -> None:
     """Add RoSy's classes, properties and command to Blender."""
-    global _cli
+    global _cli_command
     import bpy
 
     from . import operators
@@ -13,21 +13,21 @@ def register() -> None:
 
     ui.register()
     operators.register()
-    _cli = bpy.utils.register_cli_command("rosy", cli.main)
+    _cli_command = bpy.utils.register_cli_command("rosy", cli.main)
 
 
 def unregister() -> None:
     """Take away everything `register` added."""
-    global _cli
+    global _cli_command
     import bpy
 
     from . import operators
-    from .rosy_addon import reuse, ui
+    from .rosy_addon import cache, ui
     from .rosy_addon.gpu import device
 
-    bpy.utils.unregister_cli_command(_cli)
-    _cli = None
+    bpy.utils.unregister_cli_command(_cli_command)
+    _cli_command = None
     operators.unregister()
     ui.unregister()
-    reuse.KEPT.clear()
+    cache.BAKE_CACHE.clear()
     device.release()

@@ -38,7 +38,7 @@ def measure(runs: int) -> Iterator[Case]:
         print("changes of a look: left out, there is no bpy here", file=sys.stderr)
         return
     from rosy_addon.bake import bake
-    from rosy_addon.reuse import KEPT
+    from rosy_addon.cache import BAKE_CACHE
 
     for triangles in (12_000, 200_000):
         scene = ball_scene(bpy, triangles)
@@ -48,7 +48,7 @@ def measure(runs: int) -> Iterator[Case]:
             bake(scene, look=look, cameras=[view])
 
         def first(baked=baked) -> None:
-            KEPT.clear()
+            BAKE_CACHE.clear()
             baked(cases.LOOK)
 
         for setting, values in CHANGES.items():
@@ -69,7 +69,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 def ball_scene(bpy, triangles: int) -> object:
     """The ball with a field of degree 4, alone in Blender."""
-    from rosy_addon.scene.attributes import write_mesh_field
+    from rosy_addon.scene.field_attributes import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -79,7 +79,7 @@ def ball_scene(bpy, triangles: int) -> object:
     corners = surface.corner_vertex[surface.triangles]
     mesh.from_pydata(surface.vertices.tolist(), [], corners.tolist())
     mesh.shade_smooth()
-    write_mesh_field(mesh, cases.body(triangles, 4).field)
+    write_mesh_field(mesh, cases.instance(triangles, 4).field)
     thing = bpy.data.objects.new("Ball", mesh)
     bpy.context.scene.collection.objects.link(thing)
     bpy.context.view_layer.update()

@@ -33,11 +33,11 @@ def measure(runs: int) -> Iterator[Case]:
         return
     from rosy_addon.animation import bake_animation
     from rosy_addon.bake import bake
-    from rosy_addon.reuse import KEPT
-    from rosy_addon.scene.apply import Settings
+    from rosy_addon.cache import BAKE_CACHE
+    from rosy_addon.scene.pictures import OutputSettings
 
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(folder=Path(folder))
+        settings = OutputSettings(folder=Path(folder))
         for name, animate in (
             ("static mesh, moving camera", _move_camera),
             ("static camera, deforming mesh", _deform),
@@ -53,7 +53,7 @@ def measure(runs: int) -> Iterator[Case]:
             def singles(scene=scene, number=number) -> None:
                 for _ in range(TOGETHER):
                     scene.frame_set(next(number))
-                    KEPT.clear()
+                    BAKE_CACHE.clear()
                     bake(scene, look=cases.LOOK, settings=settings)
 
             frames()

@@ -7,14 +7,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from rosy_addon.compositor.compose import METHODS, compose, look_noise
-from rosy_addon.compositor.flow import Flow, planar_flow
+from rosy_addon.cache import Cache
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.lic import METHODS, look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.pixel_field import PixelField, planar_pixel_field
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.progress import drain
+from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
 #: The frame of the paper's Table 1.
@@ -25,19 +27,19 @@ LOOK = Look(length=40, step=1.0, grain=1.5)
 
 
 @lru_cache(maxsize=8)
-def plane(degree: int, size: int = SIZE) -> tuple[Flow, np.ndarray]:
+def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
     """A planar field with singularities of index 1 / N and -1 / N, and noise for it."""
     y, x = np.mgrid[0:size, 0:size] + 0.5
     plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
     minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
-    flow = planar_flow((plus - minus) / degree + 0.3, degree)
+    flow = planar_pixel_field((plus - minus) / degree + 0.3, degree)
     return flow, look_noise(flow, LOOK)
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:
     """The LIC stage alone: a planar field and noise to the images of its members."""
     flow, noise = plane(degree, size)
-    drain(METHODS[method](flow, look, noise))
+    run_to_completion(METHODS[method](flow, look, noise))
 
 
 @lru_cache(maxsize=8)
@@ -77,11 +79,15 @@ def _surface(name: str, point: np.ndarray) -> Surface:
     return build_surface(points, corners.ravel(), starts, name=f"{name} {len(corners)}")
 
 
+#: Corner fields of instances. A frame finds them here when only the camera has moved.
+CORNER_FIELDS = Cache()
+
+
 @lru_cache(maxsize=16)
-def body(triangles: int, degree: int) -> Body:
+def instance(triangles: int, degree: int) -> MeshInstance:
     """The ball with a field."""
     surface = ball(triangles)
-    return Body(surface, np.eye(4), axis_field(surface, degree, (0.3, 0.2, 1.0)))
+    return MeshInstance(surface, np.eye(4), axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
 def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -> Camera:
@@ -93,8 +99,10 @@ def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -
 
 def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
     """A frame of a mesh that has not been drawn before: what a camera does not change is found."""
-    fresh = body(triangles, degree)
-    gbuffer = project([Body(_fresh(fresh.surface), fresh.matrix, fresh.field)], camera(size))
+    fresh = instance(triangles, degree)
+    gbuffer = project(
+        [MeshInstance(_fresh(fresh.surface), fresh.matrix, fresh.field)], camera(size)
+    )
     return compose(gbuffer, look).rgba
 
 
@@ -107,5 +115,6 @@ def frame(
     triangles: int, degree: int, look: Look = LOOK, size: int = SIZE, azimuth: float = 0.0
 ) -> np.ndarray:
     """A mesh with a field to a picture: all that is done when the camera has moved."""
-    gbuffer = project([body(triangles, degree)], camera(size, azimuth=azimuth), look.display)
+    eye = camera(size, azimuth=azimuth)
+    gbuffer = project([instance(triangles, degree)], eye, look.display, CORNER_FIELDS)
     return compose(gbuffer, look).rgba

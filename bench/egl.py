@@ -11,8 +11,8 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from rosy_addon.gpu.device import Values
-from rosy_addon.gpu.passes import GROUP, Compute, Drawing
+from rosy_addon.gpu.device import NamedValues
+from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 
 FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
 
@@ -26,7 +26,7 @@ class EglDevice:
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
         self._programs: dict[str, Any] = {}
-        self.largest: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
+        self.max_texture_size: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
 
     @property
     def name(self) -> str:
@@ -34,59 +34,66 @@ class EglDevice:
         return self.context.info["GL_RENDERER"]
 
     def texture(
-        self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
+        self,
+        width: int,
+        height: int,
+        texel_format: str,
+        layers: int = 0,
+        data: np.ndarray | None = None,
     ) -> Any:
         """As `Device.texture`."""
         if data is not None:
-            data = np.ascontiguousarray(data, dtype=FORMATS[kind])
+            data = np.ascontiguousarray(data, dtype=FORMATS[texel_format])
         if layers:
-            return self.context.texture_array((width, height, layers), 4, data, dtype=FORMATS[kind])
-        return self.context.texture((width, height), 4, data, dtype=FORMATS[kind])
+            return self.context.texture_array(
+                (width, height, layers), 4, data, dtype=FORMATS[texel_format]
+            )
+        return self.context.texture((width, height), 4, data, dtype=FORMATS[texel_format])
 
-    def depth(self, width: int, height: int) -> Any:
-        """As `Device.depth`."""
+    def depth_texture(self, width: int, height: int) -> Any:
+        """As `Device.depth_texture`."""
         return self.context.depth_texture((width, height))
 
     def clear(self, texture: Any) -> None:
         """As `Device.clear`."""
         self.context.framebuffer([texture]).clear()
 
-    def batch(self, corners: np.ndarray) -> Any:
+    def batch(self, vertices: np.ndarray) -> Any:
         """As `Device.batch`."""
-        return self.context.buffer(np.ascontiguousarray(corners, dtype=np.float32))
+        return self.context.buffer(np.ascontiguousarray(vertices, dtype=np.float32))
 
     def compute(
         self,
-        shader: Compute,
+        shader: ComputePass,
         size: Sequence[int],
-        textures: Values,
-        images: Values,
-        constants: Values,
+        textures: NamedValues,
+        images: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
         """As `Device.compute`."""
-        program = self._bound(shader, textures, constants)
+        program = self._bind(shader, textures, uniforms)
         for slot, (name, _) in enumerate(shader.images):
-            images[_plain(name)].bind_to_image(slot, read=False, write=True)
+            images[_base_name(name)].bind_to_image(slot, read=False, write=True)
         width, height, layers = (*size, 1)[:3]
-        program.run(-(-width // GROUP[0]), -(-height // GROUP[1]), layers)
+        program.run(-(-width // WORKGROUP_SIZE[0]), -(-height // WORKGROUP_SIZE[1]), layers)
         self.context.memory_barrier()
 
     def draw(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
         target: tuple[Any, Any],
-        constants: Values,
+        uniforms: NamedValues,
     ) -> None:
         """As `Device.draw`."""
-        colour, depth = target
-        framebuffer = self.context.framebuffer([colour], depth)
+        color, depth = target
+        framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
-        for batch, own in batches:
-            program = self._bound(shader, {}, {**constants, **own})
-            self.context.vertex_array(program, [(batch, "4f", "corner")]).render()
+        for batch, item_uniforms in batches:
+            program = self._bind(shader, {}, {**uniforms, **item_uniforms})
+            self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
         """As `Device.read`."""
@@ -96,45 +103,49 @@ class EglDevice:
         """Wait until all is done."""
         self.context.finish()
 
-    def _bound(self, shader: Compute | Drawing, textures: Values, constants: Values) -> Any:
+    def _bind(
+        self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
+    ) -> Any:
         if shader.name not in self._programs:
-            self._programs[shader.name] = self._compiled(shader)
+            self._programs[shader.name] = self._compile(shader)
         program = self._programs[shader.name]
         for slot, name in enumerate(shader.textures):
-            textures[_plain(name)].use(slot)
-            if _plain(name) in program:
-                program[_plain(name)] = slot
-        for name, _ in shader.constants:
+            textures[_base_name(name)].use(slot)
+            if _base_name(name) in program:
+                program[_base_name(name)] = slot
+        for name, _ in shader.uniforms:
             # A driver leaves out what has no effect.
             if name in program:
-                program[name] = constants[name]
+                program[name] = uniforms[name]
         return program
 
-    def _compiled(self, shader: Compute | Drawing) -> Any:
+    def _compile(self, shader: ComputePass | RasterPass) -> Any:
         head = "#version 430\n"
         for name in shader.textures:
-            head += f"uniform sampler2D{'Array' * name.endswith('[]')} {_plain(name)};\n"
-        for name, kind in shader.constants:
+            head += f"uniform sampler2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
+        for name, kind in shader.uniforms:
             head += f"uniform {kind} {name};\n"
-        if isinstance(shader, Compute):
-            head += f"layout(local_size_x={GROUP[0]}, local_size_y={GROUP[1]}) in;\n"
+        if isinstance(shader, ComputePass):
+            head += (
+                f"layout(local_size_x={WORKGROUP_SIZE[0]}, local_size_y={WORKGROUP_SIZE[1]}) in;\n"
+            )
             for slot, (name, kind) in enumerate(shader.images):
                 head += (
                     f"layout({kind.lower()}, binding={slot}) writeonly uniform "
-                    f"image2D{'Array' * name.endswith('[]')} {_plain(name)};\n"
+                    f"image2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
                 )
             return self.context.compute_shader(head + shader.source)
         ways = [
-            f"{'flat ' * (name == 'triangle')}{{}} {kind} {name};\n"
+            f"{'flat ' * (name == 'triangle_id')}{{}} {kind} {name};\n"
             for name, kind in shader.varyings
         ]
-        vertex = head + "in vec4 corner;\n" + "".join(way.format("out") for way in ways)
-        fragment = head + BLENDER + f"out vec4 {shader.target};\n"
+        vertex = head + "in vec4 vertex_data;\n" + "".join(way.format("out") for way in ways)
+        fragment = head + BLENDER + f"out vec4 {shader.output};\n"
         fragment += "".join(way.format("in") for way in ways)
         return self.context.program(
             vertex + shader.vertex_source, fragment_shader=fragment + shader.fragment_source
         )
 
 
-def _plain(name: str) -> str:
+def _base_name(name: str) -> str:
     return name.removesuffix("[]")

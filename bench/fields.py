@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rosy_addon.field.connection import Connection, connect, laplacian
-from rosy_addon.field.smoothest import smallest, smoothest_field
-from rosy_addon.field.sparse import Rows
-from rosy_addon.progress import drain
+from rosy_addon.field.connection import Connection, build_connection, laplacian
+from rosy_addon.field.smoothest import smallest_eigenvectors_task, smoothest_field
+from rosy_addon.field.sparse_multigrid import CSRMatrix
+from rosy_addon.progress import run_to_completion
 
 from . import cases
 from .timing import Case, compare, main
@@ -28,20 +28,20 @@ def measure(runs: int) -> Iterator[Case]:
     except ImportError:
         print("SciPy's LU: left out, there is no scipy here", file=sys.stderr)
         return
-    connection = connect(cases.ball(200_000))
+    connection = build_connection(cases.ball(200_000))
     matrix = laplacian(connection, DEGREE)
 
     def theirs() -> None:
         shifted = _csc(matrix, connection)
         inverse = scipy.sparse.linalg.splu(shifted)
-        z = np.random.default_rng(0).standard_normal(connection.count).astype(complex)
+        z = np.random.default_rng(0).standard_normal(connection.node_count).astype(complex)
         for _ in range(ITERATIONS):
             z = inverse.solve(connection.mass * z)
             z /= np.sqrt(connection.mass @ np.abs(z) ** 2)
 
     yield compare(
         f"smoothest field / SciPy's LU and {ITERATIONS} iterations, 200K triangles, N = {DEGREE}",
-        lambda: drain(smallest(connection, DEGREE)),
+        lambda: run_to_completion(smallest_eigenvectors_task(connection, DEGREE)),
         theirs,
         target=1.5,
         higher_is_better=False,
@@ -57,12 +57,12 @@ def measure(runs: int) -> Iterator[Case]:
     )
 
 
-def _csc(matrix: Rows, connection: Connection) -> object:
+def _csc(matrix: CSRMatrix, connection: Connection) -> object:
     """For SciPy, positive definite."""
     import scipy.sparse
 
-    shape = len(matrix), matrix.columns
-    whole = scipy.sparse.csr_matrix((matrix.value, matrix.column, matrix.start), shape)
+    shape = len(matrix), matrix.column_count
+    whole = scipy.sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
     return (whole + 1e-8 * scipy.sparse.diags(connection.mass)).tocsc()
 
 

@@ -17,7 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from rosy_addon.gpu.card import Card, Placed
+from rosy_addon.gpu.renderer import GpuRenderer
+from rosy_addon.gpu.resources import DrawItem
+from rosy_addon.progress import run_to_completion
+from rosy_addon.render.view_input import ViewInput
 
 from . import cases
 
@@ -36,9 +39,9 @@ TRIANGLES = 12_000
 #: Where the time goes is looked at for this.
 STAGES_SIZE, STAGES_DEGREE = (1920, 1080), 4
 STAGES = {
-    "what is seen (seen, resolve)": ("seen", "resolve"),
-    "where lines go (flow, turning)": ("flow", "turning"),
-    "streamlines and light (walk)": ("walk",),
+    "G-buffer (visibility, resolve)": ("visibility", "resolve"),
+    "covering (directions, angle_gradient)": ("directions", "angle_gradient"),
+    "streamlines and light (lic)": ("lic",),
 }
 
 #: Frames that a time is the median of; fewer where they take longer than this together.
@@ -68,14 +71,21 @@ def device() -> Any:
         return None
 
 
+def draw_texture(card: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
+    """Draw a picture that stays on the card."""
+    return run_to_completion(card.render_texture_task(items, ViewInput((), camera, look)))
+
+
 class Frames:
     """One object in a frame of one size, again and again."""
 
     def __init__(self, drawn_by: Any, size: tuple[int, int], degree: int) -> None:
         self.device = drawn_by
         self.size = size
-        self.card = Card(drawn_by)
-        self.placed: list[Placed] = self.card.place([cases.body(TRIANGLES, degree)], "smooth")
+        self.card = GpuRenderer(drawn_by)
+        self.placed: list[DrawItem] = self.card.upload(
+            [cases.instance(TRIANGLES, degree)], "smooth"
+        )
         self.drawn = 0
 
     def draw(self) -> float:
@@ -83,7 +93,7 @@ class Frames:
         camera = cases.camera(*self.size, azimuth=self.drawn * ON)
         self.drawn += 1
         start = time.perf_counter()
-        self.card.draw(self.placed, camera, cases.LOOK)
+        draw_texture(self.card, self.placed, camera, cases.LOOK)
         self.device.finish()
         return time.perf_counter() - start
 
@@ -118,7 +128,7 @@ class Staged:
         self._timed(self._device.compute, shader, *rest)
 
     def draw(self, shader: Any, *rest: Any) -> None:
-        """As `Device.draw`."""
+        """As `Device.render`."""
         self._timed(self._device.draw, shader, *rest)
 
     def _timed(self, work: Any, shader: Any, *rest: Any) -> None:

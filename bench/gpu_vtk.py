@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from rosy_addon.gpu.card import Card
+from rosy_addon.gpu.renderer import GpuRenderer
 
 from . import cases
-from .gpu import device
+from .gpu import device, draw_texture
 from .surface_vtk import DEGREE, LOOK, ON, renderer
 from .timing import Case, compare, main
 
@@ -44,9 +44,9 @@ def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
     if drawn_by.name != theirs:
         print("shaders beside VTK: left out, they are not drawn by the same", file=sys.stderr)
         return None
-    card = Card(drawn_by)
-    placed = card.place([cases.body(triangles, DEGREE)], LOOK.display)
-    picture = card.read(card.draw(placed, cases.camera(), LOOK), cases.SIZE, cases.SIZE)
+    card = GpuRenderer(drawn_by)
+    placed = card.upload([cases.instance(triangles, DEGREE)], LOOK.display)
+    picture = card.read(draw_texture(card, placed, cases.camera(), LOOK), cases.SIZE, cases.SIZE)
     turn()
     ours, covered = (picture[..., 3] > 0).mean(), (read().min(axis=1) < 255).mean()
     print(f"covered: {covered:.1%} by VTK, {ours:.1%} by the shaders", flush=True)
@@ -55,7 +55,7 @@ def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
     def frame() -> None:
         # VTK makes its own context the current one at each of its frames.
         with drawn_by.context:
-            card.draw(placed, cases.camera(azimuth=next(azimuths)), LOOK)
+            draw_texture(card, placed, cases.camera(azimuth=next(azimuths)), LOOK)
             drawn_by.finish()
 
     return compare(

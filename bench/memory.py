@@ -61,7 +61,9 @@ def draw(name: str) -> float:
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
     width, height = (size * look.supersampling for size in WIDE)
-    gbuffer = project([cases.body(triangles, degree)], cases.camera(width, height), look.display)
+    gbuffer = project(
+        [cases.instance(triangles, degree)], cases.camera(width, height), look.display
+    )
     compose(gbuffer, look)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e9

@@ -35,7 +35,7 @@ def main() -> int:
 
 
 def _table(entries: list[dict]) -> str:
-    lines = ["| measured | ratio | least to largest | asked | amounts |", "| --- " * 5 + "|"]
+    lines = ["| case | ratio | min to max | target | amounts |", "| --- " * 5 + "|"]
     for entry in entries:
         asked = ""
         if entry["target"] is not None:

@@ -56,15 +56,17 @@ def rooms(package: str = "rosy_addon") -> SimpleNamespace:
 
     return SimpleNamespace(
         package=package,
-        Body=of("projection.gbuffer").Body,
+        MeshInstance=of("projection.gbuffer").MeshInstance,
         Camera=of("projection.camera").Camera,
-        Card=of("gpu.card").Card,
+        GpuRenderer=of("gpu.renderer").GpuRenderer,
         Look=of("compositor.look").Look,
+        ViewInput=of("render.view_input").ViewInput,
         compose=of("compositor.compose").compose,
         generate=of("field.generate").generate,
         orbit_camera=of("projection.camera").orbit_camera,
         project=of("projection.project").project,
-        read_mesh=of("field.meshfile").read_mesh,
+        run_to_completion=of("progress").run_to_completion,
+        read_mesh=of("field.mesh_io").read_mesh,
     )
 
 
@@ -101,7 +103,7 @@ class Pair:
 def drawn_twice(
     rosy: SimpleNamespace,
     card: Any,
-    bodies: Sequence[Any],
+    instances: Sequence[Any],
     camera: Any,
     look: Any,
     lights: Sequence[Any] = (),
@@ -114,7 +116,7 @@ def drawn_twice(
     rosy : SimpleNamespace
         Of `rooms`.
     card : Card
-    bodies : sequence of Body
+    instances : sequence of Body
     camera : Camera
         Of `look.supersampling` times the size of the picture each way.
     look : Look
@@ -122,13 +124,27 @@ def drawn_twice(
     rendered : Rendered, optional
     """
     side = look.supersampling
-    placed = card.place(bodies, look.display)
-    picture = card.draw(placed, camera, look, lights, rendered=rendered)
-    found = card.read(picture, camera.width // side, camera.height // side)
-    images = card.gbuffer(camera)
-    gbuffer = rosy.project(bodies, camera, look.display)
+    width, height = camera.width // side, camera.height // side
+    view = rosy.ViewInput(
+        tuple(instances), camera.resized(width, height), look, tuple(lights), rendered
+    )
+    items = card.upload(instances, look.display)
+    texture = rosy.run_to_completion(card.render_texture_task(items, view))
+    found = card.read(texture, width, height)
+    images = card.read_gbuffer(camera)
+    gbuffer = rosy.project(instances, camera, look.display)
     expected = rosy.compose(gbuffer, replace(look, method="brute"), lights, rendered).rgba
     return Pair(gbuffer, {name: np.array(image) for name, image in images.items()}, found, expected)
+
+
+def drawn_on_card(
+    rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
+) -> np.ndarray:
+    """(H, W, 4) the picture from the card, without supersampling."""
+    view = rosy.ViewInput(tuple(instances), camera, look)
+    items = card.upload(instances, look.display)
+    texture = rosy.run_to_completion(card.render_texture_task(items, view))
+    return card.read(texture, camera.width, camera.height)
 
 
 def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
@@ -151,20 +167,20 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
         Of `Card.gbuffer`.
     """
     camera, pixel = gbuffer.camera, gbuffer.pixel
-    normals, values = (images[name].reshape(-1, 4) for name in ("normals", "values_seen"))
+    normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))
     covered = np.zeros(camera.width * camera.height, dtype=bool)
     covered[pixel] = True
     either = np.count_nonzero(covered | (values[:, 3] > 0))
     normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
-    same = values[:, 3] == gbuffer.body + 1
+    same = values[:, 3] == gbuffer.instance_id + 1
     depth = -gbuffer.position[:, 2].astype(np.float64)
     apart = np.abs(np.abs(normals[:, 3]) - depth)
     if camera.is_perspective:
         # Along the ray, and in units of a pixel at that depth.
-        apart = apart / gbuffer.toward_eye[:, 2] / depth
+        apart = apart / gbuffer.view_direction[:, 2] / depth
     same &= apart * camera.pixels_per_unit < NEAR
     same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < ALIKE
-    same &= (normals[:, 3] > 0) == gbuffer.front
+    same &= (normals[:, 3] > 0) == gbuffer.front_facing
     z = values[:, 0] + 1j * values[:, 1]
     expected = gbuffer.representation.astype(np.complex128)
     same &= np.abs(z - expected) <= ALIKE * np.maximum(np.abs(z), np.abs(expected))
@@ -229,14 +245,16 @@ def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
             continue
         camera = camera_for(rosy, name, surface, size)
         for degree in DEGREES:
-            body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
+            instance = rosy.MeshInstance(
+                surface, np.eye(4), rosy.generate(surface, "smoothest", degree)
+            )
             plain = rosy.Look(shading=0.0)
             start = time.perf_counter()
-            card.read(card.draw(card.place([body], "smooth"), camera, plain), size, size)
+            drawn_on_card(rosy, card, [instance], camera, plain)
             middle = time.perf_counter()
-            pair = drawn_twice(rosy, card, [body], camera, plain)
+            pair = drawn_twice(rosy, card, [instance], camera, plain)
             end = time.perf_counter()
-            shaded = drawn_twice(rosy, card, [body], camera, rosy.Look())
+            shaded = drawn_twice(rosy, card, [instance], camera, rosy.Look())
             yield (
                 f"| {name} | {len(surface.triangles)} | {degree} | {len(pair.gbuffer.pixel)} "
                 f"| {100 * pair.agreement:.3f} | {pair.likeness:.4f} | {shaded.likeness:.4f} "
@@ -253,7 +271,7 @@ def main() -> None:
     rosy = rooms()
     device = module_of(rosy.package, "gpu.device").BlenderDevice()
     lines = []
-    for line in sweep(rosy, rosy.Card(device), options.size):
+    for line in sweep(rosy, rosy.GpuRenderer(device), options.size):
         print(line, flush=True)
         lines.append(line)
     if options.out:

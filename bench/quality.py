@@ -17,18 +17,23 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.compositor.compose import METHODS, look_noise
-from rosy_addon.compositor.flow import Flow, nearest_member, planar_flow, surface_flow
-from rosy_addon.compositor.images import Images
+from rosy_addon.compositor.lic import METHODS, look_noise
+from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.fieldfile import read_field
+from rosy_addon.compositor.pixel_field import (
+    PixelField,
+    nearest_member,
+    planar_pixel_field,
+    surface_pixel_field,
+)
+from rosy_addon.field.field_io import read_field
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.meshfile import read_mesh
+from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import drain
+from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from tools.gallery.measure import mean_spectrum, persistence
 
@@ -101,12 +106,12 @@ def _compared(name: str, sheets: Measured, brute: Measured) -> Iterator[Case]:
         yield case
 
 
-def _measured(flows: Sequence[Flow], look: Look) -> Measured:
+def _measured(flows: Sequence[PixelField], look: Look) -> Measured:
     """Means over some seeds of the noise, or over some flows with one of them each."""
     found = []
     for seed, flow in zip(SEEDS, flows * len(SEEDS) if len(flows) == 1 else flows, strict=True):
         noise = look_noise(flow, replace(look, seed=seed))
-        found.append(_measured_in(flow, drain(METHODS[look.method](flow, look, noise))))
+        found.append(_measured_in(flow, run_to_completion(METHODS[look.method](flow, look, noise))))
     return Measured(
         *(
             np.mean([getattr(one, part) for one in found], axis=0)
@@ -115,7 +120,7 @@ def _measured(flows: Sequence[Flow], look: Look) -> Measured:
     )
 
 
-def _measured_in(flow: Flow, images: Images) -> Measured:
+def _measured_in(flow: PixelField, images: LicImages) -> Measured:
     shape = flow.height, flow.width
     inside = np.zeros(flow.height * flow.width, dtype=bool)
     inside[flow.pixel] = flow.representation != 0
@@ -144,14 +149,14 @@ def _measured_in(flow: Flow, images: Images) -> Measured:
     return Measured(deviation, np.mean(along, axis=0), np.mean(across, axis=0), sharpness)
 
 
-def _on_screen(flow: Flow, member: np.ndarray) -> np.ndarray:
+def _on_screen(flow: PixelField, member: np.ndarray) -> np.ndarray:
     """(P,) unit directions in the picture of members in the view plane."""
-    if flow.axes is not None:
-        member = flow.axes[:, 0] * member.real + flow.axes[:, 1] * member.imag
+    if flow.screen_jacobian is not None:
+        member = flow.screen_jacobian[:, 0] * member.real + flow.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
 
 
-def _frame(values: np.ndarray, flow: Flow) -> np.ndarray:
+def _frame(values: np.ndarray, flow: PixelField) -> np.ndarray:
     frame = np.zeros(flow.height * flow.width, dtype=values.dtype)
     frame[flow.pixel] = values
     return frame.reshape(flow.height, flow.width)
@@ -160,8 +165,8 @@ def _frame(values: np.ndarray, flow: Flow) -> np.ndarray:
 # --- fields ----------------------------------------------------------------------------------------
 
 
-def _fields(data: Path | None) -> dict[str, Callable[[], list[Flow]]]:
-    fields: dict[str, Callable[[], list[Flow]]] = {}
+def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
+    fields: dict[str, Callable[[], list[PixelField]]] = {}
     for degree in (2, 3, 4, 6):
         fields[f"uniform, N = {degree}"] = partial(_uniform, degree)
         fields[f"singularities, N = {degree}"] = lambda degree=degree: [cases.plane(degree)[0]]
@@ -175,36 +180,36 @@ def _fields(data: Path | None) -> dict[str, Callable[[], list[Flow]]]:
     return fields
 
 
-def _uniform(degree: int) -> list[Flow]:
+def _uniform(degree: int) -> list[PixelField]:
     """Of several angles: of a single one, the pixels' grid and the streamlines' may beat."""
     shape = cases.SIZE, cases.SIZE
-    return [planar_flow(np.full(shape, angle), degree) for angle in ANGLES]
+    return [planar_pixel_field(np.full(shape, angle), degree) for angle in ANGLES]
 
 
-def _on_sphere(degree: int) -> list[Flow]:
+def _on_sphere(degree: int) -> list[PixelField]:
     surface = cases.ball(20_000, bumps=0.0)
     return _seen(surface, axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
-def _on_torus(degree: int) -> list[Flow]:
+def _on_torus(degree: int) -> list[PixelField]:
     surface = cases.torus(20_000)
     return _seen(surface, axis_field(surface, degree, (0.0, 0.0, 1.0)))
 
 
-def _on_bunny(data: Path) -> list[Flow]:
+def _on_bunny(data: Path) -> list[PixelField]:
     surface = read_mesh(data / "meshes" / "stanford-bunny.obj")
     return _seen(surface, generate(surface, "curvature", 4))
 
 
-def _on_vase(data: Path, degree: int) -> list[Flow]:
+def _on_vase(data: Path, degree: int) -> list[PixelField]:
     surface = read_mesh(data / "meshes" / "vase.off")
     return _seen(surface, read_field(data / "fields" / f"vase-{degree}.rawfield", surface))
 
 
-def _seen(surface: Surface, field: RosyField) -> list[Flow]:
+def _seen(surface: Surface, field: RosyField) -> list[PixelField]:
     camera = orbit_camera(surface, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
-    gbuffer = project([Body(surface, np.eye(4), field)], camera)
-    return [surface_flow(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
+    gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
 
 
 if __name__ == "__main__":

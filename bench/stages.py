@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
-from rosy_addon.compositor.compose import METHODS, compose, look_noise
-from rosy_addon.compositor.flow import surface_flow
+from rosy_addon.cache import Cache
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.lic import METHODS, look_noise
+from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
-from rosy_addon.progress import drain
-from rosy_addon.projection.carried import carrying
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.corner_field import corner_field_task
+from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project
-from rosy_addon.projection.raster import rasterise
-from rosy_addon.projection.steps import links, screen_axes
+from rosy_addon.projection.rasterizer import rasterize
 
 from . import cases
 from .timing import Case, compare, main
@@ -38,24 +39,27 @@ def measure(runs: int) -> Iterator[Case]:
 
 def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     """What a frame does, each alone, on what the stages before have left."""
-    look, camera, body = cases.LOOK, cases.camera(), cases.body(triangles, DEGREE)
-    gbuffer = project([body], camera, look.display)
-    flow = surface_flow(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
+    look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
+    cache = Cache()
+    gbuffer = project([instance], camera, look.display, cache)
+    flow = surface_pixel_field(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
     grain = look_noise(flow, look)
-    points = np.column_stack([body.surface.vertices, np.ones(len(body.surface.vertices))])
+    points = np.column_stack([instance.surface.vertices, np.ones(len(instance.surface.vertices))])
     clip = points @ (camera.projection @ camera.view).T
-    triangle = body.surface.triangle_vertex
+    triangle = instance.surface.triangle_vertex
     return {
-        "carry the field to the corners, once a mesh": lambda: drain(
-            carrying(body.surface, body.matrix, body.field, look.display)
+        "carry the field to the corners, once a mesh": lambda: run_to_completion(
+            corner_field_task(instance.surface, instance.matrix, instance.field, look.display)
         ),
-        "project": lambda: project([body], camera, look.display),
-        "  of which rasterise": lambda: rasterise(clip, triangle, camera.width, camera.height),
-        "compose": lambda: compose(replace(gbuffer, made={}), look),
-        "  of which links": lambda: links(gbuffer, look.crease_angle, look.cross_creases),
-        "  of which axes on screen": lambda: screen_axes(gbuffer),
+        "project": lambda: project([instance], camera, look.display, cache),
+        "  of which rasterise": lambda: rasterize(clip, triangle, camera.width, camera.height),
+        "compose": lambda: compose(gbuffer, look),
+        "  of which links": lambda: neighbor_masks(gbuffer, look.crease_angle, look.cross_creases),
+        "  of which axes on screen": lambda: screen_jacobians(gbuffer),
         "  of which noise": lambda: look_noise(flow, look),
-        "  of which streamlines": lambda: drain(METHODS[look.method](flow, look, grain)),
+        "  of which streamlines": lambda: run_to_completion(
+            METHODS[look.method](flow, look, grain)
+        ),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bench.stroke_spacing import lateral_gaps
 from rosy_addon.field.smoothest import smoothest_field
-from rosy_addon.projection.gbuffer import Body
-from rosy_addon.strokes.evenness import side_gaps
-from rosy_addon.strokes.ground import lay_ground
-from rosy_addon.strokes.spread import Rules
-from rosy_addon.strokes.trace import trace
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.placement import SeparationRules
+from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
+from rosy_addon.strokes.trace import trace_strokes
 
 from . import cases
 from .timing import Case, compare, main
@@ -29,18 +29,18 @@ SECONDS = 30.0
 def measure(runs: int) -> Iterator[Case]:
     """The ratio, beside it the milliseconds of both; what came of it goes to the error stream."""
     surface = cases.ball(200_000)
-    body = Body(surface, np.eye(4), smoothest_field(surface, DEGREE))
-    rules = Rules(longest=LONGEST)
-    drawn = trace(body, SPACING, rules=rules)
-    gaps = side_gaps(lay_ground(body), drawn)
+    instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
+    rules = SeparationRules(max_length=LONGEST)
+    drawn = trace_strokes(instance, SPACING, rules=rules)
+    gaps = lateral_gaps(build_tangent_mesh(instance), drawn)
     print(
-        f"{len(drawn)} strokes, {100 * gaps.even():.1f} % of gaps within 25 %, "
-        f"none nearer than {gaps.nearest.min():.2f} spacings",
+        f"{len(drawn)} strokes, {100 * gaps.evenness():.1f} % of gaps within 25 %, "
+        f"none nearer than {gaps.nearest_distance.min():.2f} spacings",
         file=sys.stderr,
     )
     case = compare(
         f"{len(drawn)} strokes / smoothest field, 200K triangles, N = {DEGREE}",
-        lambda: trace(body, SPACING, rules=rules),
+        lambda: trace_strokes(instance, SPACING, rules=rules),
         lambda: smoothest_field(surface, DEGREE),
         higher_is_better=False,
         runs=min(runs, 3),

@@ -113,8 +113,8 @@ def _poly_data(vtk: Any, triangles: int) -> Any:
     """The ball with a member of the field, averaged at its points."""
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
-    body = cases.body(triangles, DEGREE)
-    surface = body.surface
+    instance = cases.instance(triangles, DEGREE)
+    surface = instance.surface
     points = vtk.vtkPoints()
     points.SetData(numpy_to_vtk(surface.vertices.astype(np.float32), deep=True))
     ids = surface.triangle_vertex.astype(np.int64).ravel()
@@ -124,7 +124,7 @@ def _poly_data(vtk: Any, triangles: int) -> Any:
     data.SetPoints(points)
     data.SetPolys(cells)
     vectors = np.zeros_like(surface.vertices)
-    np.add.at(vectors, surface.corner_vertex, body.field.vectors[surface.corner_face])
+    np.add.at(vectors, surface.corner_vertex, instance.field.vectors[surface.corner_face])
     field = numpy_to_vtk(vectors.astype(np.float32), deep=True)
     field.SetName("field")
     data.GetPointData().SetVectors(field)

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rosy_addon.bake import bake
 from rosy_addon.field.generate import generate
-from rosy_addon.scene.attributes import has_field, write_mesh_field
+from rosy_addon.scene.field_attributes import has_field, write_mesh_field
 from rosy_addon.scene.meshes import mesh_surface
 from rosy_addon.ui.properties import ensure_registered
 
@@ -29,7 +29,7 @@ def main(output: Path) -> None:
     for baked in bake(scene):
         names = ", ".join(thing.name for thing in baked.objects)
         print(f"{names} drawn from {baked.camera}, {tuple(baked.image.size)} pixels")
-        print(*baked.notes, sep="\n")
+        print(*baked.warnings, sep="\n")
     scene.render.filepath = str(output.resolve())
     bpy.ops.render.render(write_still=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve().with_suffix(".blend")), copy=True)

@@ -1,34 +1,34 @@
-"""What the user can do, one verb a file."""
+"""The operators of the extension, one task in each file."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon import live
-from ..rosy_addon.ui import overlay
+from ..rosy_addon.viewport import session
 from . import (
     bake,
     bake_animation,
+    bake_occlusion,
+    bake_remove,
+    bake_show,
     field_convert,
     field_export,
     field_generate,
     field_import,
-    occlusion,
+    modal_task,
     preset_apply,
     preset_export,
     preset_import,
     preset_remove,
     preset_rename,
     preset_save,
-    remove,
-    show,
     singularities,
     strokes,
-    ticking,
     turntable,
     viewport,
 )
 
+#: All modules with operators, in the order of registration.
 MODULES = (
     field_generate,
     field_convert,
@@ -36,13 +36,13 @@ MODULES = (
     field_export,
     singularities,
     strokes,
-    occlusion,
+    bake_occlusion,
     bake,
     bake_animation,
     turntable,
     viewport,
-    show,
-    remove,
+    bake_show,
+    bake_remove,
     preset_apply,
     preset_save,
     preset_rename,
@@ -53,17 +53,16 @@ MODULES = (
 
 
 def register() -> None:
-    """Add the operators to Blender."""
+    """Register the operators."""
     for module in MODULES:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
 
 
 def unregister() -> None:
-    """Take them away again, ending work under way."""
-    ticking.stop_running()
-    overlay.hide()
-    live.stop()
+    """Stop the current task and the live view, and unregister the operators."""
+    modal_task.stop_current_job()
+    session.stop()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

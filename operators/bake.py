@@ -1,4 +1,4 @@
-"""Draw the fields of the scene as a camera or the view sees them."""
+"""Operator: bake pictures of the fields from a camera, all cameras or the current view."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.bake import Baked, Source, baking
+from ..rosy_addon.bake import BakeResult, bake_task
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.progress import Work
+from ..rosy_addon.progress import Task
 from ..rosy_addon.projection.camera import Camera
-from ..rosy_addon.scene.bodies import rosy_objects
-from ..rosy_addon.scene.cameras import camera_of_view, render_camera, scene_cameras
-from ..rosy_addon.ui.properties import CAMERAS
-from .meshes import can_draw
-from .ticking import Ticking
+from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
+from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.ui.properties import CAMERA_ITEMS
+from .modal_task import ModalTaskMixin
+from .poll import poll_has_field
 
 
-class ROSY_OT_bake(Ticking, bpy.types.Operator):
+class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
     """Draw the fields of the scene as the chosen camera sees them, and put the picture on the meshes"""
 
     bl_idname = "rosy.bake"
@@ -25,34 +25,42 @@ class ROSY_OT_bake(Ticking, bpy.types.Operator):
     bl_options = {"UNDO"}
 
     camera: bpy.props.EnumProperty(
-        name="Camera", description="From where the fields are drawn", items=CAMERAS
+        name="Camera", description="From where the fields are drawn", items=CAMERA_ITEMS
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_draw(cls, context)
+        return poll_has_field(cls, context)
 
-    def work(self, context: bpy.types.Context) -> Work[list[Baked]]:
-        return baking(context.scene, cameras=self._cameras(context))
+    def make_task(self, context: bpy.types.Context) -> Task[list[BakeResult]]:
+        return bake_task(context.scene, cameras=self._cameras(context))
 
-    def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return rosy_objects(context.view_layer)
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return field_objects(context.view_layer)
 
-    def finish(self, context: bpy.types.Context, result: list[Baked]) -> None:
-        names = ", ".join(f"'{baked.camera}'" for baked in result)
+    def finish(self, context: bpy.types.Context, result: list[BakeResult]) -> None:
+        names = ", ".join(f"'{picture.camera}'" for picture in result)
         self.report({"INFO"}, f"Baked from {names}")
-        for note in dict.fromkeys(note for baked in result for note in baked.notes):
+        for note in dict.fromkeys(note for picture in result for note in picture.warnings):
             self.report({"WARNING"}, note)
 
-    def _cameras(self, context: bpy.types.Context) -> list[Source]:
+    def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:
+        """Return the cameras to bake from: the operator's choice, by default the scene's."""
         scene = context.scene
-        chosen = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
-        if chosen == "VIEW":
+        source = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
+        if source == "VIEW":
             return [view_camera(context)]
-        return scene_cameras(scene) if chosen == "ALL" else [render_camera(scene)]
+        return scene_cameras(scene) if source == "ALL" else [render_camera(scene)]
 
 
 def view_camera(context: bpy.types.Context) -> Camera:
+    """Return the camera of the current 3D view.
+
+    Raises
+    ------
+    RosyError
+        If the current area is not a 3D view.
+    """
     area = context.area
     if area is None or area.type != "VIEW_3D":
         raise RosyError("the current view is that of a 3D view: start this from one")

@@ -1,4 +1,4 @@
-"""Draw the fields of the scene at every frame."""
+"""Operator: bake pictures of the fields at every frame, as image sequences."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import replace
 
 import bpy
 
-from ..rosy_addon.animation import Frames, baking_animation
+from ..rosy_addon.animation import SequenceResult, bake_animation_task
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.progress import Work
-from ..rosy_addon.scene.apply import folder_of, settings_of
-from ..rosy_addon.scene.bodies import rosy_objects
+from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import scene_cameras
-from .meshes import can_draw
-from .ticking import Ticking
+from ..rosy_addon.scene.pictures import output_folder, read_output_settings
+from ..rosy_addon.scene.scene_reader import field_objects
+from .modal_task import ModalTaskMixin
+from .poll import poll_has_field
 
 
-class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
-    """Draw the fields at every frame of the scene into a folder, and let materials play the pictures back. Frames that are there and up to date stay; stopped with ESC, it goes on there next time"""
+class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
+    """Draw the fields at every frame of the scene into a folder, and let materials play the pictures back. Frames that are up to date are kept; after a stop with ESC, the next run continues from there"""
 
     bl_idname = "rosy.bake_animation"
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
-    if_stopped = "frames that are done stay"
+    cancel_note = "frames that are done stay"
 
     first: bpy.props.IntProperty(name="First", description="Frame", default=1)
     last: bpy.props.IntProperty(name="Last", description="Frame", default=250)
@@ -36,34 +36,36 @@ class ROSY_OT_bake_animation(Ticking, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_draw(cls, context)
+        return poll_has_field(cls, context)
 
-    def work(self, context: bpy.types.Context) -> Work[list[Frames]]:
+    def make_task(self, context: bpy.types.Context) -> Task[list[SequenceResult]]:
         scene = context.scene
-        chosen = {
-            name: getattr(self, name) if self.properties.is_property_set(name) else usual
-            for name, usual in (
+        frame_settings = {
+            name: getattr(self, name) if self.properties.is_property_set(name) else default
+            for name, default in (
                 ("first", scene.frame_start),
                 ("last", scene.frame_end),
                 ("step", scene.frame_step),
             )
         }
-        frames = range(chosen["first"], chosen["last"] + 1, chosen["step"])
+        frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
         if not len(frames):
-            raise RosyError(f"frames {chosen['first']} to {chosen['last']}: there are none")
+            raise RosyError(
+                f"frames {frame_settings['first']} to {frame_settings['last']}: there are none"
+            )
         cameras = scene_cameras(scene) if self.all_cameras else None
-        # Frames go to the scene's folder even if single pictures are packed.
-        settings = replace(settings_of(scene), folder=folder_of(scene))
-        return baking_animation(scene, frames, cameras=cameras, settings=settings)
+        # Frames are saved in the scene's folder, even if single pictures are packed.
+        settings = replace(read_output_settings(scene), folder=output_folder(scene))
+        return bake_animation_task(scene, frames, cameras=cameras, settings=settings)
 
-    def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return rosy_objects(context.view_layer)
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return field_objects(context.view_layer)
 
-    def finish(self, context: bpy.types.Context, result: list[Frames]) -> None:
-        for each in result:
+    def finish(self, context: bpy.types.Context, result: list[SequenceResult]) -> None:
+        for sequence in result:
             self.report(
                 {"INFO"},
-                f"{len(each.drawn)} frames drawn, {len(each.kept)} were there: {each.strip.path}",
+                f"{len(sequence.rendered)} frames drawn, {len(sequence.skipped)} were there: {sequence.sequence.path}",
             )
 
 

@@ -1,4 +1,4 @@
-"""Make another field of the one that is there."""
+"""Operators: convert existing fields, or store them in another form."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from math import pi
 import bpy
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.convert import Conversion, converting
+from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.progress import Work, part
-from ..rosy_addon.scene.attributes import (
-    FORMS,
+from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.scene.field_attributes import (
+    STORAGE_FORMS,
     attribute_name,
     has_field,
+    read_face_scalars,
     read_mesh_field,
-    read_scalars,
     write_mesh_field,
 )
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, give_fields, has_field_selected, selected_meshes
-from .ticking import Ticking
+from .modal_task import ModalTaskMixin
+from .poll import assign_fields, poll_active_field, poll_editable, selected_mesh_objects
 
 
-class _OnFields:
-    """An operator on the fields of the selected meshes."""
+class _FieldOperator:
+    """Mixin of operators on the fields of the selected meshes."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_change_fields(cls, context) and has_field_selected(cls, context)
+        return poll_editable(cls, context) and poll_active_field(cls, context)
 
-    def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return dict.fromkeys(thing.data for thing in selected_meshes(context) if has_field(thing))
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
 
 
-class ROSY_OT_field_convert(_OnFields, Ticking, bpy.types.Operator):
+class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     """Give the fields of the selected meshes another degree, turn them, smooth them, or give them other magnitudes"""
 
     bl_idname = "rosy.field_convert"
@@ -81,26 +81,26 @@ class ROSY_OT_field_convert(_OnFields, Ticking, bpy.types.Operator):
     values: bpy.props.StringProperty(
         name="Values",
         description="Name of the attribute or vertex group",
-        search=lambda self, context, typed: _names_of_values(context),
+        search=lambda self, context, typed: _scalar_names(context),
     )
 
-    def work(self, context: bpy.types.Context) -> Work[int]:
-        """Convert all fields, then give them to the meshes; the number of meshes comes back."""
-        meshes = list(self.needed(context))
-        made = {}
-        for number, mesh in enumerate(meshes):
+    def make_task(self, context: bpy.types.Context) -> Task[int]:
+        """Convert all fields, then store them. Return the number of meshes."""
+        meshes = list(self.required_data(context))
+        converted = {}
+        for index, mesh in enumerate(meshes):
             surface = mesh_surface(mesh)
             field = read_mesh_field(mesh, surface=surface)
-            values = read_scalars(mesh, self.values) if self.magnitude == "values" else None
+            values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
             if values is not None and values.min() < 0:
                 raise RosyError(f"{surface.name}: '{self.values}' has values below 0, no lengths")
-            kept = values if self.magnitude in ("keep", "values") else self.magnitude
-            wished = Conversion(self.degree or None, self.angle, self.smooth, kept)
-            work = converting(surface, field, wished)
-            field = yield from part(work, number / len(meshes), (number + 1) / len(meshes))
-            made[mesh] = replace(field, given=None)
-        give_fields(self, context, made)
-        return len(made)
+            magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
+            conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
+            task = convert_task(surface, field, conversion)
+            field = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
+            converted[mesh] = replace(field, source_directions=None)
+        assign_fields(self, context, converted)
+        return len(converted)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
         self.report({"INFO"}, f"Converted the fields of {result} meshes")
@@ -115,7 +115,7 @@ class ROSY_OT_field_convert(_OnFields, Ticking, bpy.types.Operator):
             layout.prop(self, "values")
 
 
-class ROSY_OT_field_store(_OnFields, bpy.types.Operator):
+class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
     bl_idname = "rosy.field_store"
@@ -123,7 +123,7 @@ class ROSY_OT_field_store(_OnFields, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     form: bpy.props.EnumProperty(
-        name="As", items=[(form, name, text) for form, (name, text) in FORMS.items()]
+        name="As", items=[(form, name, text) for form, (name, text) in STORAGE_FORMS.items()]
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
@@ -132,14 +132,16 @@ class ROSY_OT_field_store(_OnFields, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            fields = {mesh: read_mesh_field(mesh) for mesh in self.needed(context)}
+            fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
             for mesh, field in fields.items():
-                usual = "rosy_angle" if self.form == "ANGLE" else attribute_name(mesh)
-                write_mesh_field(mesh, field, self.attribute or usual, self.form)
+                default_name = "rosy_angle" if self.form == "ANGLE" else attribute_name(mesh)
+                write_mesh_field(mesh, field, self.attribute or default_name, self.form)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Stored the fields of {len(fields)} meshes: {FORMS[self.form][1]}")
+        self.report(
+            {"INFO"}, f"Stored the fields of {len(fields)} meshes: {STORAGE_FORMS[self.form][1]}"
+        )
         return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -151,11 +153,14 @@ class ROSY_OT_field_store(_OnFields, bpy.types.Operator):
             layout.prop(self, "attribute")
 
 
-def _names_of_values(context: bpy.types.Context) -> list[str]:
-    thing = selected_meshes(context)[0]
-    kinds = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
-    names = [each.name for each in thing.data.attributes if each.data_type in kinds]
-    return [*(group.name for group in thing.vertex_groups), *names]
+def _scalar_names(context: bpy.types.Context) -> list[str]:
+    """Return the vertex groups and scalar attributes of the active mesh, by name."""
+    obj = selected_mesh_objects(context)[0]
+    scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
+    names = [
+        attribute.name for attribute in obj.data.attributes if attribute.data_type in scalar_types
+    ]
+    return [*(group.name for group in obj.vertex_groups), *names]
 
 
 CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

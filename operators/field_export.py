@@ -1,4 +1,4 @@
-"""Write the field of the active mesh to a file."""
+"""Operator: export the field of the active mesh to a file."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.fieldfile import write_field
-from ..rosy_addon.scene.attributes import read_mesh_field
+from ..rosy_addon.field.field_io import write_field
+from ..rosy_addon.scene.field_attributes import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, has_field_selected, selected_meshes, with_ending
+from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
 
-#: The kinds of files, by the end of their name.
-FORMATS = {
+#: File formats by suffix: label and description in the user interface.
+FIELD_FORMATS = {
     ".rosy": ("RoSy", "One member vector a face"),
     ".rawfield": ("Raw Field", "All directions of a face in a row, as Directional reads them"),
     ".txt": ("Text", "All directions of a face in a row, numbers alone"),
@@ -33,28 +33,28 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
 
     filename_ext = ".rosy"
     filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{kind}" for kind in FORMATS), options={"HIDDEN"}
+        default=";".join(f"*{suffix}" for suffix in FIELD_FORMATS), options={"HIDDEN"}
     )
     file_format: bpy.props.EnumProperty(
         name="Format",
-        items=[(kind, name, text) for kind, (name, text) in FORMATS.items()],
+        items=[(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
         default=".rosy",
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_change_fields(cls, context) and has_field_selected(cls, context)
+        return poll_editable(cls, context) and poll_active_field(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Keep the name's ending in step with the format, in the file browser."""
-        return with_ending(self, self.file_format)
+        """Set the suffix of the file name to the format's in the file browser."""
+        return sync_suffix(self, self.file_format)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        thing = selected_meshes(context)[0]
+        obj = selected_mesh_objects(context)[0]
         path = Path(bpy.path.abspath(self.filepath))
         try:
-            surface = mesh_surface(thing.data)
-            field = read_mesh_field(thing.data, surface=surface)
+            surface = mesh_surface(obj.data)
+            field = read_mesh_field(obj.data, surface=surface)
             write_field(path, field, surface)
         except RosyError as error:
             self.report({"ERROR"}, str(error))

@@ -1,4 +1,4 @@
-"""Make a field on the selected meshes."""
+"""Operator: generate fields on the selected meshes."""
 
 from __future__ import annotations
 
@@ -9,33 +9,38 @@ from math import pi
 import bpy
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.generate import KINDS, Recipe, generating
+from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.field.surface import Surface, cut_note
-from ..rosy_addon.progress import Work, part
+from ..rosy_addon.field.surface import Surface, orientation_warning
+from ..rosy_addon.progress import Task, subtask
 from ..rosy_addon.scene.guides import (
+    corner_uvs,
     guide_objects,
-    guiding_vectors,
-    strokes_and_handles,
-    uv_of_corners,
+    guide_strokes_and_empties,
+    guide_vectors,
 )
-from ..rosy_addon.scene.meshes import MARKS, marked_edges, mesh_surface
-from ..rosy_addon.ui.generators import settings_of_generator
-from .meshes import can_change_fields, give_fields, selected_meshes
-from .ticking import Ticking
+from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
+from ..rosy_addon.ui.generator_settings import generator_setting_names
+from .modal_task import ModalTaskMixin
+from .poll import assign_fields, poll_editable, selected_mesh_objects
 
-#: Kinds whose name is not their word with a capital.
-NAMES = {"uv": "UV Map"}
+#: Labels of generators that are not the capitalized key.
+KIND_LABELS = {"uv": "UV Map"}
+
+# Not inside the annotation: up to Python 3.11, a comprehension there cannot see module names.
+KIND_ITEMS = [
+    (kind, KIND_LABELS.get(kind, kind.capitalize()), text) for kind, text in GENERATORS.items()
+]
 
 
-def _names_on_mesh(context: bpy.types.Context, kind: str) -> list[str]:
-    """Names of the active mesh's UV maps or attributes."""
-    meshes = selected_meshes(context)
-    return [each.name for each in getattr(meshes[0].data, kind)] if meshes else []
+def _mesh_item_names(context: bpy.types.Context, collection: str) -> list[str]:
+    """Return the names in a collection of the active mesh, such as its UV maps or attributes."""
+    meshes = selected_mesh_objects(context)
+    return [item.name for item in getattr(meshes[0].data, collection)] if meshes else []
 
 
-class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
+class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     """Make a field on the selected meshes, one direction and its rotations a face"""
 
     bl_idname = "rosy.field_generate"
@@ -45,7 +50,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
     kind: bpy.props.EnumProperty(
         name="From",
         description="Where the directions come from",
-        items=[(kind, NAMES.get(kind, kind.capitalize()), text) for kind, text in KINDS.items()],
+        items=KIND_ITEMS,
         default="curvature",
     )
     degree: bpy.props.IntProperty(
@@ -72,7 +77,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         description="Which edges the field runs along",
         items=[
             ("FEATURES", "By Angle", "Borders, and where the surface bends sharply"),
-            *((mark, name, text) for mark, (_, name, text) in MARKS.items()),
+            *((mark, name, text) for mark, (_, name, text) in EDGE_MARKS.items()),
         ],
     )
     sharp_angle: bpy.props.FloatProperty(
@@ -100,18 +105,18 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         description="Grease Pencil, curves or an empty that the field follows; empty: all of these "
         "that are selected. Empties guide along their z axis, as far as they are drawn",
         search=lambda self, context, typed: [
-            thing.name for thing in guide_objects(context.scene.objects)
+            obj.name for obj in guide_objects(context.scene.objects)
         ],
     )
     uv_map: bpy.props.StringProperty(
         name="UV Map",
         description="Empty: the active one",
-        search=lambda self, context, typed: _names_on_mesh(context, "uv_layers"),
+        search=lambda self, context, typed: _mesh_item_names(context, "uv_layers"),
     )
     vectors: bpy.props.StringProperty(
         name="Vectors",
         description="Attribute of vectors on faces, points or corners",
-        search=lambda self, context, typed: _names_on_mesh(context, "attributes"),
+        search=lambda self, context, typed: _mesh_item_names(context, "attributes"),
     )
     axis: bpy.props.FloatVectorProperty(
         name="Axis",
@@ -127,64 +132,69 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_change_fields(cls, context)
+        return poll_editable(cls, context)
 
-    def work(self, context: bpy.types.Context) -> Work[int]:
-        """Make all fields, then give them to the meshes; the number of faces comes back."""
-        meshes = list(self.needed(context))
+    def make_task(self, context: bpy.types.Context) -> Task[int]:
+        """Generate all fields, then store them. Return the number of faces."""
+        meshes = list(self.required_data(context))
         surfaces = [mesh_surface(mesh) for mesh in meshes]
-        recipes = [
-            self._recipe(context, mesh, surface)
+        settings_per_mesh = [
+            self._generator_settings(context, mesh, surface)
             for mesh, surface in zip(meshes, surfaces, strict=True)
         ]
-        made = {}
-        for number, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
-            if note := cut_note(surface):
+        fields = {}
+        for index, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
+            if note := orientation_warning(surface):
                 self.report({"WARNING"}, note)
-            making = generating(surface, recipes[number], self.degree)
-            made[mesh] = yield from part(making, number / len(meshes), (number + 1) / len(meshes))
-        give_fields(self, context, made, self.attribute)
-        return sum(len(field.vectors) for field in made.values())
+            task = generate_task(surface, settings_per_mesh[index], self.degree)
+            fields[mesh] = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
+        assign_fields(self, context, fields, self.attribute)
+        return sum(len(field.vectors) for field in fields.values())
 
-    def _recipe(self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface) -> Recipe:
-        recipe = Recipe(self.kind, tuple(self.axis), self.reach, self.sharp_angle)
+    def _generator_settings(
+        self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
+    ) -> GeneratorSettings:
+        """Return the settings of the generator for one mesh, with the guides read."""
+        settings = GeneratorSettings(self.kind, tuple(self.axis), self.reach, self.sharp_angle)
         if self.kind == "uv":
-            return replace(recipe, uv=uv_of_corners(mesh, self.uv_map))
+            return replace(settings, uv=corner_uvs(mesh, self.uv_map))
         if self.kind == "features" and self.edges != "FEATURES":
-            return replace(recipe, edges=marked_edges(mesh, self.edges))
+            return replace(settings, edges=marked_edges(mesh, self.edges))
         if self.kind != "guided":
-            return recipe
+            return settings
         if "EDGES" in self.guides:
             by_angle = self.edges == "FEATURES"
-            ends = feature_edges(surface, self.sharp_angle) if by_angle else None
-            recipe = replace(recipe, edges=marked_edges(mesh, self.edges) if ends is None else ends)
+            edges = feature_edges(surface, self.sharp_angle) if by_angle else None
+            settings = replace(
+                settings, edges=marked_edges(mesh, self.edges) if edges is None else edges
+            )
         if "OBJECTS" in self.guides:
-            owner = next(thing for thing in selected_meshes(context) if thing.data == mesh)
-            strokes, handles = strokes_and_handles(self._guides(context), owner)
-            recipe = replace(recipe, strokes=strokes, handles=handles)
+            target = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
+            strokes, empties = guide_strokes_and_empties(self._guide_objects(context), target)
+            settings = replace(settings, strokes=strokes, axis_guides=empties)
         if "UV" in self.guides:
-            recipe = replace(recipe, uv=uv_of_corners(mesh, self.uv_map))
+            settings = replace(settings, uv=corner_uvs(mesh, self.uv_map))
         if "ATTRIBUTE" in self.guides:
-            recipe = replace(recipe, vectors=guiding_vectors(mesh, self.vectors))
-        return recipe
+            settings = replace(settings, vectors=guide_vectors(mesh, self.vectors))
+        return settings
 
-    def _guides(self, context: bpy.types.Context) -> list[bpy.types.Object]:
-        """The objects to follow."""
+    def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        """Return the guide objects: the named one, or by default the selected ones."""
         if not self.guide:
-            found = guide_objects(context.selected_objects)
-            if not found:
+            objects = guide_objects(context.selected_objects)
+            if not objects:
                 raise RosyError(
                     "there is nothing to follow: name an object, or select Grease Pencil, curves "
                     "or empties beside the mesh"
                 )
-            return found
-        thing = context.scene.objects.get(self.guide)
-        if thing is None or not guide_objects([thing]):
+            return objects
+        obj = context.scene.objects.get(self.guide)
+        if obj is None or not guide_objects([obj]):
             raise RosyError(f"object '{self.guide}' is no Grease Pencil, curve or empty here")
-        return [thing]
+        return [obj]
 
-    def needed(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return dict.fromkeys(thing.data for thing in selected_meshes(context))
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
         self.report({"INFO"}, f"Made a field of degree {self.degree} on {result:,} faces")
@@ -195,7 +205,7 @@ class ROSY_OT_field_generate(Ticking, bpy.types.Operator):
         layout.use_property_decorate = False
         layout.prop(self, "kind")
         layout.prop(self, "degree")
-        for name in settings_of_generator(self):
+        for name in generator_setting_names(self):
             layout.prop(self, name)
         layout.prop(self, "attribute")
 

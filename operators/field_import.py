@@ -1,4 +1,4 @@
-"""Read a field file into the active mesh."""
+"""Operator: import a field from a file to the active mesh."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.fieldfile import READ, load_field
+from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
-from .meshes import can_change_fields, give_fields, selected_meshes
+from .poll import assign_fields, poll_editable, selected_mesh_objects
 
 
 class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
@@ -21,7 +21,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
 
     filename_ext = ".rosy"
     filter_glob: bpy.props.StringProperty(
-        default=";".join(f"*{kind}" for kind in READ), options={"HIDDEN"}
+        default=";".join(f"*{suffix}" for suffix in READ_SUFFIXES), options={"HIDDEN"}
     )
     degree: bpy.props.IntProperty(
         name="Degree",
@@ -54,14 +54,14 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return can_change_fields(cls, context)
+        return poll_editable(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        # A file dropped on the view comes with its path.
+        # A dialog if a file was dropped on the view, so that the path is set; else a file browser.
         return self.invoke_popup(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        mesh = selected_meshes(context)[0].data
+        mesh = selected_mesh_objects(context)[0].data
         try:
             field, note = load_field(
                 bpy.path.abspath(self.filepath),
@@ -70,7 +70,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
                 self.undefined,
                 mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
             )
-            give_fields(self, context, {mesh: field}, self.attribute)
+            assign_fields(self, context, {mesh: field}, self.attribute)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -84,7 +84,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
 
 
 class ROSY_FH_field(bpy.types.FileHandler):
-    """Field files can be dropped on the 3D view."""
+    """Import field files that are dropped on the 3D view."""
 
     bl_idname = "ROSY_FH_field"
     bl_label = "RoSy field"

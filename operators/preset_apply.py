@@ -1,4 +1,4 @@
-"""Give the scene the look of a preset."""
+"""Operator: apply the look of a preset to the scene."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.compositor.presets import load_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
-from ..rosy_addon.ui import shelf
+from ..rosy_addon.presets.store import load_preset
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
 
 
 class ROSY_OT_preset_apply(bpy.types.Operator):
@@ -22,21 +22,21 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
     preset: bpy.props.StringProperty(
         name="Preset",
         description="Name of a preset, RoSy's or your own, or the path of a .json file",
-        search=lambda self, context, typed: shelf.names(),
+        search=lambda self, context, typed: preset_library.preset_keys(),
         search_options={"SUGGESTION"},
     )
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: Any) -> str:
-        """What the preset says of itself."""
+        """Return the description of the preset, as the tooltip."""
         try:
-            return load_preset(properties.preset, presets_folder()).description
+            return load_preset(properties.preset, user_presets_folder()).description
         except RosyError as error:
             return str(error)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            shelf.apply_preset(context.scene.rosy, self.preset)
+            preset_library.apply_preset(context.scene.rosy, self.preset)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -1,4 +1,4 @@
-"""Write a preset to a file that can be passed on."""
+"""Operator: export a preset to a file."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.compositor.presets import load_preset, write_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
-from ..rosy_addon.ui import shelf
-from .shelved import ANY_PRESET, preset_of
+from ..rosy_addon.presets.store import load_preset, write_preset
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
+from .preset_shared import PRESET_ARGUMENTS, target_preset
 
 
 class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
@@ -24,17 +24,17 @@ class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
     filename_ext = ".json"
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
     preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: shelf.names(), **ANY_PRESET
+        search=lambda self, context, typed: preset_library.preset_keys(), **PRESET_ARGUMENTS
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        self.filepath = f"{Path(preset_of(self, context)).stem}.json"
+        self.filepath = f"{Path(target_preset(self, context)).stem}.json"
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = Path(bpy.path.abspath(self.filepath))
         try:
-            write_preset(path, load_preset(preset_of(self, context), presets_folder()))
+            write_preset(path, load_preset(target_preset(self, context), user_presets_folder()))
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -1,13 +1,13 @@
-"""Add a preset that somebody passed on to the user's own."""
+"""Operator: import a preset from a file."""
 
 from __future__ import annotations
 
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.compositor.presets import read_preset, save_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
+from ..rosy_addon.presets.store import read_preset, save_preset
+from ..rosy_addon.scene.paths import user_presets_folder
 
 
 class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
@@ -28,7 +28,7 @@ class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             preset = read_preset(bpy.path.abspath(self.filepath))
-            save_preset(preset, presets_folder(), replace=self.replace)
+            save_preset(preset, user_presets_folder(), replace=self.replace)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

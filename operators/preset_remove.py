@@ -1,14 +1,14 @@
-"""Delete a preset of the user's own."""
+"""Operator: delete one of the user's presets."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.compositor.presets import remove_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
-from ..rosy_addon.ui import shelf
-from .shelved import ANY_PRESET, has_own, preset_of
+from ..rosy_addon.presets.store import remove_preset
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
+from .preset_shared import PRESET_ARGUMENTS, poll_user_presets, target_preset
 
 
 class ROSY_OT_preset_remove(bpy.types.Operator):
@@ -19,16 +19,16 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: shelf.own_names(), **ANY_PRESET
+        search=lambda self, context, typed: preset_library.user_preset_keys(), **PRESET_ARGUMENTS
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_own(cls)
+        return poll_user_presets(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        key = preset_of(self, context)
-        entry = shelf.entries().get(key)
+        key = target_preset(self, context)
+        entry = preset_library.entries().get(key)
         name = key if entry is None else entry.preset.name
         return context.window_manager.invoke_confirm(
             self,
@@ -40,9 +40,9 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
         )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        key = preset_of(self, context)
+        key = target_preset(self, context)
         try:
-            remove_preset(key, presets_folder())
+            remove_preset(key, user_presets_folder())
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -1,14 +1,20 @@
-"""Give a preset of the user's own another name or sentence."""
+"""Operator: change the name or description of one of the user's presets."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.compositor.presets import LONGEST_NAME, rename_preset
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
-from ..rosy_addon.ui import shelf
-from .shelved import ANY_PRESET, SENTENCE, draw_name, has_own, preset_of
+from ..rosy_addon.presets.store import MAX_NAME_LENGTH, rename_preset
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
+from .preset_shared import (
+    DESCRIPTION_ARGUMENTS,
+    PRESET_ARGUMENTS,
+    draw_name_and_description,
+    poll_user_presets,
+    target_preset,
+)
 
 
 class ROSY_OT_preset_rename(bpy.types.Operator):
@@ -19,34 +25,34 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: shelf.own_names(), **ANY_PRESET
+        search=lambda self, context, typed: preset_library.user_preset_keys(), **PRESET_ARGUMENTS
     )
     name: bpy.props.StringProperty(
-        name="Name", description="What the preset is to be called", maxlen=LONGEST_NAME
+        name="Name", description="What the preset is to be called", maxlen=MAX_NAME_LENGTH
     )
-    sentence: bpy.props.StringProperty(**SENTENCE)
+    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_own(cls)
+        return poll_user_presets(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        entry = shelf.entries().get(preset_of(self, context))
+        entry = preset_library.entries().get(target_preset(self, context))
         if entry is not None:
             self.name, self.sentence = entry.preset.name, entry.preset.description
         return context.window_manager.invoke_props_dialog(self, width=400)
 
     def draw(self, context: bpy.types.Context) -> None:
-        draw_name(self.layout, self)
+        draw_name_and_description(self.layout, self)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        old, name = preset_of(self, context), self.name.strip()
+        old, name = target_preset(self, context), self.name.strip()
         try:
-            new = rename_preset(old, name, self.sentence.strip(), presets_folder())
+            new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        shelf.follow(old, new)
+        preset_library.rename_references(old, new)
         self.report({"INFO"}, f"Renamed preset '{old}' to '{name}'")
         return {"FINISHED"}
 

@@ -1,4 +1,4 @@
-"""Keep the scene's look as a preset of the user's own."""
+"""Operator: save the look of the scene as a preset."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.compositor.presets import (
-    LONGEST_NAME,
-    Preset,
-    key_of,
-    save_preset,
-)
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.folders import presets_folder
-from ..rosy_addon.ui import shelf
-from ..rosy_addon.ui.properties import look_of
-from .shelved import SENTENCE, draw_name
+from ..rosy_addon.presets.store import MAX_NAME_LENGTH, Preset, preset_key, save_preset
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
+from ..rosy_addon.ui.properties import read_look
+from .preset_shared import DESCRIPTION_ARGUMENTS, draw_name_and_description
 
 
 class ROSY_OT_preset_save(bpy.types.Operator):
@@ -27,9 +22,9 @@ class ROSY_OT_preset_save(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     name: bpy.props.StringProperty(
-        name="Name", description="What the preset is called", maxlen=LONGEST_NAME
+        name="Name", description="What the preset is called", maxlen=MAX_NAME_LENGTH
     )
-    sentence: bpy.props.StringProperty(**SENTENCE)
+    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
     replace: bpy.props.BoolProperty(
         name="Replace the One There",
         description="Let this preset take the place of one of yours that is called the same",
@@ -37,23 +32,23 @@ class ROSY_OT_preset_save(bpy.types.Operator):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        entry = shelf.chosen(context.scene.rosy)
-        if entry is not None and entry.own:
+        entry = preset_library.active_entry(context.scene.rosy)
+        if entry is not None and entry.is_user:
             self.name, self.sentence = entry.preset.name, entry.preset.description
         return context.window_manager.invoke_props_dialog(self, width=400)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
-        draw_name(layout, self)
-        if _is_own(self.name):
+        draw_name_and_description(layout, self)
+        if _is_user_preset(self.name):
             layout.label(text="You have a preset of this name", icon="INFO")
             layout.prop(self, "replace")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.rosy
-        preset = Preset(self.name.strip(), self.sentence.strip(), look_of(settings))
+        preset = Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
         try:
-            key = save_preset(preset, presets_folder(), replace=self.replace)
+            key = save_preset(preset, user_presets_folder(), replace=self.replace)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -62,9 +57,10 @@ class ROSY_OT_preset_save(bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _is_own(name: Any) -> bool:
+def _is_user_preset(name: Any) -> bool:
+    """Whether the user has a preset of this name."""
     try:
-        return key_of(name) in shelf.own_names()
+        return preset_key(name) in preset_library.user_preset_keys()
     except RosyError:
         return False
 

@@ -1,14 +1,18 @@
-"""Show where fields are singular."""
+"""Operator: show the singularities of fields, in the overlay or as points."""
 
 from __future__ import annotations
 
 import bpy
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.scene.attributes import has_field
-from ..rosy_addon.scene.singular import add_points, remove_points, singular_vertices
+from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.scene.singularity_points import (
+    add_singularity_points,
+    read_singularities,
+    remove_singularity_points,
+)
 from ..rosy_addon.ui import overlay
-from .meshes import has_field_selected, is_idle, selected_meshes
+from .poll import poll_active_field, poll_idle, selected_mesh_objects
 
 
 class ROSY_OT_singularities(bpy.types.Operator):
@@ -30,29 +34,29 @@ class ROSY_OT_singularities(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return is_idle(cls) and has_field_selected(cls, context)
+        return poll_idle(cls) and poll_active_field(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        things = [thing for thing in selected_meshes(context) if has_field(thing)]
+        objects = [obj for obj in selected_mesh_objects(context) if has_field(obj)]
         depsgraph = context.evaluated_depsgraph_get()
         try:
-            found = {thing: singular_vertices(thing, depsgraph) for thing in things}
+            singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for thing, singular in found.items():
-            overlay.hide(thing.name)
-            remove_points(context.scene, thing)
+        for obj, singularities in singularities_by_object.items():
+            overlay.hide(obj.name)
+            remove_singularity_points(context.scene, obj)
             if self.show in ("OVERLAY", "BOTH"):
-                overlay.show(thing.name, singular)
+                overlay.show(obj.name, singularities)
             if self.show in ("POINTS", "BOTH"):
-                add_points(context.scene, thing, singular)
+                add_singularity_points(context.scene, obj, singularities)
         if self.show != "NONE":
-            count = sum(map(len, found.values()))
+            count = sum(map(len, singularities_by_object.values()))
             total = "; ".join(
-                f"'{thing.name}': indices add up to "
-                f"{overlay.index_text(int(singular.index.sum()), singular.degree)}"
-                for thing, singular in found.items()
+                f"'{obj.name}': indices add up to "
+                f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
+                for obj, singularities in singularities_by_object.items()
             )
             self.report({"INFO"}, f"{count} singularities; {total}")
         return {"FINISHED"}

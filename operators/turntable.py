@@ -1,7 +1,8 @@
-"""A film of the active object from all around."""
+"""Operator: render a turntable video of the active object."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from math import degrees
 from pathlib import Path
@@ -9,23 +10,36 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.errors import RosyError
-from ..rosy_addon.files import check_writable
+from ..rosy_addon.cache import Cache
+from ..rosy_addon.file_io import check_writable
+from ..rosy_addon.gpu.select import select_renderer
+from ..rosy_addon.progress import Task
 from ..rosy_addon.projection.camera import check_size
-from ..rosy_addon.scene.bodies import read_scene
-from ..rosy_addon.scene.looks import look_of
-from ..rosy_addon.scene.movie import encode
-from ..rosy_addon.scene.tones import tone_wish
-from ..rosy_addon.turntable import check_film, has_ffmpeg, pictures, write_film
-from .meshes import has_field_selected, is_idle, selected_meshes, with_ending
+from ..rosy_addon.scene.look_properties import read_look
+from ..rosy_addon.scene.read_view import read_turntable
+from ..rosy_addon.scene.video import encode_video
+from ..rosy_addon.turntable import (
+    check_video_path,
+    has_ffmpeg,
+    turntable_task,
+    turntable_views,
+)
+from .modal_task import ModalTaskMixin
+from .poll import poll_active_field, poll_idle, selected_mesh_objects, sync_suffix
+
+#: Properties that are passed on from the file browser to the operator that does the work.
+VIDEO_SETTINGS = ("filepath", "film", "pictures", "rate", "width", "height", "elevation")
 
 
-class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
+class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
     """Draw the active mesh with its field from all around, by the scene's look, as a film"""
 
     bl_idname = "rosy.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER"}
+    cancel_note = "no video was written"
+
+    _in_browser = False
 
     filename_ext = ".mp4"
     filter_glob: bpy.props.StringProperty(default="*.mp4;*.gif", options={"HIDDEN"})
@@ -50,42 +64,59 @@ class ROSY_OT_turntable(bpy.types.Operator, ExportHelper):
         max=1.5,
     )
 
+    skip_browser: bpy.props.BoolProperty(
+        name="Skip Browser",
+        description="Start at once, without a file browser",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return is_idle(cls) and has_field_selected(cls, context)
+        return poll_idle(cls) and poll_active_field(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Keep the name's ending in step with the kind of film, in the file browser."""
-        return with_ending(self, self.film)
+        """Set the suffix of the file name to the video format's in the file browser."""
+        return sync_suffix(self, self.film)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.skip_browser:
+            return ModalTaskMixin.invoke(self, context, event)
+        self._in_browser = True
+        return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        thing = selected_meshes(context)[0]
-        path = Path(bpy.path.abspath(self.filepath))
-        manager = context.window_manager
+        if not self._in_browser:
+            return ModalTaskMixin.execute(self, context)
+        # Blender frees an operator when its file browser is confirmed. A second one does the work.
+        settings = {name: getattr(self, name) for name in VIDEO_SETTINGS}
         try:
-            check_writable(path)
-            check_film(path)
-            look = look_of(context.scene.rosy)
-            look = replace(look, supersampling=max(look.supersampling, 2))
-            wish = tone_wish(context.scene, look)
-            body = read_scene(context.evaluated_depsgraph_get(), [thing], wish=wish).bodies[0]
-            view = -25.0, degrees(self.elevation)
-            size = check_size(self.width, self.height)
-            manager.progress_begin(0, self.pictures)
-            frames = pictures(body, look, self.pictures, size, view)
-            counted = (self._count(manager, number, frame) for number, frame in enumerate(frames))
-            write_film(path, counted, self.rate, None if has_ffmpeg() else encode)
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+            result = bpy.ops.rosy.turntable("INVOKE_DEFAULT", skip_browser=True, **settings)
+        except RuntimeError as error:  # reported by the second operator
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
             return {"CANCELLED"}
-        finally:
-            manager.progress_end()
-        self.report({"INFO"}, f"Wrote {path}")
-        return {"FINISHED"}
+        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
 
-    def _count(self, manager: bpy.types.WindowManager, number: int, frame):
-        manager.progress_update(number)
-        return frame
+    def make_task(self, context: bpy.types.Context) -> Task[Path]:
+        path = Path(bpy.path.abspath(self.filepath))
+        check_writable(path)
+        check_video_path(path)
+        scene = context.scene
+        look = read_look(scene.rosy)
+        look = replace(look, supersampling=max(look.supersampling, 2))
+        renderer = select_renderer(scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False)
+        obj = selected_mesh_objects(context)[0]
+        depsgraph = context.evaluated_depsgraph_get()
+        instance, lights = read_turntable(scene, depsgraph, obj, look)
+        size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
+        views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
+        encode = None if has_ffmpeg() else encode_video
+        return turntable_task(renderer, views, self.pictures, path, self.rate, encode)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return selected_mesh_objects(context)[:1]
+
+    def finish(self, context: bpy.types.Context, result: Path) -> None:
+        self.report({"INFO"}, f"Wrote {result}")
 
 
 CLASSES = (ROSY_OT_turntable,)

@@ -1,11 +1,11 @@
-"""Show fields in the 3D view as it moves, without a bake."""
+"""Operator: switch the live view of fields on or off in a 3D view."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon import live
 from ..rosy_addon.errors import RosyError
+from ..rosy_addon.viewport import session
 
 
 class ROSY_OT_viewport(bpy.types.Operator):
@@ -42,12 +42,12 @@ class ROSY_OT_viewport(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         space = context.space_data
-        on = not live.is_live(space) if self.show == "TOGGLE" else self.show == "ON"
-        if not on:
-            live.stop(space)
+        enable = not session.is_live(space) if self.show == "TOGGLE" else self.show == "ON"
+        if not enable:
+            session.stop(space)
             return {"FINISHED"}
         try:
-            live.start(space, self.device.lower())
+            session.start(space, self.device.lower())
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

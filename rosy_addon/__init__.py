@@ -1,8 +1,21 @@
-"""RoSy: N-way rotational symmetry fields made visible on meshes.
+"""RoSy: draw N-way rotational symmetry fields on meshes, as LIC pictures and hatching.
 
-The rooms, each importing only from those before it::
+A package imports only from those above it::
 
-    field -> projection -> compositor -> scene -> bake, ui -> cli
+    field                 surfaces and fields: formats, generation, analysis, editing
+    projection            cameras, rasterizer, G-buffer and shadow maps
+    compositor, strokes   pictures from G-buffers; streamlines on surfaces as strokes
+    render, image_io      the renderer interface and its numpy renderer; image files
+    gpu, presets          the renderer on the graphics card; stored looks and stroke settings
+    scene                 reading and writing Blender data
+    viewport              the live preview in the 3D view
+    ui                    properties, panels, preferences and overlay
+    cli                   the command line
 
-``field``, ``projection`` and ``compositor`` need numpy alone.
+The modules beside the packages are of two kinds. The base modules, such as `errors`, `progress`,
+`cache` and `settings`, are imported by many packages. The main jobs are run by operators and by the
+command line: `bake`, `animation`, `draw_strokes` and `turntable`.
+
+``field``, ``projection``, ``compositor``, ``strokes``, ``render``, ``image_io`` and ``presets`` do
+not import bpy and need only numpy.
 """

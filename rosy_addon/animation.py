@@ -1,10 +1,11 @@
-"""The main job over a range of frames: read, project, compose, write; what is there already stays.
+"""The main job over a range of frames: read, draw and write each frame that is not up to date.
 
-A frame's picture is a file in a folder, beside it a note of what it was drawn from: a digest of the
-look, the camera, every mesh and field, and the lights. A frame is there when its file is whole and
-the note says the same; so work that was broken off goes on where it stopped, and a change draws
-again only what it touches. Both are written aside and renamed, and the same inputs give the same
-bytes, so that two processes may work on one folder and at worst do a frame twice.
+The picture of a frame is a file in a folder. A sidecar file beside it holds a hash of everything that
+the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A frame is up
+to date if the picture exists and the hash is equal. So work that was stopped continues where it
+stopped, and a change draws only the frames that it affects. Both files are written under a temporary
+name and renamed, and equal inputs give equal bytes. Two processes may therefore share one folder; at
+worst they draw a frame twice.
 """
 
 from __future__ import annotations
@@ -16,226 +17,242 @@ from dataclasses import dataclass
 
 import bpy
 
-from .bake import Source, camera_view, scene_depsgraph, undefined_of
+from .cache import Cache, content_hash
 from .compositor.look import Look
-from .compositor.shading import Light
-from .compositor.tone import Rendered
 from .errors import RosyError
-from .files import read_bytes, write_bytes
-from .gpu.painter import find_card, painting
-from .progress import Progress, Work, drain, part
+from .file_io import read_bytes, write_bytes
+from .gpu.select import select_renderer
+from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
-from .reuse import Kept, digest
-from .scene.apply import Settings, Strip, apply_strip, check_appliable, settings_of
-from .scene.bodies import Reading, prepared, read_scene, rosy_objects
-from .scene.cameras import frame_camera
-from .scene.images import check_folder, frame_path, write_frame
-from .scene.lights import read_lights
-from .scene.looks import look_of
-from .scene.tones import read_rendered, tone_wish
+from .render.renderer import Renderer
+from .render.view_input import ViewInput
+from .scene.blender_images import check_folder, frame_path, write_frame
+from .scene.cameras import CameraSource, frame_camera
+from .scene.look_properties import read_look
+from .scene.pictures import (
+    ImageSequence,
+    OutputSettings,
+    apply_sequence,
+    check_targets,
+    read_output_settings,
+)
+from .scene.read_view import nonfinite_policy, read_views, scene_depsgraph
+from .scene.scene_reader import SceneData, field_objects, temp_attributes
 
-#: How the note of a frame ends; it begins as the picture's name.
-NOTE = ".rosy.txt"
+#: Suffix of a sidecar file, after the name of the picture.
+SIDECAR_SUFFIX = ".rosy.txt"
 
-#: What a note says first. Changes of how pictures are drawn change it, too.
-FORMAT = "rosy frame 1"
+#: First line of a sidecar file. It changes when pictures are drawn differently.
+SIDECAR_HEADER = "rosy frame 1"
 
 
 @dataclass(frozen=True)
-class Frames:
-    """What came of a range of frames from one camera.
+class SequenceResult:
+    """The result of a range of frames from one camera.
 
     Attributes
     ----------
     camera : str
-        Its name; that of the scene if the camera may change from frame to frame.
-    drawn, kept : tuple of int
-        Frames that were drawn now, and that were there already.
-    strip : Strip
+        Name of the camera, or of the scene if the camera may change from frame to frame.
+    rendered, skipped : tuple of int
+        Frames that were drawn, and frames that were up to date.
+    sequence : ImageSequence
     """
 
     camera: str
-    drawn: tuple[int, ...]
-    kept: tuple[int, ...]
-    strip: Strip
+    rendered: tuple[int, ...]
+    skipped: tuple[int, ...]
+    sequence: ImageSequence
 
 
-def baking_animation(
+def bake_animation_task(
     scene: bpy.types.Scene,
     frames: Sequence[int],
     *,
-    cameras: Sequence[Source] | None = None,
+    cameras: Sequence[CameraSource] | None = None,
     objects: Sequence[bpy.types.Object] | None = None,
     look: Look | None = None,
     size: tuple[int, int] | None = None,
-    settings: Settings | None = None,
+    settings: OutputSettings | None = None,
     show: bool = True,
-) -> Work[list[Frames]]:
-    """Draw the fields of a scene at some frames, and have materials play the pictures back.
+) -> Task[list[SequenceResult]]:
+    """Draw the fields of a scene at a range of frames, and apply the image sequences.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        At the frame it is at, in the end.
+        Its current frame is restored in the end.
     frames : sequence of int
     cameras : sequence of bpy.types.Object, optional
-        One sequence of pictures each. If not given, the camera that renders each frame, as markers
-        may say.
+        One image sequence each. By default one sequence from the camera that renders each frame;
+        markers may change it.
     objects, look, size : optional
-        As for `bake`; settings of a look may be animated if it is the scene's.
-    settings : Settings, optional
-        As ``scene.rosy`` says if not given; with a folder.
+        As for `bake`. Settings of the scene's own look may be animated.
+    settings : OutputSettings, optional
+        By default the scene's. Must have a folder.
     show : bool
-        Whether the objects get a material that plays the pictures back.
+        Whether the objects get a material that plays the sequence.
 
     Yields
     ------
     Progress
-        With the time that is left.
+        The label includes the remaining time.
 
     Raises
     ------
     RosyError
-        As `bake`, with the frame; if there is no folder; or a picture cannot be written.
+        As `bake`, with the frame number; if there is no folder; if a picture cannot be written.
     """
-    settings = settings_of(scene) if settings is None else settings
+    settings = read_output_settings(scene) if settings is None else settings
     if settings.folder is None:
         raise RosyError("frames are saved to a folder: choose Output > Store: In a Folder")
     check_folder(settings.folder)
     frames = list(frames)
-    before = scene.frame_current, scene.frame_subframe
-    drawn: dict[str, list[int]] = {}
-    kept: dict[str, list[int]] = {}
-    views: dict[str, Camera] = {}
-    began, spent = time.monotonic(), 0
-    reading = None
-    # What a frame has not used, none of the next ones will: its memory is theirs.
-    held, known = ExitStack(), Kept()
+    original_frame = scene.frame_current, scene.frame_subframe
+    rendered_frames: dict[str, list[int]] = {}
+    skipped_frames: dict[str, list[int]] = {}
+    sequence_cameras: dict[str, Camera] = {}
+    start_time, rendered_count = time.monotonic(), 0
+    scene_data = None
+    # After each frame, entries that it has not used are evicted.
+    exit_stack, cache = ExitStack(), Cache()
     try:
         depsgraph = scene_depsgraph(scene)
-        drawn_ones = rosy_objects(depsgraph.view_layer) if objects is None else list(objects)
+        targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
         if show:
-            check_appliable(drawn_ones, settings)
-        held.enter_context(prepared(depsgraph, drawn_ones, undefined_of(scene), known))
-        for number, frame in enumerate(frames):
-            start, stop = number / len(frames), (number + 1) / len(frames)
-            label = f"frame {frame}{_time_left(began, spent, len(frames) - number)}"
+            check_targets(targets, settings)
+        exit_stack.enter_context(
+            temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache)
+        )
+        for index, frame in enumerate(frames):
+            start, stop = index / len(frames), (index + 1) / len(frames)
+            label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"
             yield Progress(start, label)
             scene.frame_set(frame)
             try:
-                steps = _frame(scene, frame, cameras, objects, look, size, settings, known)
-                reading, results = yield from part(steps, start, stop, label)
+                task = _frame_task(scene, frame, cameras, objects, look, size, settings, cache)
+                scene_data, results = yield from subtask(task, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
-            for name, (view, was_there) in results.items():
-                (kept if was_there else drawn).setdefault(name, []).append(frame)
-                views[name] = view
-            # Frames that were there take no time to speak of.
-            spent += not all(was_there for _, was_there in results.values())
-            if not spent:
-                began = time.monotonic()
-        made = []
-        for name, view in views.items():
+            for name, (camera, up_to_date) in results.items():
+                (skipped_frames if up_to_date else rendered_frames).setdefault(name, []).append(
+                    frame
+                )
+                sequence_cameras[name] = camera
+            # Frames that are up to date take almost no time and do not count.
+            rendered_count += not all(up_to_date for _, up_to_date in results.values())
+            if not rendered_count:
+                start_time = time.monotonic()
+        sequence_results = []
+        for name, camera in sequence_cameras.items():
             path = frame_path(settings.folder, name, frames[0], settings.as_float)
-            strip = Strip(name, path, frames[0], frames[-1], view.width, view.height)
+            sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
             if show:
-                apply_strip(scene, reading, strip, view, settings)
-            mine = tuple(drawn.get(name, ())), tuple(kept.get(name, ()))
-            made.append(Frames(name, *mine, strip))
-        return made
+                apply_sequence(scene, scene_data, sequence, camera, settings)
+            frame_lists = tuple(rendered_frames.get(name, ())), tuple(skipped_frames.get(name, ()))
+            sequence_results.append(SequenceResult(name, *frame_lists, sequence))
+        return sequence_results
     finally:
-        held.close()
-        scene.frame_set(before[0], subframe=before[1])
+        exit_stack.close()
+        cache.clear()  # of renderers, which refer to it
+        scene.frame_set(original_frame[0], subframe=original_frame[1])
 
 
-def bake_animation(scene: bpy.types.Scene, frames: Sequence[int], **more) -> list[Frames]:
-    """`baking_animation`, run to its end."""
-    return drain(baking_animation(scene, frames, **more))
+def bake_animation(
+    scene: bpy.types.Scene, frames: Sequence[int], **options
+) -> list[SequenceResult]:
+    """Run `bake_animation_task` to its end."""
+    return run_to_completion(bake_animation_task(scene, frames, **options))
 
 
-def _frame(
+def _frame_task(
     scene: bpy.types.Scene,
     frame: int,
-    cameras: Sequence[Source] | None,
+    cameras: Sequence[CameraSource] | None,
     objects: Sequence[bpy.types.Object] | None,
     look: Look | None,
     size: tuple[int, int] | None,
-    settings: Settings,
-    kept: Kept,
-) -> Work[tuple[Reading, dict]]:
-    """Draw one frame from all cameras; by the names of the sequences their views, and whether the
-    picture was there."""
-    look = look_of(scene.rosy) if look is None else look
-    card = kept.find_or_make(
-        ("card", settings.device), lambda: (find_card(settings.device, look),)
-    )[0]
-    depsgraph = scene_depsgraph(scene)
+    settings: OutputSettings,
+    cache: Cache,
+) -> Task[tuple[SceneData, dict]]:
+    """Draw one frame from all cameras.
+
+    Returns
+    -------
+    scene_data : SceneData
+    results : dict of str to (Camera, bool)
+        By the name of the sequence: the camera, and whether the picture was up to date.
+    """
+    look = read_look(scene.rosy) if look is None else look
+    # The look may be animated, and its method decides which renderer can draw it.
+    renderer = cache.get_or_create(
+        ("renderer", settings.device, look.method),
+        lambda: select_renderer(settings.device, look, cache, keep_gbuffers=False),
+    )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
-    wish = tone_wish(scene, look)
-    reading = read_scene(depsgraph, objects, undefined_of(scene), kept, wish)
-    rendered = None
-    if look.tone == "picture":
-        rendered = read_rendered(scene, depsgraph, frame_camera(scene, frame), look)
+    scene_views = read_views(
+        scene,
+        scene_depsgraph(scene),
+        sources,
+        look,
+        objects=objects,
+        size=size,
+        reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
+        cache=cache,
+    )
     results = {}
-    for number, source in enumerate(sources):
-        start, stop = number / len(sources), (number + 1) / len(sources)
-        view = camera_view(scene, depsgraph, source, size)
-        name = scene.name if cameras is None else view.name
-        lights = read_lights(depsgraph, view.view)
+    for index, view in enumerate(scene_views.views):
+        start, stop = index / len(sources), (index + 1) / len(sources)
+        name = scene.name if cameras is None else view.camera.name
         path = frame_path(settings.folder, name, frame, settings.as_float)
-        note = path.with_name(path.name + NOTE)
-        drawn_from = _inputs(
-            reading, look, view, lights, settings, rendered, by_card=card is not None
-        )
-        inputs = f"{FORMAT}\n{drawn_from.hex()}\n".encode()
-        was_there = path.is_file() and note.is_file() and read_bytes(note) == inputs
-        if not was_there:
-            fine = view.scaled(look.supersampling)
-            work = painting(card, reading.bodies, fine, look, lights, rendered=rendered)
-            picture = yield from part(work, start, stop)
-            note.unlink(missing_ok=True)
+        sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
+        input_hash = _input_hash(view, renderer, settings)
+        sidecar_bytes = f"{SIDECAR_HEADER}\n{input_hash.hex()}\n".encode()
+        up_to_date = path.is_file() and sidecar.is_file() and read_bytes(sidecar) == sidecar_bytes
+        if not up_to_date:
+            picture = yield from subtask(renderer.render_task(view), start, stop)
+            sidecar.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
-            write_bytes(note, inputs)
-        results[name] = view, was_there
-    kept.forget_unused()
-    return reading, results
+            write_bytes(sidecar, sidecar_bytes)
+        results[name] = view.camera, up_to_date
+    cache.evict_unused()
+    return scene_views.scene_data, results
 
 
-def _inputs(
-    reading: Reading,
-    look: Look,
-    view: Camera,
-    lights: Sequence[Light],
-    settings: Settings,
-    rendered: Rendered | None,
-    *,
-    by_card: bool,
-) -> bytes:
-    """A digest of all that a picture is drawn from."""
-    parts: list = [look, view.view, view.projection, view.width, view.height, settings.as_float]
-    if by_card:
+def _input_hash(view: ViewInput, renderer: Renderer, settings: OutputSettings) -> bytes:
+    """Return a digest of everything that a picture is drawn from."""
+    camera, reference = view.camera, view.reference
+    parts: list = [
+        view.look,
+        camera.view,
+        camera.projection,
+        camera.width,
+        camera.height,
+        settings.as_float,
+    ]
+    if renderer.device_name == "gpu":
         parts.append("by the graphics card")
-    if look.light == "scene":
-        for light in lights:
+    if view.look.light == "scene":
+        for light in view.lights:
             parts += vars(light).values()
-    if rendered is not None:
-        parts += [rendered.luminance, rendered.camera.view, rendered.camera.projection]
-    for body in reading.bodies:
-        surface, field = body.surface, body.field
-        parts += [body.matrix, surface.vertices, surface.triangles, surface.corner_vertex]
+    if reference is not None:
+        parts += [reference.luminance, reference.camera.view, reference.camera.projection]
+    for instance in view.instances:
+        surface, field = instance.surface, instance.field
+        parts += [instance.matrix, surface.vertices, surface.triangles, surface.corner_vertex]
         if field is not None:
-            parts += [surface.corner_normal, surface.corner_fan, surface.rest]
-            parts += [field.degree, field.vectors, field.deviations, field.families]
-        if body.tone is not None:
-            parts += [body.tone.values, body.tone.image]
-    return digest(*parts)
+            parts += [surface.corner_normal, surface.corner_fan, surface.rest_vertices]
+            parts += [field.degree, field.vectors, field.direction_ratios, field.family_count]
+        if instance.tone is not None:
+            parts += [instance.tone.values, instance.tone.image]
+    return content_hash(*parts)
 
 
-def _time_left(began: float, spent: int, left: int) -> str:
-    """How long the rest will take, in words; nothing until it can be told."""
-    if not spent:
+def _time_left(start_time: float, rendered_count: int, remaining_count: int) -> str:
+    """Return the remaining time as text, or "" before the first frame is drawn."""
+    if not rendered_count:
         return ""
-    seconds = (time.monotonic() - began) / spent * left
+    seconds = (time.monotonic() - start_time) / rendered_count * remaining_count
     if seconds < 90:
         return f", {seconds:.0f} s left"
     minutes = seconds / 60

@@ -1,17 +1,17 @@
-"""The exceptions that users see as a line of text."""
+"""Exceptions whose messages are shown to the user."""
 
 
 class RosyError(ValueError):
-    """Something the user can put right, said in one line.
+    """An error that the user can correct, with a message of one line.
 
-    The message names the thing (object, attribute, file and line), what was found and what
-    was wanted. Operators report it, the command line prints it and exits with status 2.
+    The message says where the error is (object, attribute, file or line), what was found and what
+    was expected. Operators report it. The command line prints it and exits with status 2.
     """
 
 
 class NothingInViewError(RosyError):
-    """A camera sees none of the RoSy objects."""
+    """No object with a field is visible from the camera."""
 
 
 class DeviceError(RosyError):
-    """There is no graphics card to draw with, or it does not take the shaders."""
+    """There is no usable graphics card, or the shaders do not compile on it."""

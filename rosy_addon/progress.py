@@ -1,4 +1,8 @@
-"""Long work as a generator of `Progress`: a modal operator ticks it, a script drains it."""
+"""Long tasks as generators that yield `Progress`.
+
+A modal operator advances a task step by step, so that Blender stays responsive and the user can
+cancel. A script runs it to completion.
+"""
 
 from __future__ import annotations
 
@@ -9,39 +13,69 @@ Result = TypeVar("Result")
 
 
 class Progress(NamedTuple):
-    """How far a piece of long work is.
+    """How far a task has come.
 
     Attributes
     ----------
     fraction : float
         0 at the start, 1 when done.
     label : str
-        What is being done, for a status bar.
+        The current step, for a status bar.
     """
 
     fraction: float
     label: str
 
 
-#: Long work that ends in a `Result`. Closing the generator cancels the work.
-Work = Generator[Progress, None, Result]
+#: A generator that yields `Progress` and returns a `Result`. Closing it cancels the task.
+Task = Generator[Progress, None, Result]
 
 
-def drain(work: Work[Result]) -> Result:
-    """Run `work` to its end and return its result."""
+def run_to_completion(task: Task[Result]) -> Result:
+    """Run a task to its end and return its result."""
     while True:
         try:
-            next(work)
-        except StopIteration as done:
-            return done.value
+            next(task)
+        except StopIteration as end:
+            return end.value
 
 
-def part(work: Work[Result], start: float, stop: float, label: str | None = None) -> Work[Result]:
-    """Run `work` as the stretch from `start` to `stop` of something longer, under a label of that."""
+def subtask(
+    task: Task[Result], start: float, stop: float, label: str | None = None
+) -> Task[Result]:
+    """Run a task as one part of a longer task, with its progress scaled to that part.
+
+    Parameters
+    ----------
+    task : Task
+    start, stop : float
+        Fractions of the longer task at which this part starts and ends.
+    label : str, optional
+        Replaces the labels of `task`.
+
+    Yields
+    ------
+    Progress
+        With the fraction of the longer task.
+
+    Returns
+    -------
+    Result
+        The result of `task`.
+
+    Examples
+    --------
+    ::
+
+        def both_task() -> Task[tuple[int, int]]:
+            first = yield from subtask(first_task(), 0.0, 0.5)
+            second = yield from subtask(second_task(), 0.5, 1.0)
+            return first, second
+    """
     while True:
         try:
-            step = next(work)
-        except StopIteration as done:
-            return done.value
-        fraction = start + (stop - start) * step.fraction
-        yield Progress(fraction, step.label if label is None else label)
+            progress = next(task)
+        except StopIteration as end:
+            return end.value
+        fraction = start + (stop - start) * progress.fraction
+        yield Progress(fraction, progress.label if label is None else label)

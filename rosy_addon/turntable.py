@@ -1,174 +1,241 @@
-"""A mesh and its field on a turntable: pictures all around, and what makes a film of them."""
+"""Turntables: pictures of one mesh from all sides, written as a video."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from .compositor.colour import to_display
-from .compositor.compose import compose
-from .compositor.gif import gif_bytes
+from .color import to_display
 from .compositor.look import Look
-from .compositor.png import write_png
+from .compositor.shading import Light
 from .errors import RosyError
-from .files import write_bytes
-from .projection.camera import Camera, orbit_camera
-from .projection.gbuffer import Body
-from .projection.project import project
+from .file_io import write_bytes
+from .image_io.gif import gif_bytes
+from .image_io.png import write_png
+from .progress import Progress, Task, subtask
+from .projection.camera import orbit_camera
+from .projection.gbuffer import MeshInstance
+from .render.renderer import Renderer
+from .render.view_input import ViewInput
 
-#: Films that can be made, by the end of the name.
-FILMS = (".mp4", ".gif")
+#: Suffixes of videos that can be written.
+VIDEO_SUFFIXES = (".mp4", ".gif")
 
-#: Makes a film: folder of pictures, their number and size, the rate, and the file.
+#: Encodes a video: folder of pictures, their number and size, frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
-#: Directions in which the outermost points are looked at, for a frame that holds all of them.
-AROUND = 48
+#: Points per circle of the hull that is framed.
+HULL_SAMPLES = 48
+
+#: Share of the progress bar after which the pictures are encoded.
+ENCODING_START = 0.97
 
 
-def pictures(
-    body: Body,
+def turntable_views(
+    instance: MeshInstance,
     look: Look,
     count: int,
     size: tuple[int, int],
-    view: tuple[float, float],
+    view_angles: tuple[float, float],
+    *,
     perspective: bool = True,
-) -> Iterator[np.ndarray]:
-    """Pictures from all around, the camera going counter-clockwise.
+    lights: Sequence[Light] = (),
+) -> Iterator[ViewInput]:
+    """Return the views of a camera that orbits a mesh once, counter-clockwise.
 
     Parameters
     ----------
-    body : Body
+    instance : MeshInstance
         In world space, z up.
     look : Look
     count : int
-        Pictures of a full turn.
+        Pictures per revolution.
     size : (int, int)
         Pixels.
-    view : (float, float)
-        Azimuth of the first one, and elevation, degrees.
+    view_angles : (float, float)
+        Azimuth of the first view, and elevation, in degrees.
     perspective : bool
+    lights : sequence of Light
+        World space. The camera moves, the lights do not.
+    """
+    hull = _swept_hull(instance.world_points())
+    for index in range(count):
+        azimuth = view_angles[0] + 360 * index / count
+        camera = orbit_camera(hull, azimuth, view_angles[1], *size, perspective=perspective)
+        camera_lights = tuple(light.transformed(camera.view) for light in lights)
+        yield ViewInput((instance,), camera, look, camera_lights)
+
+
+def turntable_task(
+    renderer: Renderer,
+    views: Iterator[ViewInput],
+    count: int,
+    path: Path,
+    fps: float,
+    encode: Encoder | None = None,
+) -> Task[Path]:
+    """Draw views and write them as a video. No file is written before all pictures are drawn.
+
+    Parameters
+    ----------
+    renderer : Renderer
+    views : iterator of ViewInput
+        From `turntable_views`.
+    count : int
+        Number of views.
+    path, fps, encode
+        See `VideoWriter`.
 
     Yields
     ------
-    (H, W, 4) float32 ndarray
-        As `Picture.rgba`.
+    Progress
+
+    Returns
+    -------
+    Path
+        The file.
     """
-    points = body.world_points()
-    hull = _turned_hull(points)
-    for number in range(count):
-        azimuth = view[0] + 360 * number / count
-        camera = _camera(hull, azimuth, view[1], size, look.supersampling, perspective)
-        yield compose(project([body], camera, look.display), look).rgba
+    with VideoWriter(path, fps, encode) as writer:
+        for index, view in enumerate(views):
+            start, stop = (ENCODING_START * done / count for done in (index, index + 1))
+            label = f"picture {index + 1} of {count}"
+            yield Progress(start, label)
+            picture = yield from subtask(renderer.render_task(view), start, stop, label)
+            writer.add(picture.rgba)
+        yield Progress(ENCODING_START, "encoding the video")
+        writer.write()
+    return path
 
 
-def write_film(
-    path: Path, frames: Iterator[np.ndarray], rate: float, encode: Encoder | None = None
-) -> None:
-    """Write pictures as a film, on white paper.
+class VideoWriter:
+    """Collects pictures and writes them as a video, on white paper. A context manager.
 
     Parameters
     ----------
     path : Path
-        A .gif needs nothing, an .mp4 an encoder.
-    frames : iterator of (H, W, 4) float32 ndarray
-        Of one size; sides of an odd number of pixels are cut by one for an .mp4.
-    rate : float
-        Pictures a second.
+        A .gif needs no encoder; an .mp4 does.
+    fps : float
+        Frames per second.
     encode : function, optional
-        Makes a film of pictures in a folder, given their number and size, the rate, and where to;
-        the program ffmpeg if not given.
-
-    Raises
-    ------
-    RosyError
-        If the name ends in neither, or the film cannot be made or written.
+        Encodes the pictures of a folder as .mp4, given the folder, the number and size of the
+        pictures, the frames per second and the file; by default the program ffmpeg.
     """
-    if path.suffix.lower() == ".gif":
-        write_bytes(path, gif_bytes([_on_paper(frame) for frame in frames], rate))
-        return
-    with tempfile.TemporaryDirectory() as name:
-        folder, count, size = Path(name), 0, (0, 0)
-        for frame in frames:
-            frame = frame[: len(frame) // 2 * 2, : frame.shape[1] // 2 * 2]
-            opaque = np.ones_like(frame)
-            opaque[..., :3] = 1 + frame[..., 3:] * (frame[..., :3] - 1)
-            write_png(folder / f"{count:05d}.png", opaque)
-            count, size = count + 1, (frame.shape[1], frame.shape[0])
-        film = folder / "film.mp4"
-        (_by_ffmpeg if encode is None else encode)(folder, count, size, rate, film)
-        write_bytes(path, film.read_bytes())
+
+    def __init__(self, path: Path, fps: float, encode: Encoder | None = None) -> None:
+        self._path, self._fps = path, fps
+        self._encode = _encode_with_ffmpeg if encode is None else encode
+        self._is_gif = path.suffix.lower() == ".gif"
+        self._temp_folder = tempfile.TemporaryDirectory()
+        self._gif_frames: list[np.ndarray] = []
+        self._count, self._size = 0, (0, 0)
+
+    def __enter__(self) -> VideoWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._temp_folder.cleanup()
+
+    def add(self, rgba: np.ndarray) -> None:
+        """Add a picture.
+
+        Parameters
+        ----------
+        rgba : (H, W, 4) float32 ndarray
+            As `Picture.rgba`. All pictures have the same size. An .mp4 needs even sides, so the
+            last row or column of an odd one is cut off.
+        """
+        if self._is_gif:
+            self._gif_frames.append(_gif_frame(rgba))
+            return
+        rgba = rgba[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2]
+        opaque = np.ones_like(rgba)
+        opaque[..., :3] = _over_white(rgba)
+        write_png(Path(self._temp_folder.name) / f"{self._count:05d}.png", opaque)
+        self._count, self._size = self._count + 1, (rgba.shape[1], rgba.shape[0])
+
+    def write(self) -> None:
+        """Write the video.
+
+        Raises
+        ------
+        RosyError
+            If it cannot be encoded or written.
+        """
+        if self._is_gif:
+            write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
+            return
+        folder = Path(self._temp_folder.name)
+        video_path = folder / "film.mp4"
+        self._encode(folder, self._count, self._size, self._fps, video_path)
+        write_bytes(self._path, video_path.read_bytes())
 
 
 def has_ffmpeg() -> bool:
-    """Whether that program is there."""
+    """Return whether the program ffmpeg is installed."""
     return shutil.which("ffmpeg") is not None
 
 
-def check_film(path: Path) -> None:
-    """Find out before long work whether films have such names.
+def check_video_path(path: Path) -> None:
+    """Refuse a file name of a video that cannot be written.
 
     Raises
     ------
     RosyError
     """
-    if path.suffix.lower() not in FILMS:
-        raise RosyError(f"{path}: films are written to {' and '.join(FILMS)} files")
+    if path.suffix.lower() not in VIDEO_SUFFIXES:
+        raise RosyError(f"{path}: films are written to {' and '.join(VIDEO_SUFFIXES)} files")
 
 
-def _by_ffmpeg(folder: Path, count: int, size: tuple[int, int], rate: float, path: Path) -> None:
+def _encode_with_ffmpeg(
+    folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
+) -> None:
     command = [
-        "ffmpeg", "-v", "error", "-y", "-framerate", f"{rate:g}", "-i", f"{folder}/%05d.png",
+        "ffmpeg", "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
         "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        why = (done.stderr.strip().splitlines() or ["it failed"])[-1]
-        raise RosyError(f"ffmpeg: {why}")
+    process = subprocess.run(command, capture_output=True, text=True, check=False)
+    if process.returncode:
+        message = (process.stderr.strip().splitlines() or ["it failed"])[-1]
+        raise RosyError(f"ffmpeg: {message}")
 
 
-def _on_paper(rgba: np.ndarray) -> np.ndarray:
-    """(H, W, 3) uint8 from the top."""
-    mixed = 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
-    return np.rint(to_display(mixed[::-1]) * 255).astype(np.uint8)
+def _over_white(rgba: np.ndarray) -> np.ndarray:
+    """Return a picture on white paper as (H, W, 3) float32, linear."""
+    return 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
 
 
-def _turned_hull(points: np.ndarray) -> np.ndarray:
-    """Points that bound all that a mesh passes as it turns about the z axis through its middle."""
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    out = np.hypot(points[:, 0] - middle[0], points[:, 1] - middle[1])
-    # The widest points of each of some slices will do.
-    slices = np.clip(
+def _gif_frame(rgba: np.ndarray) -> np.ndarray:
+    """Return a picture on white paper as (H, W, 3) uint8, with the top row first."""
+    return np.rint(to_display(_over_white(rgba)[::-1]) * 255).astype(np.uint8)
+
+
+def _swept_hull(points: np.ndarray) -> np.ndarray:
+    """Return points around everything that a mesh sweeps when it turns about its vertical axis.
+
+    The mesh is cut into 32 horizontal slices. Each is enclosed by a cylinder, whose two rims are
+    sampled.
+    """
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    radius = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
+    slice_position = np.clip(
         (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2]).clip(1e-12) * 31, 0, 31
     )
-    widest = np.zeros(32)
-    np.maximum.at(widest, slices.astype(int), out)
-    low, high = np.full(32, np.inf), np.full(32, -np.inf)
-    np.minimum.at(low, slices.astype(int), points[:, 2])
-    np.maximum.at(high, slices.astype(int), points[:, 2])
-    used = np.isfinite(low)
-    angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    max_radius = np.zeros(32)
+    np.maximum.at(max_radius, slice_position.astype(int), radius)
+    min_z, max_z = np.full(32, np.inf), np.full(32, -np.inf)
+    np.minimum.at(min_z, slice_position.astype(int), points[:, 2])
+    np.maximum.at(max_z, slice_position.astype(int), points[:, 2])
+    is_occupied = np.isfinite(min_z)
+    angle = np.linspace(0, 2 * np.pi, HULL_SAMPLES, endpoint=False)
     rings = []
-    for height in (low[used], high[used]):
-        x = middle[0] + widest[used, None] * np.cos(angle)
-        y = middle[1] + widest[used, None] * np.sin(angle)
-        z = np.broadcast_to(height[:, None], x.shape)
+    for rim_z in (min_z[is_occupied], max_z[is_occupied]):
+        x = center[0] + max_radius[is_occupied, None] * np.cos(angle)
+        y = center[1] + max_radius[is_occupied, None] * np.sin(angle)
+        z = np.broadcast_to(rim_z[:, None], x.shape)
         rings.append(np.stack([x, y, z], axis=-1).reshape(-1, 3))
     return np.concatenate(rings)
-
-
-def _camera(
-    hull: np.ndarray,
-    azimuth: float,
-    elevation: float,
-    size: tuple[int, int],
-    finer: int,
-    perspective: bool,
-) -> Camera:
-    width, height = (side * finer for side in size)
-    return orbit_camera(hull, azimuth, elevation, width, height, perspective=perspective)

@@ -1,89 +1,98 @@
-"""How bright and how varied the pixels of LIC images are, without looking at any."""
+"""Contrast correction of LIC images, with factors from theory instead of image analysis."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .kernel import whole_samples
+from .filter_kernel import full_sample_count
+from .image_noise import NOISE_MEAN, streak_moments
 from .look import Look
-from .noise import MEAN, streak_statistics
 
 
-def even_out(mean: np.ndarray, samples: np.ndarray, look: Look) -> np.ndarray:
-    """Give streamlines that ended early the spread of whole ones.
+def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Look) -> np.ndarray:
+    """Scale averages over streamlines that ended early to the variance of full streamlines.
 
-    The mean of n samples has full / n times the variance of that of all of them; without this,
-    borders and the surroundings of zeros glare. Means over less than two cells of the noise are
-    hardly means at all, but bright and dark dots: these fade to grey.
+    The mean of n samples has full / n times the variance of the mean of all samples. Without this
+    correction, contrast is too high at borders and around zeros of the field. Means over less than
+    two cells of the noise fade to gray, as they would look like dots, not streaks.
 
     Parameters
     ----------
     mean : (P, K) float32 ndarray
         Mean noise along each streamline.
-    samples : (P,) float32 ndarray
+    effective_samples : (P,) float32 ndarray
         n, at least 1.
     look : Look
-        Its `length`, `taper`, `step` and `grain` count.
+        In pixels of the frame. Its `length`, `taper`, `step` and `grain` are used.
+
+    Returns
+    -------
+    (P, K) float32 ndarray
     """
-    full = np.float32(whole_samples(look))
-    cells = samples * np.float32(look.step / look.grain)
-    factor = np.sqrt(samples / full) * np.minimum(cells / 2, 1)
-    return MEAN + (mean - MEAN) * factor[:, None]
+    full_samples = np.float32(full_sample_count(look))
+    cells = effective_samples * np.float32(look.step / look.grain)
+    factor = np.sqrt(effective_samples / full_samples) * np.minimum(cells / 2, 1)
+    return NOISE_MEAN + (mean - NOISE_MEAN) * factor[:, None]
 
 
-def blend_gain(images: int, samples: np.ndarray, look: Look) -> np.ndarray:
-    """The factor that gives the mean of M member images the spread of one: about sqrt(M).
+def blend_gain(image_count: int, effective_samples: np.ndarray, look: Look) -> np.ndarray:
+    """Compute the factor that gives the mean of M member images the standard deviation of one.
 
-    Equation 6 of the paper takes the M values at a pixel for independent. They are not quite: all
-    M streamlines cross there and share the noise around the crossing, so that the variance of
-    the mean is (1 + r) / M of that of one, r being the sum of the correlations of one of them with
-    the others (`noise.streak_statistics`). At N = 7 and the usual length sqrt(M) alone is a
-    tenth too much. Correlations grow as streamlines get shorter.
+    It is about sqrt(M). Equation 6 of the paper assumes that the M values at a pixel are
+    independent. But all M streamlines cross at the pixel and share the noise around it. The
+    variance of the mean is that of one image times (1 + r) / M, where r is the sum of the
+    correlations of one streamline with the others (`image_noise.streak_moments`). For N = 7 and the
+    default length, sqrt(M) alone is 10 percent too high. Correlations grow as streamlines get
+    shorter.
 
     Parameters
     ----------
-    images : int
+    image_count : int
         M.
-    samples : (P,) float32 ndarray
-        Of a streamline, mean over the M of a pixel.
+    effective_samples : (P,) float32 ndarray
+        Effective samples of a streamline, mean over the M lines of a pixel.
     look : Look
-        Its `length`, `taper`, `step`, `grain` and `high_pass` count.
+        In pixels of the frame. Its `length`, `taper`, `step`, `grain` and `high_pass` are used.
 
     Returns
     -------
     (P,) float32 ndarray
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
-    _, crossing = streak_statistics(*streaks_of(look), images, tapered=look.taper)
-    shared = np.clip(crossing * whole_samples(look) / samples, 0, images - 1)
-    return np.sqrt(images / (1 + shared)).astype(np.float32)
+    _, correlation_sum = streak_moments(*streak_args(look), image_count, tapered=look.taper)
+    pixel_correlation = np.clip(
+        correlation_sum * full_sample_count(look) / effective_samples, 0, image_count - 1
+    )
+    return np.sqrt(image_count / (1 + pixel_correlation)).astype(np.float32)
 
 
-def averaging_gain(look: Look) -> float:
-    """The factor that gives supersampled streaks the contrast of those drawn at once.
+def supersampling_gain(look: Look) -> float:
+    """Compute the factor that gives supersampled streaks the contrast without supersampling.
 
     Parameters
     ----------
     look : Look
-        With its lengths in the pixels of the supersampled frame.
+        In pixels of the supersampled frame.
     """
-    side = look.supersampling
-    fine = streaks_of(look)
-    averaged, _ = streak_statistics(*fine, average=side, tapered=look.taper)
-    at_once, _ = streak_statistics(*(length / side for length in fine), tapered=look.taper)
-    return at_once / averaged
+    subpixels = look.supersampling
+    supersampled_args = streak_args(look)
+    supersampled_std, _ = streak_moments(*supersampled_args, average=subpixels, tapered=look.taper)
+    direct_std, _ = streak_moments(
+        *(length / subpixels for length in supersampled_args), tapered=look.taper
+    )
+    return direct_std / supersampled_std
 
 
-def expected_deviation(look: Look) -> float:
-    """Standard deviation of one member image with whole streamlines, from theory."""
-    return streak_statistics(*streaks_of(look), tapered=look.taper)[0]
+def expected_std(look: Look) -> float:
+    """Compute the theoretical standard deviation of one member image, with full streamlines."""
+    return streak_moments(*streak_args(look), tapered=look.taper)[0]
 
 
-def streaks_of(look: Look) -> tuple[float, float, float]:
-    """Length of the streamlines, grain and high pass of the noise, in pixels."""
+def streak_args(look: Look) -> tuple[float, float, float]:
+    """Length of the streamlines, and grain and high-pass width of the noise, in pixels."""
     return (2 * look.length + 1) * look.step, look.grain, look.high_pass
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:
-    """Values spread by `gain` about the mean of the noise (equation 6)."""
-    return MEAN + gain * (tone - MEAN)
+    """Scale the difference of tones from the mean of the noise by `gain` (equation 6)."""
+    return NOISE_MEAN + gain * (tone - NOISE_MEAN)

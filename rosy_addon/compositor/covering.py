@@ -1,22 +1,22 @@
-"""The covering surface of a field: its states, and what a streamline has to know of each.
+"""The covering surface of a field, and a compact table of its states for tracing streamlines.
 
-A state is a pixel and a *sheet* k, one of S half-directions: the angle t + 2 pi k / S, where t is
-that of the representation, and S is N for even N, 2 N for odd. The states are the points of an
-S-fold covering of the surface, on which the field is one vector field without breaking points: a
+A *state* is a pixel and a *sheet* k. Sheet k is the direction at the angle t + 2 pi k / S, where t
+is the angle of the representation, and S is N for even N and 2 N for odd N. The states form an
+S-fold covering of the surface. On it the field is a single vector field without breaking points. A
 step from (p, k) to the pixel q leads to the sheet
 
     k' = k + round((t(p) - t(q)) S / 2 pi)  mod S,
 
-a closed form for the best of all members. Sheets k and k + S / 2 are the two directions of one
-streamline, so that M = S / 2 *lines* pass through a pixel, one a member image.
+which is the best match of all members in closed form. Sheets k and k + S / 2 are the two directions
+of one streamline, so M = S / 2 *lines* pass through a pixel, one per member image.
 
-Directions that are no RoSy go from member to member as the RoSy does from which they deviate. If
-they come without their opposites, forward and backward are two coverings of N sheets each, and
-a streamline stays on its own: N sheets are *around* a pixel then, not S.
+Directions that are not a RoSy are matched like the members of the RoSy that they deviate from. If
+they have no opposites, the forward and backward directions are two separate coverings of N sheets,
+and a streamline stays on one of them. A full turn then passes N sheets, not S.
 
-A streamline waits for memory, not for arithmetic. So a state's record is as short as can be, and
-pixels are *cells* of a window of the frame, with a border: the next one is a sum away, and no
-table of neighbours is read.
+Tracing is bound by memory accesses, not by arithmetic. So the record of a state is short. Pixels
+are *cells* of a window of the frame that has a border: the index of a neighbor is a sum, and no
+table of neighbors is read.
 """
 
 from __future__ import annotations
@@ -25,288 +25,316 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..field.directions import evaluate
-from ..trigonometry import angle_of, cosine_sine
-from .flow import OFFSETS, Flow, phase
+from ..deterministic_trig import cos_sin, vector_angle
+from ..field.directional_field import evaluate_harmonics
 from .look import Look
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, normalized
 
-#: Pixels unfolded at once, so that they stay in a core's cache.
-BLOCK = 1 << 14
+#: Number of pixels of a block. Their data fits the cache of a processor core.
+BLOCK_PIXELS = 1 << 14
 
-#: The largest number of a record.
-TOP = 32767
+#: The largest integer in `Covering.state_table`.
+INT16_MAX = 32767
 
-#: Bits of `Flow.joined` of a pixel that goes on to all neighbours.
-OPEN = 0b111_111_111
+#: `PixelField.neighbor_mask` of a pixel that is linked to all neighbors.
+ALL_NEIGHBORS = 0b111_111_111
 
-#: The cell where streamlines end: a corner of the border.
-END = 0
+#: The cell that streamlines stay in after their end: a corner of the border.
+SINK_CELL = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Covering:
-    """The states of a flow.
+    """The states of a pixel field.
 
-    State (c, k) is entry k C + c of `records`; line l of the cell c, of the sheets l and l + S / 2,
-    is entry l C + c elsewhere.
+    State (c, k) is row k C + c of `state_table`. Line l of the cell c consists of the sheets l and
+    l + S / 2, and has the index l C + c in arrays of lines.
 
     Attributes
     ----------
     sheets : int
         S.
-    around : int
-        How many of them make a full turn: S, or N.
+    sheets_per_turn : int
+        Sheets that a full turn passes: S, or N.
     width : int
-        Cells of a row of the window: one above another is so far away.
-    place : (P,) int32 ndarray
+        Cells of a row of the window, which is the distance of a cell from the one above it.
+    cell_of_pixel : (P,) int32 ndarray
         The cell of each pixel.
-    turn : (C,) float32 ndarray
-        t in parts of a full turn, `around` of them, plus 2. The last nine bits, too fine to matter, hold what can be
-        got with `joined`: streamlines look both up at every step, so they lie together.
-    records : (S C, 2 + 2 K) int16 ndarray
-        A step on screen, and for each channel the noise and its slope to the left.
-    units : (3,) tuple of float
-        Of these three, in pixels and in tones.
+    packed_phase : (C,) float32 ndarray
+        t plus 2, in units of a full turn divided by `sheets_per_turn`. The last nine bits of the
+        mantissa hold the neighbor mask (see `unpack_neighbor_mask`). Every step reads both, so
+        they are stored together.
+    state_table : (S C, 2 + 2 K) int16 ndarray
+        The step on screen, x and y; then for each channel the noise and its derivative to the left.
+    state_scales : (3,) tuple of float
+        Scales of the integers: of the step (pixels), of the noise, and of its derivative.
     """
 
     sheets: int
-    around: int
+    sheets_per_turn: int
     width: int
-    place: np.ndarray
-    turn: np.ndarray
-    records: np.ndarray
-    units: tuple[float, float, float]
+    cell_of_pixel: np.ndarray
+    packed_phase: np.ndarray
+    state_table: np.ndarray
+    state_scales: tuple[float, float, float]
 
     @property
-    def lines(self) -> int:
+    def line_count(self) -> int:
         """M."""
         return self.sheets // 2
 
     @property
-    def cells(self) -> int:
+    def cell_count(self) -> int:
         """C."""
-        return len(self.turn)
+        return len(self.packed_phase)
 
     @property
-    def channels(self) -> int:
+    def noise_channels(self) -> int:
         """K."""
-        return self.records.shape[1] // 2 - 1
+        return self.state_table.shape[1] // 2 - 1
 
-    def first_states(self, turns: int) -> tuple[np.ndarray, int]:
-        """The first states of sheets, for streamlines that wind no more often than `turns`.
+    def sheet_offsets(self, max_winding: int) -> tuple[np.ndarray, int]:
+        """Tabulate the first state of each sheet, by sheet numbers that include full turns.
+
+        Parameters
+        ----------
+        max_winding : int
+            Maximum number of full turns of a streamline, in both directions of rotation.
 
         Returns
         -------
-        first : (n,) intp ndarray
-            That of sheet k at k + turns around.
-        back : int
-            How far from there the sheet of the opposite direction is.
+        offsets : (n,) intp ndarray
+            Index of the first state of sheet k, at k plus multiples of `sheets_per_turn`.
+        backward : int
+            Offset in that array of the opposite sheet.
         """
-        once = np.arange(self.around) * self.cells
-        forward = np.tile(once, 2 * turns)
-        if self.around == self.sheets:
-            return forward, self.lines
-        return np.concatenate([forward, forward + self.lines * self.cells]), len(forward)
+        one_turn = np.arange(self.sheets_per_turn) * self.cell_count
+        forward = np.tile(one_turn, 2 * max_winding)
+        if self.sheets_per_turn == self.sheets:
+            return forward, self.line_count
+        return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
-    def line_of(self, state: np.ndarray) -> np.ndarray:
-        """Entries of the lines of states, in their place."""
-        half = self.lines * self.cells
-        return np.subtract(state, half, out=state, where=state >= half)
+    def fold_to_line(self, state: np.ndarray) -> np.ndarray:
+        """Replace the indices of states by those of their lines, in place."""
+        entry_count = self.line_count * self.cell_count
+        return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
-    def beside(self, line: np.ndarray, along: int, left: int) -> np.ndarray:
-        """Where some lines go on in a neighbour.
+    def neighbor_line(self, line: np.ndarray, forward: int, left: int) -> np.ndarray:
+        """Find the lines of neighboring cells that match the given lines.
 
         Parameters
         ----------
         line : (n,) intp ndarray
-            Entries of lines.
-        along, left : int
-            To which neighbour: that many pixels along the line, and to its left.
+            Indices of lines.
+        forward, left : int
+            Offset of the neighbor: pixels along the line, and to its left.
 
         Returns
         -------
         (n,) intp ndarray
-            Entries of lines; of `END` where streamlines end.
+            Indices of lines, of the cell `SINK_CELL` where there is no linked neighbor.
         """
-        sheet, cell = np.divmod(line, self.cells)
-        step = self.records.take(line, axis=0)[:, :2].astype(np.float32)
+        sheet, cell = np.divmod(line, self.cell_count)
+        step = self.state_table.take(line, axis=0)[:, :2].astype(np.float32)
         x, y = step[:, 0], step[:, 1]
-        size = np.sqrt(x * x + y * y)
-        size[size == 0] = 1
-        column = np.rint((along * x - left * y) / size).astype(np.intp)
-        row = np.rint((along * y + left * x) / size).astype(np.intp)
-        turn = self.turn.take(cell)
-        goes_on = joined(turn) >> (column + 3 * row + 4).astype(np.uint32) & 1
-        there = np.where(goes_on, cell + row * self.width + column, END)
-        slip = np.rint(turn - self.turn.take(there)).astype(np.intp)
-        return (sheet + slip) % self.lines * self.cells + there
+        norm = np.sqrt(x * x + y * y)
+        norm[norm == 0] = 1
+        column = np.rint((forward * x - left * y) / norm).astype(np.intp)
+        row = np.rint((forward * y + left * x) / norm).astype(np.intp)
+        phase_bits = self.packed_phase.take(cell)
+        is_open = unpack_neighbor_mask(phase_bits) >> (column + 3 * row + 4).astype(np.uint32) & 1
+        neighbor = np.where(is_open, cell + row * self.width + column, SINK_CELL)
+        matching = np.rint(phase_bits - self.packed_phase.take(neighbor)).astype(np.intp)
+        return (sheet + matching) % self.line_count * self.cell_count + neighbor
 
 
-def sheets_around(flow: Flow) -> int:
-    """How many sheets make a full turn: S, or N of directions without their opposites."""
-    return flow.lines if flow.harmonics and not flow.is_paired else 2 * flow.lines
+def member_lines(field: PixelField) -> np.ndarray:
+    """(M,) intp index of the line of each member image.
 
-
-def line_of_member(flow: Flow) -> np.ndarray:
-    """(M,) intp: which line is that of each member image.
-
-    Of a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N the other half of its line.
+    For a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N is the other direction of its
+    line.
     """
-    return np.arange(flow.lines) * (sheets_around(flow) // flow.degree) % flow.lines
-
-
-def unfold(flow: Flow, look: Look, noise: np.ndarray) -> Covering:
-    """The covering of a flow; its sheets are counted from the member nearest to the guide.
-
-    Parameters
-    ----------
-    flow : Flow
-        At least one pixel.
-    look : Look
-        Its `step`, `guiding_angle` and `foreshorten` count.
-    noise : (P, K) float32 ndarray
-    """
-    degree, (count, channels) = flow.degree, noise.shape
-    half, around = flow.lines, sheets_around(flow)
-    place, width, cells = _window(flow)
-    # Streamlines that have ended stay in `END`.
-    turn = _with_bits(np.full(cells, 2, dtype=np.float32), 1 << 4)
-    spread = np.zeros((cells, channels), dtype=np.float32)
-    spread[place] = noise
-    # A direction that is kept foreshortened may be longer than 1 under a wide lens.
-    longest = 2.0 if look.foreshorten else 1.0
-    brightest = max(float(np.abs(noise).max()), 1e-30)
-    steepest = 2 * brightest * longest
-    in_units = [np.float32(TOP / longest), np.float32(TOP / brightest), np.float32(TOP / steepest)]
-    records = np.zeros((2 * half, cells, 2 + 2 * channels), dtype=np.int16)
-    for start in range(0, count, BLOCK):
-        part = slice(start, min(start + BLOCK, count))
-        here = place[part]
-        right, up = _slopes(spread, here, width, flow.joined[part])
-        right, up = right * in_units[2], up * in_units[2]
-        base, x, y = _nearest(flow.representation[part], degree, look.guiding_angle)
-        base *= np.float32(around / (2 * np.pi))
-        base += np.float32(2)
-        turn[here] = _with_bits(base, flow.joined[part])
-        rows = np.empty((len(here), 2 + 2 * channels), dtype=np.int16)
-        rows[:, 2::2] = np.rint(noise[part] * in_units[1])
-        for sheet in range(half):
-            angle = look.guiding_angle + 2 * np.pi * sheet / around
-            way = _deviating(flow, part, *_rotated(x, y, angle))
-            way_x, way_y = _on_screen(flow, part, *way, look.foreshorten)
-            if look.foreshorten:
-                way_x, way_y = np.clip(way_x, -longest, longest), np.clip(way_y, -longest, longest)
-            rows[:, 3::2] = np.rint(up * way_x[:, None] - right * way_y[:, None])
-            way_x, way_y = way_x * in_units[0], way_y * in_units[0]
-            rows[:, 0], rows[:, 1] = np.rint(way_x, out=way_x), np.rint(way_y, out=way_y)
-            put(records[sheet], here, rows)
-            # Of the opposite direction all but the noise is the opposite.
-            for column in (0, 1, *range(3, rows.shape[1], 2)):
-                np.negative(rows[:, column], out=rows[:, column])
-            put(records[sheet + half], here, rows)
-    return Covering(
-        sheets=2 * half,
-        around=around,
-        width=width,
-        place=place,
-        turn=turn,
-        records=records.reshape(-1, records.shape[2]),
-        units=(look.step * longest / TOP, brightest / TOP, steepest / TOP),
+    return (
+        np.arange(field.line_count)
+        * (field.symmetry.sheets_per_turn // field.degree)
+        % field.line_count
     )
 
 
-def joined(turn: np.ndarray) -> np.ndarray:
-    """(n,) uint32: `Flow.joined` of the cells that have these turns."""
-    return turn.view(np.uint32) & np.uint32(OPEN)
+def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering:
+    """Build the covering of a pixel field. Sheet 0 is the member nearest to the guiding angle.
+
+    Parameters
+    ----------
+    field : PixelField
+        At least one pixel.
+    look : Look
+        In pixels of the frame. Its `step`, `guiding_angle` and `foreshorten` are used.
+    noise : (P, K) float32 ndarray
+
+    Returns
+    -------
+    Covering
+    """
+    degree, (count, channels) = field.degree, noise.shape
+    line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
+    cell_of_pixel, width, cell_count = _pixel_window(field)
+    # Streamlines that have ended stay in `SINK_CELL`.
+    packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
+    cell_noise = np.zeros((cell_count, channels), dtype=np.float32)
+    cell_noise[cell_of_pixel] = noise
+    # Foreshortened directions may be longer than 1 where the field of view is wide.
+    max_step = 2.0 if look.foreshorten else 1.0
+    max_noise = max(float(np.abs(noise).max()), 1e-30)
+    max_slope = 2 * max_noise * max_step
+    quantize = [
+        np.float32(INT16_MAX / max_step),
+        np.float32(INT16_MAX / max_noise),
+        np.float32(INT16_MAX / max_slope),
+    ]
+    state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
+    for start in range(0, count, BLOCK_PIXELS):
+        block = slice(start, min(start + BLOCK_PIXELS, count))
+        block_cells = cell_of_pixel[block]
+        right, up = _noise_gradient(cell_noise, block_cells, width, field.neighbor_mask[block])
+        right, up = right * quantize[2], up * quantize[2]
+        cell_phase, x, y = _nearest_member(field.representation[block], degree, look.guiding_angle)
+        cell_phase *= np.float32(per_turn / (2 * np.pi))
+        cell_phase += np.float32(2)
+        packed_phase[block_cells] = _pack_neighbor_mask(cell_phase, field.neighbor_mask[block])
+        rows = np.empty((len(block_cells), 2 + 2 * channels), dtype=np.int16)
+        rows[:, 2::2] = np.rint(noise[block] * quantize[1])
+        for sheet in range(line_count):
+            angle = look.guiding_angle + 2 * np.pi * sheet / per_turn
+            direction = _apply_harmonics(field, block, *_rotate(x, y, angle))
+            step_x, step_y = _to_screen(field, block, *direction, look.foreshorten)
+            if look.foreshorten:
+                step_x, step_y = (
+                    np.clip(step_x, -max_step, max_step),
+                    np.clip(step_y, -max_step, max_step),
+                )
+            rows[:, 3::2] = np.rint(up * step_x[:, None] - right * step_y[:, None])
+            step_x, step_y = step_x * quantize[0], step_y * quantize[0]
+            rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
+            scatter_rows(state_table[sheet], block_cells, rows)
+            # For the opposite direction, all entries except the noise are negated.
+            for column in (0, 1, *range(3, rows.shape[1], 2)):
+                np.negative(rows[:, column], out=rows[:, column])
+            scatter_rows(state_table[sheet + line_count], block_cells, rows)
+    return Covering(
+        sheets=2 * line_count,
+        sheets_per_turn=per_turn,
+        width=width,
+        cell_of_pixel=cell_of_pixel,
+        packed_phase=packed_phase,
+        state_table=state_table.reshape(-1, state_table.shape[2]),
+        state_scales=(
+            look.step * max_step / INT16_MAX,
+            max_noise / INT16_MAX,
+            max_slope / INT16_MAX,
+        ),
+    )
 
 
-def _with_bits(turn: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Turns that hold what `joined` is to give."""
-    return (turn.view(np.uint32) & ~np.uint32(OPEN) | bits).view(np.float32)
+def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
+    """(n,) uint32 neighbor masks of cells, from their entries of `Covering.packed_phase`."""
+    return packed_phase.view(np.uint32) & np.uint32(ALL_NEIGHBORS)
 
 
-def put(table: np.ndarray, row: np.ndarray, rows: np.ndarray) -> None:
-    """Write some rows of a table, each as one number."""
-    whole_rows(table)[row] = whole_rows(rows)
+def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
+    """Phases with neighbor masks in the last bits of their mantissas."""
+    return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 
-def whole_rows(table: np.ndarray) -> np.ndarray:
-    """(n, k) numbers seen as (n,), each row of 8 or 16 bytes as one number."""
-    kind = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
-    return table.view(kind)[:, 0]
+def scatter_rows(table: np.ndarray, index: np.ndarray, rows: np.ndarray) -> None:
+    """Assign rows of a table. Rows are copied as scalars, which is faster."""
+    rows_as_scalars(table)[index] = rows_as_scalars(rows)
 
 
-def _window(flow: Flow) -> tuple[np.ndarray, int, int]:
+def rows_as_scalars(table: np.ndarray) -> np.ndarray:
+    """An (n,) view of an (n, k) array whose rows of 8 or 16 bytes are seen as complex scalars."""
+    scalar_type = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
+    return table.view(scalar_type)[:, 0]
+
+
+def _pixel_window(field: PixelField) -> tuple[np.ndarray, int, int]:
     """The cell of each pixel, the width of the window, and its number of cells."""
-    row, column = np.divmod(flow.pixel, np.int32(flow.width))
-    low, left = row[0], column.min()
+    row, column = np.divmod(field.pixel, np.int32(field.width))
+    bottom, left = row[0], column.min()
     width = int(column.max() - left) + 3
-    place = (row - (low - 1)) * np.int32(width) + (column - (left - 1))
-    return place, width, (int(row[-1] - low) + 3) * width
+    cell = (row - (bottom - 1)) * np.int32(width) + (column - (left - 1))
+    return cell, width, (int(row[-1] - bottom) + 3) * width
 
 
-def _slopes(
-    noise: np.ndarray, here: np.ndarray, width: int, joined: np.ndarray
+def _noise_gradient(
+    noise: np.ndarray, cells: np.ndarray, width: int, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Change of the (C, K) noise of cells to the right and up: (n, K), (n, K)."""
+    """(n, K) central differences of the (C, K) noise of cells, to the right and upward.
+
+    They are 0 where a neighbor is not linked.
+    """
     slopes = []
-    for away, offset in ((1, (1, 0)), (width, (0, 1))):
-        slope = noise.take(here + away, axis=0) - noise.take(here - away, axis=0)
+    for cell_offset, offset in ((1, (1, 0)), (width, (0, 1))):
+        slope = noise.take(cells + cell_offset, axis=0) - noise.take(cells - cell_offset, axis=0)
         slope *= np.float32(0.5)
-        after = OFFSETS.index(offset)
-        both = np.uint16(1 << after | 1 << (8 - after))
-        slope[joined & both != both] = 0
+        bit = NEIGHBOR_OFFSETS.index(offset)
+        both_bits = np.uint16(1 << bit | 1 << (8 - bit))
+        slope[mask & both_bits != both_bits] = 0
         slopes.append(slope)
     return slopes[0], slopes[1]
 
 
-def _nearest(z: np.ndarray, degree: int, guide: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The member nearest to a guiding angle, from there: its angle, cosine and sine; 0, 0 of 0."""
-    x, y = _rotated(z.real, z.imag, -degree * guide)
-    angle = angle_of(x, y)
+def _nearest_member(
+    z: np.ndarray, degree: int, guiding_angle: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
+    x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
+    angle = vector_angle(x, y)
     angle /= np.float32(degree)
     if degree == 1:
-        size = np.sqrt(x * x + y * y)
-        size[size == 0] = 1
-        return angle, x / size, y / size
-    cosine, sine = cosine_sine(angle)
+        norm = np.sqrt(x * x + y * y)
+        norm[norm == 0] = 1
+        return angle, x / norm, y / norm
+    cosine, sine = cos_sin(angle)
     defined = z != 0
     return angle, cosine * defined, sine * defined
 
 
-def _rotated(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
     if angle == 0:
         return x, y
     cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     return cosine * x - sine * y, sine * x + cosine * y
 
 
-def _deviating(
-    flow: Flow, part: slice, x: np.ndarray, y: np.ndarray
+def _apply_harmonics(
+    field: PixelField, block: slice, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `Flow.direction`."""
-    if not flow.harmonics:
+    """Compute `PixelField.member_direction` for a block, as real and imaginary parts."""
+    if not field.harmonics:
         return x, y
     member = x + 1j * y
-    way = phase(member * evaluate([(j, c[part]) for j, c in flow.harmonics], member))
-    return way.real, way.imag
+    direction = normalized(
+        member * evaluate_harmonics([(j, c[block]) for j, c in field.harmonics], member)
+    )
+    return direction.real, direction.imag
 
 
-def _on_screen(
-    flow: Flow, part: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
+def _to_screen(
+    field: PixelField, block: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """As `Flow.on_screen`, in single precision."""
-    if flow.axes is None:
+    """Compute `PixelField.to_screen` for a block in single precision, as x and y."""
+    if field.screen_jacobian is None:
         return x, y
-    first, second = flow.axes[part, 0], flow.axes[part, 1]
-    across = first.real * x + second.real * y
-    up = first.imag * x + second.imag * y
+    x_axis, y_axis = field.screen_jacobian[block, 0], field.screen_jacobian[block, 1]
+    screen_x = x_axis.real * x + y_axis.real * y
+    screen_y = x_axis.imag * x + y_axis.imag * y
     if not foreshorten:
-        size = across * across
-        size += up * up
-        np.sqrt(size, out=size)
-        size[size == 0] = 1
-        np.divide(1, size, out=size)
-        across *= size
-        up *= size
-    return across, up
+        norm = screen_x * screen_x
+        norm += screen_y * screen_y
+        np.sqrt(norm, out=norm)
+        norm[norm == 0] = 1
+        np.divide(1, norm, out=norm)
+        screen_x *= norm
+        screen_y *= norm
+    return screen_x, screen_y

@@ -1,478 +1,312 @@
-"""Lines of ink on paper, as many and as wide as the tone asks for.
+"""Hatching: LIC images thresholded to lines of ink on paper that reproduce a tone.
 
-Every streak of an LIC image stands for a line that may be drawn: ink lies where the streak rises above a
-threshold. How much of the paper streaks above any threshold cover is known from their statistics,
-so the threshold follows from the coverage that is wanted; no image is analysed. Of several families of
-lines each leaves (1 - a) of the light, so that together they leave the tone T if they take shares s of
-it, 1 - a = T^s with shares that sum to 1. In light tones one family has it all, in darker ones the next
-ones join in, those nearest to the guiding angle first.
+Ink is drawn where the streaks of an LIC image exceed a threshold. The fraction of the paper above
+any threshold is known from the statistics of streaks (`streak_statistics`), so the threshold
+follows from the coverage that the tone requires, and no image has to be analyzed.
 
-Whatever makes lines uneven is part of the streaks before they are compared with the threshold, and
-of the statistics that it comes from, so that the tone stays: shorter streaks, which break lines or make
-them swell and thin out, and the tooth of the paper.
+Each line family with the coverage a transmits 1 - a of the light. To reach the tone T together,
+each family transmits 1 - a = T^s, with shares s that sum to 1. In light tones one family has the
+share 1. Further families join in darker tones, in order of their distance to the guiding angle.
+
+Effects that make lines uneven are added to the streaks before the threshold: shorter streaks, which
+break lines or vary their width, and the grain of the paper. The statistics include them, so
+they do not change the tone.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from .anchored import OCTAVES, octave_shares
-from .colour import map_colours, to_linear
-from .flow import Flow, all_members
-from .hues import families_of_lines
-from .images import Images, relative_magnitude
-from .inks import INKS, inks_of
-from .look import Look
-from .noise import MEAN, image_noise
-from .paper import TOOTH, paper_tooth, surface_tooth
+from ..color import map_colors, to_linear
+from .family_hues import line_families
+from .image_noise import NOISE_MEAN
+from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
+from .lic_images import LicImages, relative_magnitude
+from .look import Look, colors_magnitude, is_hatched
+from .paper_grain import PAPER_GRAIN_STRENGTH
+from .pixel_field import PixelField, all_members
+from .streak_statistics import (
+    COVERAGE_STEPS,
+    break_amount,
+    look_streak_statistics,
+    smoothstep,
+    softness,
+)
 
-#: Darkness over which a family that joins in comes to its full share.
-JOINING = 0.35
+#: Range of darkness (1 - tone), beyond its onset, over which a family grows to its full share.
+ONSET_RANGE = 0.35
 
-#: By how much earlier it begins to, faintly: where two change places, they do so without a seam.
-EARLY = 0.15
+#: Darkness before the onset at which a family already begins, faintly. It hides the seam where two
+#: families swap ranks.
+ONSET_LEAD = 0.15
 
-#: Half the width of the step from paper to ink, in deviations of the streaks: soft and crisp.
-SOFTEST, CRISPEST = 1.6, 0.2
+#: Half the width of the blend between two ranks, in ranks.
+RANK_BLEND = 0.4
 
-#: How far lines are made of pieces where a hand wavers as much as it can.
-SWELL = 0.5
-
-#: Length of the pieces of broken lines each way, in grains, and at most as a part of the whole.
-PIECE, LONGEST_PIECE = 4.0, 0.4
-
-#: Share of a pixel below which it has no ink that could be seen.
-LEAST = 1e-3
-
-#: Coverages of which a line's is looked up, and of how many degrees of brokenness.
-STEPS, BREAKS = 256, 17
-
-#: Side of the sample that thresholds are read off, in grains and at least and at most in pixels; and
-#: into how many steps the streaks in it are sorted.
-SAMPLE, SMALLEST_SAMPLE, LARGEST_SAMPLE, BINS = 64, 320, 768, 1600
+#: Coverage, as a fraction of a pixel, below which ink is not visible.
+MIN_COVERAGE = 1e-3
 
 
-class Hand(NamedTuple):
-    """What makes lines uneven.
+class LineModulation(NamedTuple):
+    """Per-pixel inputs that make lines uneven, and the outline.
 
     Attributes
     ----------
-    pieces : Images or None
-        Of streaks as long as the pieces of broken lines (`piece_length`).
-    tooth : (M, P) float32 ndarray or None
-        How much better than elsewhere the paper takes the ink of each line, in deviations.
-    tones : (M, P) float32 ndarray or None
-        The light that each line is to leave, if that is not the tone alone: its mean along the line,
-        so that lines run on past the borders of tones, thinning out, the strongest farthest.
-
+    break_images : LicImages or None
+        Images whose streaks are as long as the pieces of broken lines (`break_steps`).
+    paper_grain : (M, P) float32 ndarray or None
+        Height of the paper for each line, with mean 0 and standard deviation 1. Ink adheres better
+        where it is larger.
+    line_tones : (M, P) float32 ndarray or None
+        Target tone of each line, linear, 0 to 1, if it differs from the tone of the pixel: the mean
+        of the tone along the line. Lines then overshoot the borders of tones and get thinner there.
     outline : (P,) float32 ndarray or None
-        How much of each pixel is covered by lines along silhouettes and creases.
+        Coverage of each pixel by lines along silhouettes and creases, 0 to 1.
     """
 
-    pieces: Images | None = None
-    tooth: np.ndarray | None = None
-    tones: np.ndarray | None = None
+    break_images: LicImages | None = None
+    paper_grain: np.ndarray | None = None
+    line_tones: np.ndarray | None = None
     outline: np.ndarray | None = None
 
 
-def hatched(
-    flow: Flow, images: Images, look: Look, tone: np.ndarray, hand: Hand
+def render_hatching(
+    field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of ink on paper.
+    """Draw the lines of a field with ink on paper.
 
     Parameters
     ----------
-    flow : Flow
-    images : Images
-        Of the members from that nearest to the look's guiding angle on.
+    field : PixelField
+    images : LicImages
+        Member images in the order of `all_members(field, look.guiding_angle)`.
     look : Look
-        With its lengths in the pixels of the frame.
+        In pixels of the frame.
     tone : (P,) float32 ndarray
-        The light that there is to be, 0 to 1, linear.
-    hand : Hand
-        What makes them uneven.
+        Target tone, linear, 0 to 1.
+    modulation : LineModulation
 
     Returns
     -------
     colour : (P, 3) float32 ndarray
-        Linear light; of clear paper that of the ink alone.
+        Linear color of ink and paper, or of the ink alone if `look.clear_paper`.
     alpha : (P,) float32 ndarray
-        1, and of clear paper how much of the pixel is ink.
+        1, or the coverage by ink if `look.clear_paper`.
     """
     tone = np.clip(tone, 0, 1)
-    families = families_of_ink(flow, look)
-    if families is None:
-        ink, coverage = _one_ink(flow, images, look, tone, hand)
+    ink_indices = line_ink_indices(field, look)
+    if ink_indices is None:
+        ink, coverage = _render_one_ink(field, images, look, tone, modulation)
     else:
-        ink, coverage = _many_inks(flow, images, look, tone, hand, families)
+        ink, coverage = _render_many_inks(field, images, look, tone, modulation, ink_indices)
     if look.clear_paper:
         return ink, coverage
     paper = inks_of(look).paper
     return paper + coverage[:, None] * (ink - paper), np.ones_like(coverage)
 
 
-def _one_ink(
-    flow: Flow, images: Images, look: Look, tone: np.ndarray, hand: Hand
+def _render_one_ink(
+    field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(P, 3) linear light of the ink, and (P,) how much of each pixel it covers."""
+    """(P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
     inks = inks_of(look)
-    by_magnitude = look.magnitude in ("colour", "both")
+    by_magnitude = colors_magnitude(look)
     if by_magnitude:
-        ink = to_linear(map_colours(relative_magnitude(flow, look), look.colour_map))
+        ink = to_linear(map_colors(relative_magnitude(field, look), look.colour_map))
     else:
-        ink = inks.at(np.zeros_like(tone), tone)
-    left = inks.inverted(_tones(tone, hand))
+        ink = inks.ink_at_tone(np.zeros_like(tone), tone)
+    transmittance = inks.complement_if_light(_line_tones(tone, modulation))
     if not by_magnitude:
-        left = 1 - inks.covering(inks.wanted(left), ink)
-    paper = np.ones_like(tone)
-    for line, share in enumerate(family_shares(flow, look, left)):
-        covered = 1 - left[line % len(left)] ** share
-        paper *= 1 - line_coverage(line, covered, images, look, hand)
-    if hand.outline is not None:
-        paper *= 1 - hand.outline
-    return ink, 1 - paper
+        transmittance = 1 - inks.required_coverage(inks.target_transmittance(transmittance), ink)
+    bare_paper = np.ones_like(tone)
+    for line, share in enumerate(line_shares(field, look, transmittance)):
+        target_coverage = 1 - transmittance[line % len(transmittance)] ** share
+        bare_paper *= 1 - line_coverage(line, target_coverage, images, look, modulation)
+    if modulation.outline is not None:
+        bare_paper *= 1 - modulation.outline
+    return ink, 1 - bare_paper
 
 
-def _many_inks(
-    flow: Flow,
-    images: Images,
+def _render_many_inks(
+    field: PixelField,
+    images: LicImages,
     look: Look,
     tone: np.ndarray,
-    hand: Hand,
-    families: list[np.ndarray],
+    modulation: LineModulation,
+    ink_indices: list[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same with an ink for each family: each lets some light through, and they multiply."""
-    inks = inks_of(look, inks_told(flow))
-    left = inks.inverted(_tones(tone, hand))
-    wanted = inks.wanted(left)
-    paper = np.ones_like(tone)
-    through = np.ones((len(tone), 3), dtype=np.float32)
-    for line, share in enumerate(family_shares(flow, look, left)):
-        ink = inks.at(families[line], tone)
-        covered = inks.covering(wanted[line % len(wanted)] ** share, ink)
-        coverage = line_coverage(line, covered, images, look, hand)
-        through *= 1 - coverage[:, None] * (1 - inks.through(ink))
-        paper *= 1 - coverage
-    if hand.outline is not None:
-        ink = inks.at(np.zeros_like(tone), tone)
-        through *= 1 - hand.outline[:, None] * (1 - inks.through(ink))
-        paper *= 1 - hand.outline
-    colour = inks.inverted(inks.inverted(inks.paper) * through)
-    coverage = 1 - paper
-    # What is seen is paper and ink: the ink is what is left without the paper.
-    ink = inks.paper + (colour - inks.paper) / np.maximum(coverage, LEAST)[:, None]
+    """(P, 3) linear color of the ink, and (P,) coverage, with an ink per family of lines.
+
+    Inks are transparent: the transmittances of crossing lines are multiplied.
+    """
+    inks = inks_of(look, ink_count(look, field.line_count, field.family_count))
+    transmittance = inks.complement_if_light(_line_tones(tone, modulation))
+    target_transmittance = inks.target_transmittance(transmittance)
+    bare_paper = np.ones_like(tone)
+    transmitted = np.ones((len(tone), 3), dtype=np.float32)
+    for line, share in enumerate(line_shares(field, look, transmittance)):
+        ink = inks.ink_at_tone(ink_indices[line], tone)
+        target_coverage = inks.required_coverage(
+            target_transmittance[line % len(target_transmittance)] ** share, ink
+        )
+        coverage = line_coverage(line, target_coverage, images, look, modulation)
+        transmitted *= 1 - coverage[:, None] * (1 - inks.transmittance(ink))
+        bare_paper *= 1 - coverage
+    if modulation.outline is not None:
+        ink = inks.ink_at_tone(np.zeros_like(tone), tone)
+        transmitted *= 1 - modulation.outline[:, None] * (1 - inks.transmittance(ink))
+        bare_paper *= 1 - modulation.outline
+    colour = inks.complement_if_light(inks.complement_if_light(inks.paper) * transmitted)
+    coverage = 1 - bare_paper
+    # colour = paper + coverage * (ink - paper), solved for the ink.
+    ink = inks.paper + (colour - inks.paper) / np.maximum(coverage, MIN_COVERAGE)[:, None]
     return np.clip(ink, 0, 1), coverage
 
 
-def _tones(tone: np.ndarray, hand: Hand) -> np.ndarray:
-    """(M, P) the light that each line is to leave, or (1, P) if it is the same for all."""
-    return tone[None] if hand.tones is None else hand.tones
+def _line_tones(tone: np.ndarray, modulation: LineModulation) -> np.ndarray:
+    """(M, P) target tones of the lines, or (1, P) if all lines have the same."""
+    return tone[None] if modulation.line_tones is None else modulation.line_tones
 
 
 def line_coverage(
-    line: int, covered: np.ndarray, images: Images, look: Look, hand: Hand
+    line: int,
+    target_coverage: np.ndarray,
+    images: LicImages,
+    look: Look,
+    modulation: LineModulation,
 ) -> np.ndarray:
-    """How much of each pixel the ink of one line covers.
+    """Compute the coverage of each pixel by one line.
 
     Parameters
     ----------
     line : int
-        Which of the images' members.
-    covered : (P,) ndarray
-        How much of the paper it is to cover, 0 to 1.
-    images, look, hand
-        As of `hatched`.
+        Index into `images.members`.
+    target_coverage : (P,) ndarray
+        Fraction of the paper that the line should cover on average, 0 to 1.
+    images, look, modulation
+        As for `render_hatching`.
 
     Returns
     -------
     (P,) float32 ndarray
+        0 to 1.
     """
-    statistics = statistics_of(look)
-    streak = (images.members[line].mean(axis=1) - MEAN) / statistics.deviation
-    if hand.pieces is not None:
-        piece = (hand.pieces.members[line].mean(axis=1) - MEAN) / statistics.piece_deviation
-        streak += brokenness(covered, look.breaks, look.wobble) * (piece - streak)
-    if hand.tooth is not None:
-        streak += np.float32(TOOTH * look.paper_grain) * hand.tooth[line]
-    limit = np.interp(covered, np.linspace(0, 1, STEPS), statistics.threshold)
-    return _smooth_step((streak - limit) / (2 * softness(look.crispness)) + 0.5)
+    statistics = look_streak_statistics(look)
+    streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / statistics.std
+    if modulation.break_images is not None:
+        break_streak = (
+            modulation.break_images.members[line].mean(axis=1) - NOISE_MEAN
+        ) / statistics.break_std
+        streak += break_amount(target_coverage, look.breaks, look.wobble) * (break_streak - streak)
+    if modulation.paper_grain is not None:
+        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
+    threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), statistics.threshold)
+    return smoothstep((streak - threshold) / (2 * softness(look.crispness)) + 0.5)
 
 
-def brokenness(covered: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
-    """How far lines are made of pieces, where they are to cover so much of the paper.
-
-    The lights break first; a hand that wavers makes lines swell and thin out everywhere.
-    """
-    least = SWELL * wobble
-    return least + (1 - least) * breaks * (1 - covered) ** 2
+def has_breaks(look: Look) -> bool:
+    """Whether lines are broken into pieces, or vary in width as drawn by hand."""
+    return is_hatched(look) and (look.breaks > 0 or look.wobble > 0)
 
 
-def has_pieces(look: Look) -> bool:
-    """Whether lines are made of pieces at all."""
-    return look.ink == "hatch" and (look.breaks > 0 or look.wobble > 0)
-
-
-def runs_on(look: Look) -> bool:
-    """Whether lines run on past the borders of tones."""
-    return look.ink == "hatch" and look.overshoot > 0
+def has_overshoot(look: Look) -> bool:
+    """Whether lines continue past the borders of tones."""
+    return is_hatched(look) and look.overshoot > 0
 
 
 def has_outline(look: Look) -> bool:
-    """Whether there are lines along silhouettes and creases."""
-    return look.ink == "hatch" and look.outline > 0
+    """Whether lines are drawn along silhouettes and creases."""
+    return is_hatched(look) and look.outline > 0
 
 
-def has_tooth(look: Look) -> bool:
-    """Whether ink catches on the tooth of the paper."""
-    return look.ink == "hatch" and look.paper_grain > 0
+def has_paper_grain(look: Look) -> bool:
+    """Whether the grain of the paper breaks up the ink."""
+    return is_hatched(look) and look.paper_grain > 0
 
 
-def piece_length(look: Look) -> int:
-    """Steps each way of the streaks that lines are broken into."""
-    steps = min(PIECE * look.grain / look.step, LONGEST_PIECE * look.length)
-    return max(round(steps), 1)
+def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
+    """Find the ink of each line at each pixel.
 
+    The ink is that of the line's family. If the field does not distinguish its lines, it is chosen
+    by the rank of the line, which is its distance to the guiding angle.
 
-def families_of_ink(flow: Flow, look: Look) -> list[np.ndarray] | None:
-    """M times (P,): the number of the ink that each line is drawn with; None if all have one.
-
-    That of its family or, if the field's lines are not told apart, by how near it is to the guiding
-    angle, in between where two change places.
+    Returns
+    -------
+    list of M (P,) ndarrays, or None
+        Indices of inks (see `Inks.ink_at_tone`). Ranks give fractional indices where two lines swap
+        places. None if all lines have the same ink.
     """
-    if look.hue == "one" or look.magnitude in ("colour", "both"):
+    if not has_ink_per_line(look):
         return None
-    told = families_of_lines(flow, look)
-    if told is not None:
-        return [np.minimum(family, INKS - 1) for family in told]
-    return [_places(rank, flow.lines) for rank in _ranks(flow, look)]
+    families = line_families(field, look)
+    if families is not None:
+        return [np.minimum(family, MAX_INKS - 1) for family in families]
+    return [_soft_rank(rank, field.line_count) for rank in _line_ranks(field, look)]
 
 
-def inks_told(flow: Flow) -> int:
-    """How many inks the lines of a field are drawn with, if each has its own."""
-    told = next((number for kind, number in flow.traits if kind == "family"), flow.lines)
-    return min(told, INKS)
+def _line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
+    """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
 
-
-def _ranks(flow: Flow, look: Look) -> list[np.ndarray]:
-    """M times (P,): how many lines are nearer to the guiding angle, going over from one to the next."""
+    The line to which k others are nearer has a rank from k to k + 1. Where two lines swap places,
+    both have the same integer rank.
+    """
     ranks = []
-    for member in all_members(flow, look.guiding_angle)[: flow.lines]:
-        toward = member * np.complex64(np.exp(-1j * look.guiding_angle))
-        away = np.arctan2(np.abs(toward.imag), np.abs(toward.real))
-        ranks.append(away * np.float32(2 * flow.lines / np.pi))
+    for member in all_members(field, look.guiding_angle)[: field.line_count]:
+        relative = member * np.complex64(np.exp(-1j * look.guiding_angle))
+        angle = np.arctan2(np.abs(relative.imag), np.abs(relative.real))
+        ranks.append(angle * np.float32(2 * field.line_count / np.pi))
     return ranks
 
 
-def _places(rank: np.ndarray, count: int) -> np.ndarray:
-    """Ranks as whole numbers from 0, but around those at which two lines change places."""
-    place = np.zeros_like(rank)
-    for layer in range(1, count):
-        place += _smooth_step((rank - layer + 0.4) / 0.8)
-    return place
+def _soft_rank(rank: np.ndarray, rank_count: int) -> np.ndarray:
+    """Ranks rounded down, with a smooth transition around the integers where lines swap places.
+
+    The result is at most `rank_count - 1`.
+    """
+    soft_rank = np.zeros_like(rank)
+    for layer in range(1, rank_count):
+        soft_rank += smoothstep((rank - layer + RANK_BLEND) / (2 * RANK_BLEND))
+    return soft_rank
 
 
-def family_shares(flow: Flow, look: Look, left: np.ndarray) -> list[np.ndarray]:
-    """M times (P,) float32: which share of the ink each line takes.
+def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> list[np.ndarray]:
+    """Compute the share of the ink that each line takes.
 
-    By how many others are nearer to the guiding angle, as a number that goes over from one to the
-    next: where two families change places both take the same, and no seam shows. Of lines that are to
-    leave the same the shares sum to 1.
+    Lines join as the picture gets darker, in the order of their ranks. The shares are continuous
+    where two lines swap ranks, so no seam is visible.
 
     Parameters
     ----------
-    flow : Flow
+    field : PixelField
     look : Look
-        Its `guiding_angle`, `layers` and `layering` count.
-    left : (M, P) or (1, P) ndarray
-        What each line, or all of them, are to leave of the paper's light.
+        Its `guiding_angle`, `layers` and `layering` are used.
+    transmittance : (M, P) or (1, P) ndarray
+        Target transmittance of each line, or of all lines.
+
+    Returns
+    -------
+    list of M (P,) float32 ndarrays
+        If all lines have the same target, the shares sum to 1 at each pixel.
     """
-    onsets = [_onset(rank, look) for rank in _ranks(flow, look)]
-    first = np.minimum.reduce(onsets)
-    later = [onset - first for onset in onsets]
-    found = []
-    for dark in 1 - left:
-        shares = [_smooth_step((dark - onset + EARLY) / (JOINING + EARLY)) for onset in later]
-        total = np.add.reduce(shares)
-        if len(left) == 1:
-            return [share / total for share in shares]
-        found.append(shares[len(found)] / total)
-    return found
+    onsets = [_onset_darkness(rank, look) for rank in _line_ranks(field, look)]
+    first_onset = np.minimum.reduce(onsets)
+    delays = [onset - first_onset for onset in onsets]
+    line_fractions = []
+    for darkness in 1 - transmittance:
+        onset_weights = [
+            smoothstep((darkness - onset + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
+            for onset in delays
+        ]
+        total = np.add.reduce(onset_weights)
+        if len(transmittance) == 1:
+            return [share / total for share in onset_weights]
+        line_fractions.append(onset_weights[len(line_fractions)] / total)
+    return line_fractions
 
 
-def _onset(rank: np.ndarray, look: Look) -> np.ndarray:
-    """The darkness at which lines of a rank join in; beyond 1 where they are one layer too many."""
-    onset = _places(rank, look.layers) * np.float32(look.layering)
-    return onset + 2 * _smooth_step((rank - look.layers + 0.4) / 0.8)
-
-
-def softness(crispness: float) -> float:
-    """Half the width of the step from paper to ink, in deviations."""
-    return SOFTEST * (CRISPEST / SOFTEST) ** crispness
-
-
-class Statistics(NamedTuple):
-    """What streaks are like, by which lines of ink are drawn.
-
-    Attributes
-    ----------
-    threshold : (STEPS,) float64 ndarray
-        Above which value streaks are ink, for them to cover even shares of the paper from 0 to 1,
-        in deviations from the mean.
-    deviation : float
-        Of the streaks.
-    piece_deviation : float
-        Of those as long as the pieces of broken lines.
-    tooth_deviation : float
-        Of a tooth that stays with surfaces.
-    """
-
-    threshold: np.ndarray
-    deviation: float
-    piece_deviation: float
-    tooth_deviation: float = 1.0
-
-
-def statistics_of(look: Look) -> Statistics:
-    """`ink_statistics` of a look, with its lengths in the pixels of the frame."""
-    return ink_statistics(
-        (2 * look.length + 1) * look.step,
-        look.grain,
-        look.density,
-        look.high_pass,
-        look.crispness,
-        tapered=look.taper,
-        anchored=look.anchor == "surface",
-        piece=(2 * piece_length(look) + 1) * look.step,
-        breaks=look.breaks,
-        wobble=look.wobble,
-        tooth=TOOTH * look.paper_grain,
-        surface_tooth=_tooth_on_surface(look),
-    )
-
-
-def _tooth_on_surface(look: Look) -> tuple[float, float, float] | None:
-    """Grain, density and high pass of the tooth, if it stays with surfaces."""
-    if look.anchor == "picture":
-        return None
-    noise = surface_tooth(look)
-    return noise["grain"], noise["density"], noise["high_pass"]
-
-
-@lru_cache(maxsize=16)
-def ink_statistics(
-    length: float,
-    grain: float,
-    density: float,
-    high_pass: float,
-    crispness: float,
-    *,
-    tapered: bool = False,
-    anchored: bool = False,
-    piece: float = 1.0,
-    breaks: float = 0.0,
-    wobble: float = 0.0,
-    tooth: float = 0.0,
-    surface_tooth: tuple[float, float, float] | None = None,
-) -> Statistics:
-    """Read off a sample of noise what streaks cover.
-
-    Parameters
-    ----------
-    length : float
-        Of the streamlines, pixels.
-    grain, density, high_pass
-        Of the noise.
-    crispness, breaks, wobble : float
-        Of the look.
-    tapered : bool
-        Whether they are less of a streamline's ends.
-    anchored : bool
-        Whether the noise is that of surfaces.
-    piece : float
-        Length of the pieces of broken lines, pixels.
-    tooth : float
-        Deviation of what the tooth of the paper adds to the streaks.
-    surface_tooth : 3 floats, optional
-        Grain, density and high pass of a tooth that stays with surfaces.
-    """
-    side = int(np.clip(SAMPLE * grain, SMALLEST_SAMPLE, LARGEST_SAMPLE))
-    reach = max(round(length), 1)
-    width = side + reach
-    noise = _sample((side, width), grain, density, high_pass, anchored)
-    streaks, deviation = _standardised(_means_along(noise, reach, side, tapered))
-    within = min(max(round(piece), 1), reach)
-    pieces, piece_deviation = _standardised(_means_along(noise, within, side, tapered))
-    uneven, tooth_deviation = 0.0, 1.0
-    if tooth and surface_tooth is not None:
-        heights = _sample(streaks.shape, *surface_tooth, anchored=True)
-        tooth_deviation = float(heights.std())
-        uneven = tooth / tooth_deviation * (heights - heights.mean())
-    elif tooth:
-        heights = paper_tooth(np.arange(streaks.size, dtype=np.int32), len(streaks[0]), grain, 1)
-        uneven = tooth * heights[0].reshape(streaks.shape)
-    wanted = np.linspace(0, 1, STEPS)
-    degrees = brokenness(wanted, breaks, wobble)
-    known = np.linspace(degrees.min(), degrees.max(), BREAKS if breaks else 1)
-    samples = [streaks + degree * (pieces - streaks) + uneven for degree in known]
-    table = _limits(samples, softness(crispness))
-    if len(known) == 1:
-        return Statistics(table[0], deviation, piece_deviation, tooth_deviation)
-    place = (degrees - known[0]) / (known[-1] - known[0]) * (BREAKS - 1)
-    below = np.minimum(place.astype(int), BREAKS - 2)
-    low, high = (table[row, np.arange(STEPS)] for row in (below, below + 1))
-    return Statistics(
-        low + (place - below) * (high - low), deviation, piece_deviation, tooth_deviation
-    )
-
-
-def _limits(samples: list[np.ndarray], soft: float) -> np.ndarray:
-    """(S, STEPS): above which values each of S samples of streaks cover even shares from 0 to 1."""
-    low, high = min(map(np.min, samples)), max(map(np.max, samples))
-    edges = np.linspace(low, high, BINS + 1)
-    limits = np.linspace(high + soft, low - soft, 4 * STEPS)
-    inked = _smooth_step(((edges[:-1] + edges[1:]) / 2 - limits[:, None]) / (2 * soft) + 0.5)
-    wanted = np.linspace(0, 1, STEPS)
-    shares = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
-    return np.array([np.interp(wanted, inked @ share, limits) for share in shares])
-
-
-def _sample(
-    shape: tuple[int, int], grain: float, density: float, high_pass: float, anchored: bool
-) -> np.ndarray:
-    """Some noise of a picture, or as that of a surface, as an image.
-
-    Of a surface across which the middle one of its octaves has the size that is asked for.
-    """
-    pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
-    away = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
-    noise = np.zeros(shape, dtype=np.float32)
-    for octave, share in zip(away, octave_shares(away) if anchored else (1.0,), strict=True):
-        size = grain * 2.0**octave
-        cells = image_noise(pixel, shape[1], size, 1, 1, density=density, high_pass=high_pass)
-        noise += np.float32(share) * cells.reshape(shape)
-    return noise
-
-
-def _means_along(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:
-    """(n, side) means over so many pixels of the rows of (n, width) noise, from its middle."""
-    # A mean of tapered weights is one of means over half the length.
-    for reach in [max(length // 2, 1)] * 2 if tapered else [length]:
-        sums = np.cumsum(np.pad(noise, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
-        noise = (sums[:, reach:] - sums[:, :-reach]) / reach
-    start = (noise.shape[1] - side) // 2
-    return noise[:, start : start + side]
-
-
-def _standardised(means: np.ndarray) -> tuple[np.ndarray, float]:
-    """Means in deviations from their own mean; and the deviation."""
-    deviation = float(means.std())
-    return (means - means.mean()) / deviation, deviation
-
-
-def _smooth_step(x: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, and a cubic between."""
-    x = np.clip(x, 0, 1)
-    return x * x * (3 - 2 * x)
+def _onset_darkness(rank: np.ndarray, look: Look) -> np.ndarray:
+    """(P,) darkness at which lines of a rank join. Above 1 for ranks beyond `look.layers`."""
+    onset = _soft_rank(rank, look.layers) * np.float32(look.layering)
+    return onset + 2 * smoothstep((rank - look.layers + RANK_BLEND) / (2 * RANK_BLEND))

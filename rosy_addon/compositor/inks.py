@@ -1,8 +1,10 @@
-"""Inks on paper: one, one that changes from the shadows to the lights, or one for each family of lines.
+"""Inks of hatching: their colors, and the coverage of the paper that a tone requires.
 
-How much of the paper an ink has to cover for a tone depends on how dark it is. Lines of one ink that
-cross are no darker where they do; inks of several colours let light through, and where they cross they
-multiply, as glazes do (on dark paper what they take away from the dark does: they screen).
+A look has one ink, one ink whose color changes from the shadows to the lights, or one ink for each
+family of lines. The coverage for a tone depends on the luminance of the ink. Crossing lines of one
+ink are not darker where they cross. Inks of several colors are transparent: where they cross, their
+transmittances are multiplied. If the ink is lighter than the paper, the same is done with the
+complements (1 - light), which is the blend mode "screen".
 """
 
 from __future__ import annotations
@@ -11,30 +13,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .colour import LUMINANCE, from_hex, to_linear
-from .look import Look
+from ..color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from .look import Look, colors_magnitude, is_hatched
 
-#: Inks that are told apart; there are never more families of lines than members of a field.
-INKS = 12
+#: Maximum number of inks.
+MAX_INKS = 12
 
-#: From one family's ink to the next, degrees of hue: of black ink the second is red, the third blue.
+#: Hue difference between the inks of successive families, and hue from which it is counted if the
+#: first ink is achromatic, in degrees of Oklab hue. With black ink the second is red, the third
+#: blue.
 HUE_STEP, FIRST_HUE = 220.0, -185.0
 
-#: Lightness and least chroma in Oklab of all inks but the first: colours that can be seen as such.
-LIGHTNESS, CHROMA = (0.5, 0.8), 0.14
+#: Range of lightness and minimum chroma in Oklab of all inks but the first, so that their hues are
+#: visible.
+LIGHTNESS_RANGE, MIN_CHROMA = (0.5, 0.8), 0.14
 
-#: Chroma below which an ink has no hue that others could start from.
-GREY = 0.03
+#: Oklab chroma below which an ink counts as achromatic.
+ACHROMATIC_CHROMA = 0.03
 
 # Bjorn Ottosson, "A perceptual color space for image processing", 2020.
-_TO_CONES = np.array(
+_RGB_TO_LMS = np.array(
     [
         (0.4122214708, 0.5363325363, 0.0514459929),
         (0.2119034982, 0.6806995451, 0.1073969566),
         (0.0883024619, 0.2817188376, 0.6299787005),
     ]
 )
-_TO_LAB = np.array(
+_LMS_TO_LAB = np.array(
     [
         (0.2104542553, 0.7936177850, -0.0040720468),
         (1.9779984951, -2.4285922050, 0.4505937099),
@@ -45,109 +50,153 @@ _TO_LAB = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Inks:
-    """What is drawn with and on.
+    """The colors of paper and inks.
 
     Attributes
     ----------
     paper : (3,) float32 ndarray
-        Linear light.
+        Linear color.
     dark, middle, light : (n, 3) float32 ndarray
-        Linear light of each ink in the shadows, at the tone `turn`, and in the lights.
-    turn : float
+        Linear colors of the n inks in the shadows, at the tone `mid_tone`, and in the lights.
+    mid_tone : float
         Between 0 and 1.
     is_light : bool
-        Whether the ink is lighter than the paper, so that there is the more of it the more light.
-    floor : float
-        Share of the paper's light (or, of light ink, of its darkness) that is left where each of them
-        could cover everything.
+        Whether the ink is lighter than the paper. Lighter tones then need more ink.
+    min_transmittance : float
+        Luminance transmittance of the lightest of the inks at full coverage (for light ink, of the
+        darkest). All inks can reach it.
     """
 
     paper: np.ndarray
     dark: np.ndarray
     middle: np.ndarray
     light: np.ndarray
-    turn: float
+    mid_tone: float
     is_light: bool
-    floor: float
+    min_transmittance: float
 
-    def at(self, number: np.ndarray, tone: np.ndarray) -> np.ndarray:
-        """(P, 3) linear light of inks, by (P,) numbers; in between, what is between two of them."""
-        below = np.minimum(number.astype(np.intp), len(self.dark) - 1)
-        above = np.minimum(below + 1, len(self.dark) - 1)
-        share = (number - below).astype(np.float32)[:, None]
+    def ink_at_tone(self, index: np.ndarray, tone: np.ndarray) -> np.ndarray:
+        """Look up the color of inks at tones.
+
+        Parameters
+        ----------
+        index : (P,) ndarray
+            Index of the ink. Inks are interpolated at fractional indices.
+        tone : (P,) ndarray
+            Linear, 0 to 1.
+
+        Returns
+        -------
+        (P, 3) float32 ndarray
+            Linear color.
+        """
+        lower = np.minimum(index.astype(np.intp), len(self.dark) - 1)
+        upper = np.minimum(lower + 1, len(self.dark) - 1)
+        fraction = (index - lower).astype(np.float32)[:, None]
         dark, middle, light = (
-            inks[below] + share * (inks[above] - inks[below])
+            inks[lower] + fraction * (inks[upper] - inks[lower])
             for inks in (self.dark, self.middle, self.light)
         )
-        lighter = np.clip((tone - np.float32(self.turn)) / np.float32(1 - self.turn), 0, 1)
-        darker = np.clip(1 - tone / np.float32(self.turn), 0, 1)
+        lighter = np.clip((tone - np.float32(self.mid_tone)) / np.float32(1 - self.mid_tone), 0, 1)
+        darker = np.clip(1 - tone / np.float32(self.mid_tone), 0, 1)
         return middle + lighter[:, None] * (light - middle) + darker[:, None] * (dark - middle)
 
-    def through(self, ink: np.ndarray) -> np.ndarray:
-        """(..., 3): share of the paper's light that inks let through, channel by channel."""
-        return self.inverted(ink) / np.maximum(self.inverted(self.paper), 1e-3)
+    def transmittance(self, ink: np.ndarray) -> np.ndarray:
+        """(..., 3) ratio of (..., 3) ink to paper, by channel, both complemented for light ink."""
+        return self.complement_if_light(ink) / np.maximum(
+            self.complement_if_light(self.paper), 1e-3
+        )
 
-    def left_by(self, ink: np.ndarray) -> np.ndarray:
-        """(...,): that share of the luminance."""
-        paper = float(self.inverted(self.paper) @ LUMINANCE)
-        return (self.inverted(ink) @ LUMINANCE) / max(paper, 1e-3)
+    def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
+        """(...,) ratio of the luminances of (..., 3) ink and paper, complemented for light ink."""
+        paper_luminance = float(self.complement_if_light(self.paper) @ LUMINANCE_WEIGHTS)
+        return (self.complement_if_light(ink) @ LUMINANCE_WEIGHTS) / max(paper_luminance, 1e-3)
 
-    def wanted(self, left: np.ndarray) -> np.ndarray:
-        """(P,): what is to be left of the paper's light, of a picture from 0, all ink, to 1."""
-        return self.floor + left * (1 - self.floor)
+    def target_transmittance(self, relative_transmittance: np.ndarray) -> np.ndarray:
+        """(P,) transmittance from `min_transmittance` to 1, given a relative one from 0 to 1."""
+        return self.min_transmittance + relative_transmittance * (1 - self.min_transmittance)
 
-    def covering(self, wanted: np.ndarray, ink: np.ndarray) -> np.ndarray:
-        """(P,): how much of the paper an ink has to cover to leave so much of its light."""
-        return np.clip((1 - wanted) / np.maximum(1 - self.left_by(ink), 1e-3), 0, 1)
+    def required_coverage(self, target_transmittance: np.ndarray, ink: np.ndarray) -> np.ndarray:
+        """(P,) coverage, 0 to 1, with which (P, 3) ink gives a target luminance transmittance."""
+        return np.clip(
+            (1 - target_transmittance) / np.maximum(1 - self.luminance_transmittance(ink), 1e-3),
+            0,
+            1,
+        )
 
-    def inverted(self, light: np.ndarray) -> np.ndarray:
-        """Light or, where light ink takes darkness away, what is missing of white."""
+    def complement_if_light(self, light: np.ndarray) -> np.ndarray:
+        """Return 1 - `light` if the ink is lighter than the paper, and `light` otherwise."""
         return 1 - light if self.is_light else light
 
 
+def has_ink_per_line(look: Look) -> bool:
+    """Whether each line, or each family of lines, has its own ink."""
+    return is_hatched(look) and look.hue != "one" and not colors_magnitude(look)
+
+
+def ink_count(look: Look, line_count: int, family_count: int) -> int:
+    """Count the inks that a look uses for a field.
+
+    Parameters
+    ----------
+    look : Look
+    line_count : int
+        M, the number of lines through a pixel.
+    family_count : int
+        Number of families of lines of the field. 1 if it does not distinguish its lines.
+    """
+    if not has_ink_per_line(look):
+        return 1
+    return min(family_count if family_count > 1 else line_count, MAX_INKS)
+
+
 def inks_of(look: Look, families: int = 1) -> Inks:
-    """The inks of a look.
+    """Compute the colors of paper and inks of a look.
 
     Parameters
     ----------
     look : Look
     families : int
-        How many are told apart, and 1 if they are all drawn with one ink.
+        Number of inks (see `ink_count`).
     """
     paper = to_linear(from_hex(look.paper_colour))
-    last = look.ink_colour_light if look.ink_ramp else look.ink_colour
-    dark, light = (_inks_from(code, families) for code in (look.ink_colour, last))
-    middle, turn = (dark + light) / 2, 0.5
+    light_code = look.ink_colour_light if look.ink_ramp else look.ink_colour
+    dark, light = (_ink_series(code, families) for code in (look.ink_colour, light_code))
+    middle, mid_tone = (dark + light) / 2, 0.5
     if look.ink_ramp and look.ink_middle > 0:
-        middle, turn = _inks_from(look.ink_colour_middle, families), look.ink_middle
-    inks = Inks(paper, dark, middle, light, turn, is_light(look), 0.0)
-    full = inks.light if inks.is_light else inks.dark
-    return replace(inks, floor=float(np.max(inks.left_by(full))))
+        middle, mid_tone = _ink_series(look.ink_colour_middle, families), look.ink_middle
+    inks = Inks(paper, dark, middle, light, mid_tone, is_light(look), 0.0)
+    solid_ink = inks.light if inks.is_light else inks.dark
+    return replace(inks, min_transmittance=float(np.max(inks.luminance_transmittance(solid_ink))))
 
 
 def is_light(look: Look) -> bool:
-    """Whether the ink is lighter than the paper, so that there is the more of it the more light."""
-    ink, paper = (
-        to_linear(from_hex(code)) @ LUMINANCE for code in (look.ink_colour, look.paper_colour)
+    """Whether the ink is lighter than the paper, by luminance."""
+    ink_luminance, paper_luminance = (
+        to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS
+        for code in (look.ink_colour, look.paper_colour)
     )
-    return bool(ink > paper)
+    return bool(ink_luminance > paper_luminance)
 
 
-def _inks_from(code: str, count: int) -> np.ndarray:
-    """(count, 3) float32 linear light: an ink, and others of about its lightness, of other hues."""
-    first = to_linear(from_hex(code))
-    lightness, a, b = _TO_LAB @ np.cbrt(_TO_CONES @ first)
+def _ink_series(code: str, count: int) -> np.ndarray:
+    """(count, 3) float32 linear colors: an ink, and variants with other hues.
+
+    The variants have the lightness and chroma of the ink, within the limits of this module.
+    """
+    base_ink = to_linear(from_hex(code))
+    lightness, a, b = _LMS_TO_LAB @ np.cbrt(_RGB_TO_LMS @ base_ink)
     chroma = np.hypot(a, b)
-    hue = np.arctan2(b, a) if chroma > GREY else np.radians(FIRST_HUE)
-    turns = hue + np.radians(HUE_STEP) * np.arange(1, min(count, INKS))
-    chroma = max(chroma, CHROMA)
+    hue = np.arctan2(b, a) if chroma > ACHROMATIC_CHROMA else np.radians(FIRST_HUE)
+    hues = hue + np.radians(HUE_STEP) * np.arange(1, min(count, MAX_INKS))
+    chroma = max(chroma, MIN_CHROMA)
     lab = np.stack(
         [
-            np.full(len(turns), np.clip(lightness, *LIGHTNESS)),
-            chroma * np.cos(turns),
-            chroma * np.sin(turns),
+            np.full(len(hues), np.clip(lightness, *LIGHTNESS_RANGE)),
+            chroma * np.cos(hues),
+            chroma * np.sin(hues),
         ]
     )
-    cones = np.linalg.solve(_TO_LAB, lab) ** 3
-    others = np.clip(np.linalg.solve(_TO_CONES, cones), 0, 1).T
-    return np.concatenate([first[None], others]).astype(np.float32)
+    lms = np.linalg.solve(_LMS_TO_LAB, lab) ** 3
+    other_inks = np.clip(np.linalg.solve(_RGB_TO_LMS, lms), 0, 1).T
+    return np.concatenate([base_ink[None], other_inks]).astype(np.float32)

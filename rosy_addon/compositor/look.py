@@ -1,282 +1,458 @@
-"""Everything that can be chosen about a picture, as one settings object."""
+"""`Look`: all settings that determine how a field is drawn."""
 
 from __future__ import annotations
 
-import re
-import reprlib
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import RosyError
+from ..settings import (
+    Stage,
+    check_settings,
+    choice,
+    color,
+    number,
+    settings_of,
+    stage_key,
+    switch,
+)
 
 
-def _number(default: float, low: float, high: float, text: str, unit: str = "") -> Any:
-    """In radians if its unit is "angle", in Blender units if it is "length": the panel shows others."""
-    rules = {"low": low, "high": high, "text": text, "unit": unit}
-    return field(default=default, metadata=rules)
+def colors_magnitude(look: Any) -> bool:
+    """Return whether the magnitude of the field drives the color of the lines."""
+    return look.magnitude in ("colour", "both")
 
 
-def _choice(default: str, text: str, **options: str) -> Any:
-    return field(default=default, metadata={"options": options, "text": text})
+def is_hatched(look: Any) -> bool:
+    """Return whether lines are drawn with ink on paper."""
+    return look.ink == "hatch"
 
 
-def _switch(default: bool, text: str) -> Any:
-    return field(default=default, metadata={"text": text})
+def _is_lit(look: Any) -> bool:
+    return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
 
-def _colour(default: str, text: str) -> Any:
-    """Display values (sRGB) as ``#rrggbb``."""
-    return field(default=default, metadata={"colour": True, "text": text})
+def _uses_ink_color(look: Any) -> bool:
+    return is_hatched(look) and not colors_magnitude(look)
+
+
+def _uses_ink_ramp(look: Any) -> bool:
+    return _uses_ink_color(look) and look.ink_ramp
+
+
+def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
+    """Return the arguments that most settings of the panel Ink have in common."""
+    return {"panel": "ink", "stage": Stage.SHADING, "applies": applies}
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a field is drawn: what a preset holds, and what the panel shows.
+    """All settings that determine how a field is drawn, as in presets and panels.
 
-    Lengths are in pixels of the finished picture, or of as many Blender units as `unit_size` says. Each field's metadata says its range or options
-    and what it does, in words a user meets; the panel's properties are made from it.
+    Lengths are in pixels of the finished picture or, with the unit "world", in multiples of
+    `unit_size` Blender units.
+
+    To add a setting that both renderers draw with, edit four files: add a field here, use it in
+    this package, add its name to `LIC_SETTINGS` or `TONE_SETTINGS` in `gpu/passes.py`, and use the
+    uniform of that name in the shader. All else is derived from the field; see
+    `rosy_addon.settings`.
+
+    Raises
+    ------
+    RosyError
+        If a value is not allowed.
     """
 
-    method: str = _choice(
+    method: str = choice(
         "sheets",
         "How the N directions become one picture",
-        sheets="Each streamline of the covering surface once: fast, without breaking points",
-        members="The paper's decomposition into member vector fields, an image of each",
-        brute="Follow the best of N directions at every step: slow, the yardstick",
+        {
+            "sheets": "Trace each streamline of the covering surface once: fast, without breaking "
+            "points",
+            "members": "Decompose the field into member vector fields with an image of each, as in "
+            "the paper",
+            "brute": "Follow the best of the N directions at every step: slow, for reference",
+        },
+        panel="quality",
     )
-    weights: str = _choice(
+    weights: str = choice(
         "cosine",
-        "How the two sets of images of the members method are blended, so that breaking points do "
-        "not show",
-        cosine="Smoothly, by the squared cosine and sine of N t / 2",
-        binary="Each pixel from one set or the other",
-        none="The first set alone: shows the breaking points",
+        "How the method Members blends its two sets of images to hide the breaking points",
+        {
+            "cosine": "Smoothly, by the squared cosine and sine of N t / 2",
+            "binary": "Take each pixel from one of the two sets",
+            "none": "Use only the first set, which shows the breaking points",
+        },
+        applies=lambda look: look.method == "members",
     )
-    view_plane: bool = _switch(
+    view_plane: bool = switch(
         True,
-        "Rotate the field into the view plane before the members method decomposes it (off: the "
-        "paper's Figure 8)",
+        "Rotate the field into the view plane before the method Members decomposes it. Off: as in "
+        "Figure 8 of the paper",
+        applies=lambda look: look.method == "members",
     )
-    display: str = _choice(
+    display: str = choice(
         "smooth",
-        "How the values of the faces become values of pixels",
-        smooth="Averaged at the corners and interpolated",
-        flat="Each face as it is",
+        "How face values become pixel values",
+        {
+            "smooth": "Average them at the corners and interpolate",
+            "flat": "Use the value of the face",
+        },
+        panel="quality",
+        panel_before="method",
+        stage=Stage.GBUFFER,
     )
-    unit: str = _choice(
+    unit: str = choice(
         "pixels",
-        "What lengths are counted in",
-        pixels="Pixels of the picture: lines are as wide from near as from afar",
-        world="Blender units: lines belong to the object, as if engraved, and are wider from near",
+        "Unit of lengths",
+        {
+            "pixels": "Pixels of the picture: line width does not depend on the distance",
+            "world": "Blender units: lines belong to the object, as if engraved, and are wider when "
+            "near",
+        },
+        panel="streaks",
     )
-    unit_size: float = _number(
+    unit_size: float = number(
         0.01,
         1e-6,
         1e6,
-        "Blender units that stand for a pixel where lengths are counted in these",
-        "length",
+        "Size in Blender units that replaces one pixel in lengths",
+        unit="length",
+        panel="streaks",
+        panel_label="Pixel Size",
+        applies=lambda look: look.unit != "pixels",
     )
-    length: int = _number(40, 1, 8000, "Steps of a streamline each way")
-    taper: bool = _switch(
+    length: int = number(
+        40,
+        1,
+        8000,
+        "Number of streamline steps in each direction",
+        is_pixel_length=True,
+        panel="streaks",
+    )
+    taper: bool = switch(
         False,
-        "Let streaks fade toward their ends, so that lines end in points and stay more like "
-        "themselves as one comes nearer",
+        "Fade streaks toward their ends. Lines end in points and change less when the view zooms",
     )
-    step: float = _number(1.0, 0.05, 1.0, "Length of a step, in pixels")
-    grain: float = _number(1.5, 0.5, 256.0, "Size of a cell of the noise, in pixels")
-    density: float = _number(
+    step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
+    grain: float = number(
+        1.5,
+        0.5,
+        256.0,
+        "Size of a noise cell in pixels",
+        is_pixel_length=True,
+        preview_low=0.75,
+        panel="streaks",
+    )
+    density: float = number(
         0.1,
         0.001,
         0.999,
-        "Share of the noise's cells that are bright: few leave single streaks, which tell many "
-        "directions apart",
+        "Fraction of noise cells that are bright. Low values give separate streaks, which make "
+        "several directions easier to tell apart",
+        panel="streaks",
     )
-    high_pass: float = _number(
+    high_pass: float = number(
         16.0,
         0.0,
         1024.0,
-        "Take variations broader than this, in pixels, out of the noise, so that crossing streaks "
-        "do not gather into clouds; 0 keeps them, as the paper does",
+        "Remove noise variations wider than this many pixels, so that crossing streaks do not form "
+        "clouds. 0: keep them, as in the paper",
+        is_pixel_length=True,
+        panel="streaks",
     )
-    noise: str = _choice(
+    noise: str = choice(
         "grey",
-        "Colour of the noise, and so of the streaks",
-        grey="One channel",
-        colour="Three channels, drawn separately: a plaid",
+        "Color of the noise, and so of the streaks",
+        {
+            "grey": "One channel",
+            "colour": "Three channels, each convolved separately: a plaid",
+        },
+        panel="colour",
     )
-    anchor: str = _choice(
+    anchor: str = choice(
         "picture",
-        "What the noise, and so the streaks, stay with when something moves",
-        picture="The picture: still pictures, as the paper's",
-        surface="The surface: streaks move with it, bend with it and keep their width, for "
-        "hatching and animations",
+        "What the noise, and so the streaks, stay attached to when something moves",
+        {
+            "picture": "The picture: for still pictures, as in the paper",
+            "surface": "The surface: streaks move and bend with it and keep their width, for "
+            "hatching and animations",
+        },
+        panel="quality",
     )
-    hue: str = _choice(
+    hue: str = choice(
         "one",
         "Whether families of directions differ in hue",
-        one="All the same",
-        families="A hue for each line that the field tells apart: of tensors the major and the "
-        "minor, of dir0, dir1 ... each, if they are the same lines all over the mesh. Hatched, "
-        "those of other fields have an ink each, too, by how near they are to the guiding angle",
+        {
+            "one": "Same hue for all",
+            "families": "One hue for each line that the field distinguishes: major and minor of "
+            "tensors, or dir0, dir1 and so on, if each is the same line on the whole mesh. In "
+            "hatching, lines of other fields get inks by their distance to the guiding angle",
+        },
+        panel="colour",
+        stage=Stage.SHADING,
     )
-    seed: int = _number(0, 0, 2**31 - 1, "Which noise")
-    gain: float = _number(2.5, 0.0, 16.0, "Contrast on top of the statistical correction")
-    guiding_angle: float = _number(
+    seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
+    gain: float = number(
+        2.5,
+        0.0,
+        16.0,
+        "Contrast, in addition to the statistical correction",
+        panel="streaks",
+        panel_before="high_pass",
+        stage=Stage.SHADING,
+    )
+    guiding_angle: float = number(
         0.0,
         -3.1416,
         3.1416,
-        "Direction in the picture nearest to which the first member is chosen",
-        "angle",
+        "Angle in the picture to which the first member is nearest",
+        unit="angle",
     )
-    foreshorten: bool = _switch(
-        False, "Let streaks shorten where the surface turns away, instead of keeping their length"
+    foreshorten: bool = switch(
+        False,
+        "Shorten streaks where the surface is slanted, instead of keeping their length in the picture",
+        panel="streaks",
     )
-    cross_creases: bool = _switch(False, "Let streaks run across sharp creases")
-    crease_angle: float = _number(
+    cross_creases: bool = switch(False, "Continue streaks across sharp creases", panel="streaks")
+    crease_angle: float = number(
         0.7,
         0.0,
         3.1416,
-        "Angle between neighbouring pixels' normals that is a sharp crease",
-        "angle",
+        "Minimum angle between the normals of adjacent pixels at a sharp crease",
+        unit="angle",
+        panel="streaks",
+        applies=lambda look: not look.cross_creases,
     )
-    magnitude: str = _choice(
+    magnitude: str = choice(
         "none",
-        "What the magnitude of the field drives",
-        none="Nothing",
-        colour="The colour, through a colour map",
-        length="The length of the streaks",
-        both="Colour and length",
+        "What the magnitude of the field controls",
+        {
+            "none": "Nothing",
+            "colour": "The color, through a color map",
+            "length": "The length of the streaks",
+            "both": "Color and length",
+        },
+        panel="colour",
     )
-    magnitude_range: float = _number(
+    magnitude_range: float = number(
         0.0,
         0.0,
         1e9,
-        "Magnitude at the top of the colour map and at full length; 0: the largest seen",
+        "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
+        panel="colour",
+        panel_label="Top Value",
+        applies=lambda look: look.magnitude != "none",
     )
-    colour_map: str = _choice(
+    colour_map: str = choice(
         "viridis",
-        "Colours that stand for the magnitude, all of even perceptual steps",
-        viridis="Dark blue through green to yellow",
-        magma="Black through red to pale yellow",
-        grey="Black to white",
+        "Perceptually uniform color map of the magnitude",
+        {
+            "viridis": "Dark blue through green to yellow",
+            "magma": "Black through red to pale yellow",
+            "grey": "Black to white",
+        },
+        panel="colour",
+        stage=Stage.SHADING,
+        applies=colors_magnitude,
     )
-    shading: float = _number(0.7, 0.0, 1.0, "Strength of the diffuse shading in the picture itself")
-    light: str = _choice(
+    shading: float = number(
+        0.7,
+        0.0,
+        1.0,
+        "Strength of the diffuse shading in the picture",
+        panel="light",
+        stage=Stage.SHADING,
+    )
+    light: str = choice(
         "headlight",
-        "Where the light of that shading comes from",
-        headlight="The eye",
-        lamp="A lamp over the left shoulder, as draughtsmen like it",
-        scene="The lights of the scene",
+        "Light source of the shading",
+        {
+            "headlight": "A light at the camera",
+            "lamp": "A lamp above and to the left of the camera",
+            "scene": "The lights of the scene",
+        },
+        panel="light",
+        stage=Stage.SHADING,
+        applies=_is_lit,
     )
-    shadows: bool = _switch(
-        False, "Let things cast shadows in that light; the eye's own light casts none"
+    shadows: bool = switch(
+        False,
+        "Cast shadows. The headlight casts none",
+        panel="light",
+        stage=Stage.SHADING,
+        applies=lambda look: _is_lit(look) and look.light != "headlight",
     )
-    tone: str = _choice(
+    tone: str = choice(
         "light",
-        "Where it is to be light and where dark",
-        light="Where the light falls",
-        attribute="As painted or computed: a number or a colour on the mesh",
-        image="As an image says that lies on the mesh by its UV map",
-        picture="As in a picture of the scene through its camera, such as a render",
+        "Source of the tone, which is how light or dark the picture is at each point",
+        {
+            "light": "The light on the surface",
+            "attribute": "An attribute of the mesh, a number or a color",
+            "image": "An image on the mesh, through its UV map",
+            "picture": "A picture of the scene through its camera, such as a render",
+        },
+        panel="tone",
+        stage=Stage.SHADING,
     )
-    tone_lit: bool = _switch(
-        False, "Let the light fall on such a tone as well, instead of taking it as it is"
+    tone_lit: bool = switch(
+        False,
+        "Multiply the tone by the light",
+        panel="tone",
+        panel_label="Light Falls on It",
+        stage=Stage.SHADING,
+        applies=lambda look: look.tone != "light",
     )
-    tone_black: float = _number(0.0, -1e6, 1e6, "What of the tone is black")
-    tone_white: float = _number(
-        1.0, -1e6, 1e6, "What of the tone is white; below that of black, light and dark change over"
+    tone_black: float = number(
+        0.0,
+        -1e6,
+        1e6,
+        "Input value that becomes black",
+        panel="tone",
+        panel_label="Black",
+        stage=Stage.SHADING,
     )
-    tone_gamma: float = _number(
-        1.0, 0.05, 20.0, "Of the tones between: above 1 they get lighter, below darker"
+    tone_white: float = number(
+        1.0,
+        -1e6,
+        1e6,
+        "Input value that becomes white. Below the value for black, the tone is inverted",
+        panel="tone",
+        panel_label="White",
+        stage=Stage.SHADING,
     )
-    ink: str = _choice(
+    tone_gamma: float = number(
+        1.0,
+        0.05,
+        20.0,
+        "Gamma of the tones between. Above 1 they become lighter, below 1 darker",
+        panel="tone",
+        panel_label="Gamma",
+        stage=Stage.SHADING,
+    )
+    ink: str = choice(
         "soft",
-        "What streaks are made of",
-        soft="Brighter and darker light around the mean, the surface shaded",
-        hatch="Lines of ink on paper, as many and as wide as the light asks for",
+        "Style of the streaks",
+        {
+            "soft": "Lighter and darker streaks around the mean, on the shaded surface",
+            "hatch": "Lines of ink on paper, whose number and width follow the tone",
+        },
+        panel="ink",
+        stage=Stage.SHADING,
     )
-    ink_colour: str = _colour("#08080d", "Colour of the ink")
-    ink_ramp: bool = _switch(
-        False, "Let the ink's colour go over into another one from the shadows to the lights"
+    ink_colour: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
+    ink_ramp: bool = switch(
+        False,
+        "Blend the ink to a second color from the shadows to the lights",
+        panel_label="Second Color",
+        **_ink(_uses_ink_color),
     )
-    ink_colour_light: str = _colour("#b06a3c", "Colour of the ink in the lights")
-    ink_middle: float = _number(
+    ink_colour_light: str = color(
+        "#b06a3c",
+        "Color of the ink in the lights",
+        panel_label="In the Lights",
+        **_ink(_uses_ink_ramp),
+    )
+    ink_middle: float = number(
         0.0,
         0.0,
         0.99,
-        "Tone at which the ink has a third colour on its way from the shadows to the lights; 0: none",
+        "Tone at which the ink has a third color, between the shadows and the lights. 0: none",
+        panel_label="Third at Tone",
+        **_ink(_uses_ink_ramp),
     )
-    ink_colour_middle: str = _colour("#6f2d4f", "Colour of the ink at that tone")
-    paper_colour: str = _colour("#ffffff", "Colour of the paper")
-    clear_paper: bool = _switch(False, "Leave the paper transparent, so that there is only ink")
-    crispness: float = _number(0.7, 0.0, 1.0, "From soft grey streaks to lines with sharp borders")
-    layers: int = _number(3, 1, 12, "Families of lines that may cross in the darkest tones")
-    layering: float = _number(
-        0.3, 0.0, 1.0, "Darkness between the tone at which one family begins and the next"
+    ink_colour_middle: str = color(
+        "#6f2d4f",
+        "Third color of the ink",
+        panel_label="Third Color",
+        **_ink(lambda look: _uses_ink_ramp(look) and look.ink_middle > 0),
     )
-    breaks: float = _number(
-        0.0, 0.0, 1.0, "How much lines are broken along their length, first where it is light"
+    paper_colour: str = color("#ffffff", "Color of the paper", **_ink())
+    clear_paper: bool = switch(
+        False, "Leave the paper transparent, so that only the ink is drawn", **_ink()
     )
-    overshoot: float = _number(
+    crispness: float = number(
+        0.7, 0.0, 1.0, "Edges of lines, from soft gray streaks to sharp lines", **_ink()
+    )
+    layers: int = number(
+        3, 1, 12, "Maximum number of line families that cross in the darkest tones", **_ink()
+    )
+    layering: float = number(
+        0.3,
         0.0,
-        0.0,
-        256.0,
-        "How far lines run on past the borders of tones, thinning out, some farther than others, in "
-        "pixels",
+        1.0,
+        "Difference in darkness between the tones at which successive families begin",
+        **_ink(),
     )
-    wobble: float = _number(
-        0.0, 0.0, 1.0, "How much lines waver in course and width, as drawn by hand"
-    )
-    paper_grain: float = _number(
+    breaks: float = number(
         0.0,
         0.0,
         1.0,
-        "How much the ink catches on the tooth of the paper, as pencil and charcoal do",
+        "Amount by which lines are broken into pieces, in light tones first",
+        **_ink(),
     )
-    outline: float = _number(
+    overshoot: float = number(
+        0.0,
+        0.0,
+        256.0,
+        "Maximum distance in pixels by which lines continue past tone borders, getting thinner",
+        is_pixel_length=True,
+        **_ink(),
+    )
+    wobble: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Amount by which lines vary in direction and width, as if drawn by hand",
+        panel="ink",
+        applies=is_hatched,
+    )
+    paper_grain: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Amount by which the grain of the paper breaks up the ink, as with pencil and charcoal",
+        **_ink(),
+    )
+    outline: float = number(
         0.0,
         0.0,
         64.0,
-        "Width of lines of ink along silhouettes, borders and sharp creases, in pixels; 0: none",
+        "Width in pixels of ink lines along silhouettes, borders and sharp creases. 0: none",
+        is_pixel_length=True,
+        **_ink(),
     )
-    supersampling: int = _number(1, 1, 4, "Samples of a pixel along each side")
+    supersampling: int = number(
+        1,
+        1,
+        4,
+        "Samples per pixel along each axis",
+        panel="quality",
+        panel_before="display",
+        stage=Stage.GBUFFER,
+    )
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            _check_setting(entry.name, getattr(self, entry.name), entry.default, entry.metadata)
+        check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> Look:
-        """A look with some settings changed.
+        """Return the look with some settings changed.
 
         Raises
         ------
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known = {entry.name for entry in fields(self)}
         for name in settings:
-            if name not in known:
+            if name not in settings_of(Look):
                 raise RosyError(f"a look has no setting '{name}'")
         return replace(self, **settings)
 
 
-def _check_setting(name: str, value: Any, default: Any, rules: Any) -> None:
-    said = reprlib.repr(value)  # one short line, whatever a file holds
-    if "colour" in rules:
-        if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
-            raise RosyError(f"setting '{name}' is {said}, not a colour like #08080d")
-    elif "options" in rules:
-        if not isinstance(value, str) or value not in rules["options"]:
-            wanted = ", ".join(rules["options"])
-            raise RosyError(f"setting '{name}' is {said}, not one of {wanted}")
-    elif "low" in rules:
-        whole = isinstance(default, int)
-        kind = int if whole else (int, float)
-        if isinstance(value, bool) or not isinstance(value, kind):
-            raise RosyError(f"setting '{name}' is {said}, not a {'whole ' * whole}number")
-        if not rules["low"] <= value <= rules["high"]:
-            raise RosyError(
-                f"setting '{name}' is {said}, not from {rules['low']} to {rules['high']}"
-            )
-    elif not isinstance(value, bool):
-        raise RosyError(f"setting '{name}' is {said}, not true or false")
+def lic_key(look: Look) -> tuple[Any, ...]:
+    """Return a key of the settings that LIC images depend on.
+
+    Two looks with equal keys have the same LIC images of the same G-buffer.
+    """
+    return stage_key(look, Stage.LIC)

@@ -1,4 +1,4 @@
-"""The finished picture and the layers it was made of."""
+"""The finished picture, and the layers that it was composed of."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .images import Images
+from .lic_images import LicImages
 
 
 @dataclass(frozen=True, eq=False)
-class Layers:
-    """What the pixels of one degree were made of, before supersampling is averaged away.
+class DegreeLayer:
+    """Images of the fields of one degree, at the resolution of the supersampled frame.
 
     Attributes
     ----------
     degree : int
     pixel : (P,) int32 ndarray
-        Flat indices into the (supersampled) frame.
-    images : Images
-        The LIC of each member and their blend, around 0.5, before contrast correction.
+        Flat indices into the supersampled frame.
+    images : LicImages
+        LIC images before contrast correction, with values around 0.5.
     tone : (P, K) float32 ndarray
-        The blend after contrast correction and gain: display values, not clipped.
+        The blend after contrast correction and gain. Display values, not clipped.
     """
 
     degree: int
     pixel: np.ndarray
-    images: Images
+    images: LicImages
     tone: np.ndarray
 
 
@@ -37,10 +37,11 @@ class Picture:
     Attributes
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear light, not premultiplied. Alpha is the part of the pixel where a field is seen.
-    layers : tuple of Layers
-        One a degree that is seen, in ascending order.
+        Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
+        or, with clear paper, the coverage by ink.
+    layers : tuple of DegreeLayer
+        One per visible degree, in ascending order. Empty if the picture is from a graphics card.
     """
 
     rgba: np.ndarray
-    layers: tuple[Layers, ...]
+    layers: tuple[DegreeLayer, ...]

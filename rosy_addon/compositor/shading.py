@@ -1,31 +1,32 @@
-"""Diffuse light on the visible pixels."""
+"""Diffuse shading of the pixels of a G-buffer: lights, Lambert's law and cast shadows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..field.frames import dot, unit
+from ..cache import Cache
+from ..field.frames import dot, normalize
 from ..projection.gbuffer import GBuffer
-from ..projection.shadows import light_cameras, reached
+from ..projection.shadow_maps import light_cameras, shadow_visibility
 from .look import Look
 
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A light as seen from the camera.
+    """A light, in the space of the camera.
 
     Attributes
     ----------
     kind : {"sun", "point"}
     vector : (3,) ndarray
-        Camera space: for a sun the unit direction to it, for a point its position.
+        The unit direction to a sun, or the position of a point light.
     colour : (3,) ndarray
         Linear.
     strength : float
-        For a sun, what a white surface facing it sends out (1 is white). For a point, the same at
+        Radiance of a white diffuse surface that faces the light; 1 is white. For a point light, at
         a distance of one Blender unit.
     """
 
@@ -34,26 +35,37 @@ class Light:
     colour: np.ndarray
     strength: float
 
+    def transformed(self, matrix: np.ndarray) -> Light:
+        """Return the light in another space, given the (4, 4) rigid transform to it."""
+        vector = matrix[:3, :3] @ self.vector
+        if self.kind == "point":
+            vector = vector + matrix[:3, 3]
+        return replace(self, vector=vector)
 
-#: Over the left shoulder of whoever looks.
-LAMP = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
+
+#: The light "lamp", over the left shoulder of the viewer.
+KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
 
 def lights_of(look: Look, lights: Sequence[Light]) -> Sequence[Light]:
-    """The lights that a look is lit by, given those of the scene; none of them is the headlight."""
-    return {"headlight": (), "lamp": (LAMP,), "scene": lights}[look.light]
+    """Return the lights that a look uses, given those of the scene. Empty for the headlight."""
+    return {"headlight": (), "lamp": (KEY_LIGHT,), "scene": lights}[look.light]
 
 
-def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.ndarray:
-    """What Lambert's law leaves of each pixel's colour.
+def diffuse(
+    gbuffer: GBuffer, look: Look, lights: Sequence[Light] = (), cache: Cache | None = None
+) -> np.ndarray:
+    """Compute the diffuse lighting of each pixel by Lambert's law.
 
     Parameters
     ----------
     gbuffer : GBuffer
     look : Look
-        Its `light`, `shadows`, and `shading`, the strength: 0 leaves all pixels at 1.
+        Its `light`, `shadows` and `shading` are used. With a `shading` of 0 all pixels are 1.
     lights : sequence of Light
-        For the light "scene".
+        Lights of the scene in the space of the camera. Used if the light of the look is "scene".
+    cache : Cache, optional
+        Stores the shadows of lights.
 
     Returns
     -------
@@ -63,32 +75,38 @@ def diffuse(gbuffer: GBuffer, look: Look, lights: Sequence[Light] = ()) -> np.nd
     if look.shading == 0:
         return np.ones((len(gbuffer.pixel), 3), dtype=np.float32)
     if look.light == "headlight":
-        facing = np.maximum(dot(gbuffer.normal, gbuffer.toward_eye), 0)
-        light = np.repeat(facing[:, None], 3, axis=1)
+        cosine = np.maximum(dot(gbuffer.normal, gbuffer.view_direction), 0)
+        light = np.repeat(cosine[:, None], 3, axis=1)
     else:
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
         for source in lights_of(look, lights):
-            given = _lambert(gbuffer, source)
+            irradiance = _lambert(gbuffer, source)
             if look.shadows:
-                given = given * _reaching(gbuffer, source)
-            light += given[:, None] * source.colour
+                irradiance = irradiance * _shadow_factor(gbuffer, source, cache)
+            light += irradiance[:, None] * source.colour
     return (1 - look.shading + look.shading * light).astype(np.float32)
 
 
 def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
-    """(P,) what one light gives, without its colour."""
+    """(P,) irradiance from one light, without its color and shadows."""
     vector = np.asarray(light.vector, dtype=np.float32)
     if light.kind == "sun":
         return light.strength * np.maximum(dot(gbuffer.normal, vector), 0)
-    way = vector - gbuffer.position
-    squared = np.maximum(dot(way, way), 1e-12)
-    return light.strength * np.maximum(dot(gbuffer.normal, unit(way)), 0) / squared
+    to_light = vector - gbuffer.position
+    distance_squared = np.maximum(dot(to_light, to_light), 1e-12)
+    return (
+        light.strength * np.maximum(dot(gbuffer.normal, normalize(to_light)), 0) / distance_squared
+    )
 
 
-def _reaching(gbuffer: GBuffer, light: Light) -> np.ndarray:
-    """(P,) the share of a light that nothing keeps from a pixel, found once for all looks."""
-    key = "reached", light.kind, np.asarray(light.vector, dtype=np.float64).tobytes()
-    if key not in gbuffer.made:
-        cameras = light_cameras(gbuffer.bodies, gbuffer.camera, light.kind, light.vector)
-        gbuffer.made[key] = reached(gbuffer, cameras)
-    return gbuffer.made[key]
+def _shadow_factor(gbuffer: GBuffer, light: Light, cache: Cache | None) -> np.ndarray:
+    """(P,) fraction of a light that reaches each pixel. It does not depend on the look."""
+
+    def compute() -> np.ndarray:
+        cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, light.vector)
+        return shadow_visibility(gbuffer, cameras)
+
+    if cache is None:
+        return compute()
+    vector = np.asarray(light.vector, dtype=np.float64).tobytes()
+    return cache.get_or_create(("shadow", gbuffer, light.kind, vector), compute)

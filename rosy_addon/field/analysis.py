@@ -1,11 +1,11 @@
-"""How smooth a field is, and how far it is from another one."""
+"""Measure a field: its Dirichlet energy, and its angular difference from another field."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..errors import RosyError
-from .frames import dot, unit
+from .frames import dot, normalize
 from .representation import (
     face_frames,
     face_representation,
@@ -13,44 +13,45 @@ from .representation import (
     to_representation,
 )
 from .rosy_field import RosyField
-from .surface import Surface, surface_edges
+from .surface import Surface, build_edges
 
 
-def field_energy(surface: Surface, field: RosyField) -> float:
-    """The Dirichlet energy of the field's direction, of its representation with modulus 1.
+def dirichlet_energy(surface: Surface, field: RosyField) -> float:
+    """Compute the Dirichlet energy of the representation of a field, normalized to modulus 1.
 
-    The sum over the edges between faces of ``w |z_f - r z_g|^2``, where r unfolds one face into the
-    plane of the other and w is the length of the edge over the distance of the faces' centres from
-    it: the integral of |grad z|^2 by two-point fluxes. It has no unit, so that scaling the mesh
-    changes nothing; a smoothest field on a sphere has about 4 pi N, and a little more around each
-    singularity the finer the mesh.
+    The energy is the integral of ``|grad z|^2``, discretized by two-point fluxes. It is the sum
+    over the interior edges of ``w |z_f - r z_g|^2``, where r is the rotation that unfolds face g
+    into the plane of face f. The weight w is the length of the edge divided by the summed distances
+    of the two face centers from it.
 
-    Faces on which the field is undefined do not count.
+    The energy has no unit, so it does not depend on the scale of the mesh. A smoothest field on a
+    sphere has about 4 pi N. The part around each singularity grows slowly with the resolution of
+    the mesh. Faces where the field is undefined are ignored.
     """
     x, y = face_frames(surface)
     z = to_representation(field.vectors, x, y, field.degree)
-    size = np.abs(z)
-    z = np.divide(z, size, out=np.zeros_like(z), where=size > 0)
-    edges = surface_edges(surface.corner_vertex, surface.face_start)
-    a, b = edges.sides[:, 0], edges.sides[:, 1]
-    one, other = surface.corner_face[a], surface.corner_face[b]
-    turn = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
+    modulus = np.abs(z)
+    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    face_a, face_b = surface.corner_face[a], surface.corner_face[b]
+    angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
     start = surface.vertices[surface.corner_vertex[a]]
     edge = surface.vertices[surface.corner_vertex[b]] - start
     length = np.sqrt(dot(edge, edge))
-    along = unit(edge)
-    across = np.zeros(len(a))
-    for face in (one, other):
-        off = surface.face_centre[face] - start
-        off -= dot(off, along)[:, None] * along
-        across += np.sqrt(dot(off, off))
-    known = (size[one] > 0) & (size[other] > 0) & (across > 0)
-    weight = np.divide(length, across, out=np.zeros_like(length), where=known)
-    return float((weight * 2 * (1 - np.cos(turn)))[known].sum())
+    edge_direction = normalize(edge)
+    center_distance = np.zeros(len(a))
+    for face in (face_a, face_b):
+        offset = surface.face_center[face] - start
+        offset -= dot(offset, edge_direction)[:, None] * edge_direction
+        center_distance += np.sqrt(dot(offset, offset))
+    defined = (modulus[face_a] > 0) & (modulus[face_b] > 0) & (center_distance > 0)
+    weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
+    return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
 
 
 def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
-    """How far one field is turned against another of the same degree.
+    """Compute the angle between two fields of the same degree on each face.
 
     Parameters
     ----------
@@ -60,43 +61,54 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Radians from a member to the nearest of the other field, 0 to pi / N; NaN on faces on which
-        either is undefined.
+        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. NaN on
+        faces where either field is undefined.
 
     Raises
     ------
     RosyError
-        If their degrees differ.
+        If the degrees differ.
     """
     if field.degree != other.degree:
         raise RosyError(
             f"{surface.name}: a field of degree {field.degree} cannot be compared with one of "
             f"{other.degree}"
         )
-    z, wanted = face_representation(surface, field), face_representation(surface, other)
-    error = np.abs(np.angle(z * wanted.conj())) / field.degree
-    error[(z == 0) | (wanted == 0)] = np.nan
+    z, other_z = face_representation(surface, field), face_representation(surface, other)
+    error = np.abs(np.angle(z * other_z.conj())) / field.degree
+    error[(z == 0) | (other_z == 0)] = np.nan
     return error
 
 
-def error_facts(surface: Surface, error: np.ndarray) -> dict[str, float]:
-    """Mean, root mean square and largest of (F,) errors, in degrees, by area; and the share known.
+def error_statistics(surface: Surface, error: np.ndarray) -> dict[str, float]:
+    """Summarize angular errors over the surface.
 
-    All are 0 if nothing is known.
+    Parameters
+    ----------
+    surface : Surface
+    error : (F,) float ndarray
+        Radians, as from `angle_errors`; NaN is ignored.
+
+    Returns
+    -------
+    dict of str to float
+        "mean" and "rms", weighted by face area, and "max", in degrees; and "compared", the fraction
+        of the faces whose error is not NaN. All are 0 if there are none.
     """
     area = np.bincount(surface.triangle_face, _triangle_areas(surface), surface.face_count)
-    known = np.isfinite(error)
-    weight = area[known] / max(float(area[known].sum()), 1e-300)
-    degrees = np.degrees(error[known])
+    defined = np.isfinite(error)
+    weight = area[defined] / max(float(area[defined].sum()), 1e-300)
+    degrees = np.degrees(error[defined])
     return {
         "mean": float(weight @ degrees),
         "rms": float(np.sqrt(weight @ degrees**2)),
         "max": float(degrees.max(initial=0.0)),
-        "compared": float(known.mean()),
+        "compared": float(defined.mean()),
     }
 
 
 def _triangle_areas(surface: Surface) -> np.ndarray:
+    """(T,) float64 areas of the triangles, in square Blender units."""
     corner = surface.vertices[surface.triangle_vertex]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return np.sqrt(dot(cross, cross)) / 2

@@ -1,12 +1,15 @@
 """The connection Laplacian of a triangulated surface, for fields of degree N at its vertices.
 
-A *node* is a vertex as seen by one umbrella of triangles around it: a vertex at which several meet,
-or that lies on an edge that is not manifold, is cut into as many. Tangents at a node are complex
-numbers in a polar map of its umbrella, in which interior angles add up to 2 pi; along an edge they
-are carried by keeping their angle with it.
+An *umbrella* is a set of triangles around a vertex that are connected by shared manifold edges. A
+*node* is a vertex together with one of its umbrellas. A vertex with several umbrellas (a
+nonmanifold vertex, or one on a nonmanifold edge) becomes several nodes.
 
-Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields", SIGGRAPH 2013, section 6,
-with cotangents as weights and masses lumped.
+Tangent vectors at a node are complex numbers in a polar map of its umbrella. Around interior
+vertices the angles of this map are scaled to add up to 2 pi. Transport along an edge keeps the
+angle between the vector and the edge.
+
+The method is that of Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields",
+SIGGRAPH 2013, section 6, but with cotangent weights and lumped masses.
 """
 
 from __future__ import annotations
@@ -17,183 +20,228 @@ from functools import cached_property
 import numpy as np
 
 from .frames import dot
-from .sparse import Rows, from_entries
-from .surface import Surface, connected, next_corners, surface_edges
+from .sparse_multigrid import CSRMatrix, from_coo
+from .surface import Surface, build_edges, connected_components, next_corners
 
-#: Cotangents of the sharpest angles are held to this, or slivers would outweigh everything.
-STEEPEST = 1e3
+#: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
+MAX_COTANGENT = 1e3
 
-#: Triangles that are worked on at once: bounds memory, and fits the caches.
-BLOCK = 1 << 14
+#: Triangles processed at once, to bound memory and fit in the CPU caches.
+BLOCK_TRIANGLES = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
 class Connection:
-    """How tangents at the nodes of a surface compare.
+    """The nodes of a triangulated surface, and the transport and weights along its edges.
+
+    T is the number of triangles, n of nodes and E of edges.
 
     Attributes
     ----------
-    node : (3 T,) int32 ndarray
-        Of each corner of the triangles.
-    count : int
-        Of the nodes.
-    along : (3 T,) float64 ndarray
-        The direction of the edge from each corner to the next, in the map of the node, radians.
-    middle : (3 T,) float64 ndarray
-        That of the middle of the corner.
-    opening : (3 T,) float64 ndarray
-        The angle at the corner, on the triangle.
+    corner_node : (3 T,) int32 ndarray
+        Node of each corner of the triangles.
+    node_count : int
+        n.
+    edge_direction : (3 T,) float64 ndarray
+        Direction of the edge from each corner to the next, in the polar map of the node, radians.
+    bisector_direction : (3 T,) float64 ndarray
+        Direction of the angle bisector of each corner, in the same map, radians.
+    corner_angle : (3 T,) float64 ndarray
+        Interior angle of the triangle at each corner, radians.
     area : (T,) float64 ndarray
+        Areas of the triangles.
     mass : (n,) float64 ndarray
-        A third of the areas around each node.
-    here, there : (E,) int32 ndarray
-        Nodes at the ends of edges.
-    turn : (E,) float64 ndarray
-        Radians from a tangent at `there` to the same one, carried, at `here`.
+        Lumped masses: a third of the area of the triangles around each node.
+    tail, head : (E,) int32 ndarray
+        Nodes at the two ends of each edge.
+    transport_angle : (E,) float64 ndarray
+        Angle in radians to add to the direction of a tangent at `head` to transport it to `tail`.
     weight : (E,) float64 ndarray
-        Half the sum of the cotangents opposite.
+        Half the sum of the cotangents of the angles opposite the edge.
     """
 
-    node: np.ndarray
-    count: int
-    along: np.ndarray
-    middle: np.ndarray
-    opening: np.ndarray
+    corner_node: np.ndarray
+    node_count: int
+    edge_direction: np.ndarray
+    bisector_direction: np.ndarray
+    corner_angle: np.ndarray
     area: np.ndarray
     mass: np.ndarray
-    here: np.ndarray
-    there: np.ndarray
-    turn: np.ndarray
+    tail: np.ndarray
+    head: np.ndarray
+    transport_angle: np.ndarray
     weight: np.ndarray
 
     @cached_property
-    def piece(self) -> np.ndarray:
-        """(n,) int32: the connected piece of each node."""
-        return connected(self.count, np.stack([self.here, self.there], axis=1))
+    def component(self) -> np.ndarray:
+        """(n,) int32: the number of the connected component of each node."""
+        return connected_components(self.node_count, np.stack([self.tail, self.head], axis=1))
 
 
-def connect(surface: Surface) -> Connection:
-    """The connection of a surface as it is, triangulated."""
+def build_connection(surface: Surface) -> Connection:
+    """Build the connection of the triangles of a surface, at its present vertex positions."""
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
-    edges = surface_edges(vertex, start)
+    edges = build_edges(vertex, start)
     corner = np.arange(len(vertex), dtype=np.int32)
-    following = next_corners(start)
-    preceding = following[following]
+    next_corner = next_corners(start)
+    previous_corner = next_corner[next_corner]
     twin = np.full(len(vertex), -1, dtype=np.int32)
-    a, b = edges.sides[:, 0], edges.sides[:, 1]
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     twin[a], twin[b] = b, a
 
-    opening, cotangent, area = _shapes(surface.vertices, surface.triangle_vertex)
-    # Around a vertex, counter-clockwise: the corner before lies across the edge that leaves here.
-    before = np.where(twin >= 0, following[np.maximum(twin, 0)], -1)
-    first, closed = _first_corners(before, int(np.bincount(vertex).max()))
-    root, offset = _back_to_first(before, first, opening)
-    number = np.cumsum(first) - 1
-    node = number[root].astype(np.int32)
-    count = int(number[-1]) + 1
-    around = np.bincount(node, opening, count)
-    stretch = np.ones(count)
-    full = closed & (around > 0)
-    stretch[full] = 2 * np.pi / around[full]
-    along = offset * stretch[node]
-    middle = (offset + 0.5 * opening) * stretch[node]
+    corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
+    # In counter-clockwise order around a vertex, the previous corner lies across the edge that
+    # leaves from this corner.
+    previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
+    is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
+    first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
+    node_of_corner = np.cumsum(is_first) - 1
+    corner_node = node_of_corner[first_corner].astype(np.int32)
+    node_count = int(node_of_corner[-1]) + 1
+    angle_sum = np.bincount(corner_node, corner_angle, node_count)
+    angle_scale = np.ones(node_count)
+    is_interior = closed & (angle_sum > 0)
+    angle_scale[is_interior] = 2 * np.pi / angle_sum[is_interior]
+    edge_direction = offset * angle_scale[corner_node]
+    bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    # The edge of each corner, once: from there to the next corner of the triangle.
-    once = (twin < 0) | (corner < twin)
-    tail, head = corner[once], following[corner[once]]
-    # Where it arrives, it runs along the edge that leaves backward: that of the twin, or the end
-    # of the corner there.
-    other = twin[tail]
-    backward = np.where(
-        other >= 0, along[np.maximum(other, 0)], along[head] + opening[head] * stretch[node[head]]
+    # Each edge once: from the tail corner to the next corner of its triangle.
+    is_edge = (twin < 0) | (corner < twin)
+    tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
+    # The direction of the reversed edge at its head: that of the twin halfedge or, at a boundary,
+    # that of the second side of the corner at the head.
+    twin_of_tail = twin[tail_corner]
+    reverse_direction = np.where(
+        twin_of_tail >= 0,
+        edge_direction[np.maximum(twin_of_tail, 0)],
+        edge_direction[head_corner]
+        + corner_angle[head_corner] * angle_scale[corner_node[head_corner]],
     )
     weight = 0.5 * (
-        cotangent[preceding[tail]] + np.where(other >= 0, cotangent[preceding[other]], 0)
+        cotangent[previous_corner[tail_corner]]
+        + np.where(twin_of_tail >= 0, cotangent[previous_corner[twin_of_tail]], 0)
     )
     return Connection(
-        node=node,
-        count=count,
-        along=along,
-        middle=middle,
-        opening=opening,
+        corner_node=corner_node,
+        node_count=node_count,
+        edge_direction=edge_direction,
+        bisector_direction=bisector_direction,
+        corner_angle=corner_angle,
         area=area,
-        mass=np.bincount(node, np.repeat(area / 3, 3), count),
-        here=node[tail],
-        there=node[head],
-        turn=along[tail] - backward - np.pi,
+        mass=np.bincount(corner_node, np.repeat(area / 3, 3), node_count),
+        tail=corner_node[tail_corner],
+        head=corner_node[head_corner],
+        transport_angle=edge_direction[tail_corner] - reverse_direction - np.pi,
         weight=weight,
     )
 
 
-def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> Rows:
-    """The (n, n) matrix of the Dirichlet energy of representations z, plus `shift` masses.
+def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMatrix:
+    """The matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
 
-    z* L z is the sum over edges of w |z_i - r^N z_j|^2.
+    Parameters
+    ----------
+    connection : Connection
+    degree : int
+        N.
+    shift : float
+        Factor of the diagonal mass matrix that is added.
+
+    Returns
+    -------
+    (n, n) CSRMatrix
+        Hermitian L. Without a shift, z* L z is the sum over all edges of w |z_i - r^N z_j|^2, where
+        r transports from node j to node i.
     """
     c = connection
-    # Slivers' cotangents, negative and large, would make it indefinite.
+    # Negative weights (of obtuse triangles) would make the matrix indefinite.
     weight = np.maximum(c.weight, 0)
-    ends = np.concatenate([c.here, c.there])
-    # A node without any weight keeps its row regular.
-    own = np.bincount(ends, np.tile(weight, 2), c.count) + shift * c.mass
-    own[own <= 0] = max(float(own.mean()), 1.0)
-    off = -weight * np.exp(1j * degree * c.turn)
-    every = np.arange(c.count)
-    return from_entries(
-        np.concatenate([c.here, c.there, every]).astype(np.intp),
-        np.concatenate([c.there, c.here, every]).astype(np.intp),
-        np.concatenate([off, off.conj(), own]),
-        c.count,
-        c.count,
+    ends = np.concatenate([c.tail, c.head])
+    # Nodes without weight get a nonzero diagonal, so that the matrix stays regular.
+    diagonal = np.bincount(ends, np.tile(weight, 2), c.node_count) + shift * c.mass
+    diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
+    off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
+    nodes = np.arange(c.node_count)
+    return from_coo(
+        np.concatenate([c.tail, c.head, nodes]).astype(np.intp),
+        np.concatenate([c.head, c.tail, nodes]).astype(np.intp),
+        np.concatenate([off_diagonal, off_diagonal.conj(), diagonal]),
+        c.node_count,
+        c.node_count,
     )
 
 
-def _shapes(
+def _corner_geometry(
     vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(3 T,) angles and cotangents at the corners of triangles, and (T,) areas."""
-    opening, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
+    """(3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
+    corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
-    for first in range(0, len(triangles), BLOCK):
-        part = slice(first, first + BLOCK)
-        points = [vertices.take(column, axis=0) for column in triangles[part].T]
+    for first in range(0, len(triangles), BLOCK_TRIANGLES):
+        block = slice(first, first + BLOCK_TRIANGLES)
+        points = [vertices.take(column, axis=0) for column in triangles[block].T]
         edges = [points[(k + 1) % 3] - points[k] for k in range(3)]
         cross = np.cross(edges[0], edges[1])
-        twice = np.sqrt(dot(cross, cross))
-        area[part] = twice / 2
+        double_area = np.sqrt(dot(cross, cross))
+        area[block] = double_area / 2
         for k in range(3):
-            along = -dot(edges[k], edges[k - 1])
-            opening[part, k] = np.arctan2(twice, along)
-            steep = np.abs(along) >= STEEPEST * twice
-            steepest = np.where(twice > 0, np.sign(along) * STEEPEST, 0)
-            cotangent[part, k] = np.where(steep, steepest, along / np.where(steep, 1, twice))
-    return opening.ravel(), cotangent.ravel(), area
+            cosine_term = -dot(edges[k], edges[k - 1])
+            corner_angle[block, k] = np.arctan2(double_area, cosine_term)
+            exceeds_limit = np.abs(cosine_term) >= MAX_COTANGENT * double_area
+            limit = np.where(double_area > 0, np.sign(cosine_term) * MAX_COTANGENT, 0)
+            cotangent[block, k] = np.where(
+                exceeds_limit, limit, cosine_term / np.where(exceeds_limit, 1, double_area)
+            )
+    return corner_angle.ravel(), cotangent.ravel(), area
 
 
-def _first_corners(before: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """(C,) bool: where each umbrella begins; (umbrellas,) bool: whether it is closed.
+def _umbrella_starts(
+    previous_in_umbrella: np.ndarray, max_corners: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the first corner of each umbrella, and which umbrellas are closed.
 
-    `before` is the corner before each, -1 at the start of an open umbrella; none has more than
-    `most` corners. A closed one begins with its smallest.
+    A closed umbrella begins with its corner of smallest index.
+
+    Parameters
+    ----------
+    previous_in_umbrella : (C,) int ndarray
+        The previous corner in counter-clockwise order; -1 at the start of an open umbrella.
+    max_corners : int
+        Upper bound of the number of corners in an umbrella.
+
+    Returns
+    -------
+    first : (C,) bool ndarray
+        Whether an umbrella begins with the corner.
+    closed : (n,) bool ndarray
+        Whether the umbrella is closed, in the order of their first corners.
     """
-    own = np.arange(len(before))
-    least, way = own, np.where(before >= 0, before, own)
-    for _ in range(most.bit_length()):
-        least, way = np.minimum(least, least[way]), way[way]
-    closed = before[way] >= 0
-    first = (before < 0) | (closed & (least == own))
+    corner = np.arange(len(previous_in_umbrella))
+    smallest, pointer = corner, np.where(previous_in_umbrella >= 0, previous_in_umbrella, corner)
+    for _ in range(max_corners.bit_length()):
+        smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
+    closed = previous_in_umbrella[pointer] >= 0
+    first = (previous_in_umbrella < 0) | (closed & (smallest == corner))
     return first, closed[first]
 
 
-def _back_to_first(
-    before: np.ndarray, first: np.ndarray, angle: np.ndarray
+def _accumulate_angles(
+    previous_in_umbrella: np.ndarray, is_first: np.ndarray, angle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(C,) the corner that the umbrella of each begins with, and the angles from there on to it."""
-    way = np.where(first, np.arange(len(before)), before)
-    total = np.where(first, 0.0, angle[way])
+    """Sum the angles from the first corner of each umbrella up to each corner.
+
+    Returns
+    -------
+    first_corner : (C,) int ndarray
+        The first corner of the umbrella that the corner belongs to.
+    angle_sum : (C,) float64 ndarray
+        Sum of the angles of all corners before this one, radians.
+    """
+    pointer = np.where(is_first, np.arange(len(previous_in_umbrella)), previous_in_umbrella)
+    angle_sum = np.where(is_first, 0.0, angle[pointer])
     while True:
-        further = way[way]
-        if np.array_equal(further, way):
-            return way, total
-        total, way = total + total[way], further
+        next_pointer = pointer[pointer]
+        if np.array_equal(next_pointer, pointer):
+            return pointer, angle_sum
+        angle_sum, pointer = angle_sum + angle_sum[pointer], next_pointer

@@ -1,4 +1,4 @@
-"""Fields made of other fields: another degree, turned, smoothed, with other magnitudes."""
+"""Convert a field: change its degree, rotate it, smooth it, or replace its magnitudes."""
 
 from __future__ import annotations
 
@@ -7,66 +7,82 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Work, drain
-from .connection import connect, laplacian
-from .directions import slips
-from .frames import unit
-from .generate import curvature_magnitude
-from .guided import solve
-from .representation import complex_sums, face_frames, from_representation, to_representation
+from ..progress import Task, run_to_completion
+from .connection import build_connection, laplacian
+from .directional_field import field_matching
+from .frames import normalize
+from .generate import compute_magnitude
+from .guided import conjugate_gradient_task
+from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .smoothest import corner_turns, sum_on_faces
-from .sparse import from_entries
-from .surface import Surface, connected
+from .smoothest import corner_frame_angles, node_sum_per_face
+from .sparse_multigrid import from_coo
+from .surface import Surface, connected_components
 
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """What a field is converted to, in this order.
+    """The steps of a conversion, applied in the order of the attributes.
 
     Attributes
     ----------
     degree : int or None
-        A multiple or a divisor of the field's.
-    turn : float
-        Radians.
-    smooth : float
-        Over which share of the surface's size it diffuses.
+        The new degree, a multiple or a divisor of the present one; None to keep it.
+    rotation : float
+        Counter-clockwise rotation about the normals, radians.
+    smoothing_length : float
+        Distance of the diffusion relative to `Surface.extent`; 0 for none.
     magnitude : str, (F,) ndarray or None
-        One of `generate.MAGNITUDES`, or values.
+        One of `generate.MAGNITUDES`, or values; None to keep the magnitudes.
     """
 
     degree: int | None = None
-    turn: float = 0.0
-    smooth: float = 0.0
+    rotation: float = 0.0
+    smoothing_length: float = 0.0
     magnitude: str | np.ndarray | None = None
 
 
 def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyField:
-    """Convert a field; see `converting`."""
-    return drain(converting(surface, field, conversion))
+    """Convert a field; see `convert_task`."""
+    return run_to_completion(convert_task(surface, field, conversion))
 
 
-def converting(surface: Surface, field: RosyField, conversion: Conversion) -> Work[RosyField]:
-    """Convert a field: what a conversion leaves out stays as it is."""
+def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> Task[RosyField]:
+    """Apply the steps of a conversion to a field.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
+
+    Raises
+    ------
+    RosyError
+        If a step is not possible; see `change_degree` and `diffuse_task`.
+    """
     if conversion.degree is not None:
-        field = to_degree(surface, field, conversion.degree)
-    if conversion.turn:
-        field = turned(surface, field, conversion.turn)
-    if conversion.smooth:
-        field = yield from smoothing(surface, field, (conversion.smooth * surface.size) ** 2)
+        field = change_degree(surface, field, conversion.degree)
+    if conversion.rotation:
+        field = rotate_field(surface, field, conversion.rotation)
+    if conversion.smoothing_length:
+        field = yield from diffuse_task(
+            surface, field, (conversion.smoothing_length * surface.extent) ** 2
+        )
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = curvature_magnitude(surface, magnitude)
+        magnitude = compute_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 
-def to_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
-    """A field of a multiple or a divisor of a field's degree.
+def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
+    """Change the degree of a field to a multiple or a divisor.
 
-    A member of degree N is one of a multiple of N, too. Of a divisor each member belongs to one of
-    several fields, of which one is followed from face to face as far as it goes: where it comes
-    back to a face as another one, around a singularity, a seam stays.
+    For a multiple, the members stay and others are added between them. For a divisor, a subset of
+    the members is selected on each face so that the subsets match from face to face. If the subsets
+    do not match after a loop around a singularity, a seam remains.
 
     Parameters
     ----------
@@ -74,11 +90,12 @@ def to_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
     field : RosyField
         A RoSy.
     degree : int
+        The new degree.
 
     Raises
     ------
     RosyError
-        If it is neither a multiple nor a divisor, or the field's directions are no RoSy.
+        If the degree is neither a multiple nor a divisor, or the directions are not a RoSy.
     """
     degree = check_degree(degree)
     _check_rosy(surface, field)
@@ -88,49 +105,54 @@ def to_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
         raise RosyError(
             f"{surface.name}: degree {degree} is neither a multiple nor a divisor of {field.degree}"
         )
-    return RosyField(degree, combed(surface, field, field.degree // degree))
+    return RosyField(degree, comb_members(surface, field, field.degree // degree))
 
 
-def combed(surface: Surface, field: RosyField, kinds: int) -> np.ndarray:
-    """(F, 3) the stored members chosen so that they go over into each other.
+def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
+    """Choose a member on each face so that the members of neighboring faces match (combing).
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
-    kinds : int
-        Members whose numbers are the same modulo this are as good as each other; a divisor of N.
+    period : int
+        Members whose numbers are equal modulo this are equivalent; a divisor of N.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
+        The chosen members.
     """
-    faces, slip = slips(surface, field)
-    usable = field.vectors.any(axis=1)[faces].all(axis=1)
-    one, other = faces[usable].T
-    slip = slip[usable]
-    here = np.concatenate([one, other])
-    there = np.concatenate([other, one])
-    # The chosen member k of `here` goes over into k + slip of `there`.
-    step = np.concatenate([slip, -slip])
-    order = np.argsort(here, kind="stable")
-    here, there, step = here[order], there[order], step[order]
-    start = np.searchsorted(here, np.arange(surface.face_count + 1))
-    # From one face of each connected piece on, ring by ring.
-    number = np.full(surface.face_count, -1)
-    piece = connected(surface.face_count, np.stack([one, other], axis=1))
-    front = np.unique(piece, return_index=True)[1]
-    number[front] = 0
+    faces, matching = field_matching(surface, field)
+    defined = field.vectors.any(axis=1)[faces].all(axis=1)
+    face_a, face_b = faces[defined].T
+    matching = matching[defined]
+    source = np.concatenate([face_a, face_b])
+    target = np.concatenate([face_b, face_a])
+    # Member k of `source` matches member k + shift of `target`.
+    shift = np.concatenate([matching, -matching])
+    order = np.argsort(source, kind="stable")
+    source, target, shift = source[order], target[order], shift[order]
+    start = np.searchsorted(source, np.arange(surface.face_count + 1))
+    # Breadth-first search from one face of each connected component.
+    member_index = np.full(surface.face_count, -1)
+    component = connected_components(surface.face_count, np.stack([face_a, face_b], axis=1))
+    front = np.unique(component, return_index=True)[1]
+    member_index[front] = 0
     while len(front):
         count = start[front + 1] - start[front]
-        entry = np.repeat(start[front] - np.cumsum(count) + count, count)
-        entry += np.arange(count.sum())
-        entry = entry[number[there[entry]] < 0]
-        front, first = np.unique(there[entry], return_index=True)
-        entry = entry[first]
-        number[front] = (number[here[entry]] + step[entry]) % kinds
-    angle = 2 * np.pi * number / field.degree
-    return turned(surface, field, angle).vectors
+        link = np.repeat(start[front] - np.cumsum(count) + count, count)
+        link += np.arange(count.sum())
+        link = link[member_index[target[link]] < 0]
+        front, first = np.unique(target[link], return_index=True)
+        link = link[first]
+        member_index[front] = (member_index[source[link]] + shift[link]) % period
+    angle = 2 * np.pi * member_index / field.degree
+    return rotate_field(surface, field, angle).vectors
 
 
-def turned(surface: Surface, field: RosyField, angle: np.ndarray | float) -> RosyField:
-    """The field turned counter-clockwise about the normals.
+def rotate_field(surface: Surface, field: RosyField, angle: np.ndarray | float) -> RosyField:
+    """Rotate a field counter-clockwise about the face normals.
 
     Parameters
     ----------
@@ -140,22 +162,25 @@ def turned(surface: Surface, field: RosyField, angle: np.ndarray | float) -> Ros
         Radians.
     """
     angle = np.broadcast_to(angle, (len(field.vectors),))[:, None]
-    across = np.cross(surface.face_normal, field.vectors)
+    perpendicular = np.cross(surface.face_normal, field.vectors)
     return replace(
-        field, vectors=np.cos(angle) * field.vectors + np.sin(angle) * across, given=None
+        field,
+        vectors=np.cos(angle) * field.vectors + np.sin(angle) * perpendicular,
+        source_directions=None,
     )
 
 
-def smoothed(surface: Surface, field: RosyField, time: float) -> RosyField:
-    """The field after diffusion; see `smoothing`."""
-    return drain(smoothing(surface, field, time))
+def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
+    """Smooth a field by diffusion; see `diffuse_task`."""
+    return run_to_completion(diffuse_task(surface, field, time))
 
 
-def smoothing(surface: Surface, field: RosyField, time: float) -> Work[RosyField]:
-    """Let the representation of a field diffuse for some time.
+def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyField]:
+    """Smooth a field by diffusion of its representation.
 
-    One implicit step of Euler's, ``(M + t L) z = M z_0`` with the connection Laplacian L. Opposite
-    values cancel: magnitudes fall where the field varied, and singularities of opposite index meet.
+    This is one implicit Euler step, ``(M + t L) z = M z_0``, with the mass matrix M and the
+    connection Laplacian L. Opposite values cancel, so magnitudes decrease where the field varies,
+    and singularities of opposite index merge.
 
     Parameters
     ----------
@@ -163,12 +188,21 @@ def smoothing(surface: Surface, field: RosyField, time: float) -> Work[RosyField
     field : RosyField
         A RoSy.
     time : float
-        Blender units squared: what is finer than about the root of it is smoothed away.
+        Diffusion time t in square Blender units. Details smaller than about its square root are
+        removed.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
 
     Raises
     ------
     RosyError
-        If the field's directions are no RoSy, or the time is not positive.
+        If the directions are not a RoSy, or the time is not positive and finite.
     """
     _check_rosy(surface, field)
     if not time > 0 or not np.isfinite(time):
@@ -176,41 +210,48 @@ def smoothing(surface: Surface, field: RosyField, time: float) -> Work[RosyField
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
-    connection = connect(surface)
-    turn = corner_turns(surface, connection, x, y)
-    share = np.repeat(connection.area / 3, 3)
-    owner = np.repeat(surface.triangle_face, 3)
-    back = np.exp(-1j * degree * turn)
-    right = complex_sums(connection.node, share * z[owner] * back, connection.count)
+    connection = build_connection(surface)
+    frame_angle = corner_frame_angles(surface, connection, x, y)
+    corner_area = np.repeat(connection.area / 3, 3)
+    corner_face = np.repeat(surface.triangle_face, 3)
+    to_node = np.exp(-1j * degree * frame_angle)
+    rhs = complex_bincount(
+        connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
+    )
     matrix = laplacian(connection, degree)
     mass = np.maximum(connection.mass, 1e-12 * max(float(connection.mass.mean()), 1e-300))
-    every = np.arange(connection.count)
-    matrix = from_entries(
-        np.concatenate([matrix.row, every]),
-        np.concatenate([matrix.column, every]),
-        np.concatenate([matrix.value * time, mass.astype(np.complex128)]),
-        connection.count,
-        connection.count,
+    nodes = np.arange(connection.node_count)
+    matrix = from_coo(
+        np.concatenate([matrix.row_indices, nodes]),
+        np.concatenate([matrix.indices, nodes]),
+        np.concatenate([matrix.data * time, mass.astype(np.complex128)]),
+        connection.node_count,
+        connection.node_count,
     )
-    found = yield from solve(matrix, right)
+    solution = yield from conjugate_gradient_task(matrix, rhs)
     area = np.bincount(surface.triangle_face, connection.area, surface.face_count)
-    mean = sum_on_faces(surface, connection, found, turn, degree) / np.where(area > 0, area, 1) / 3
+    mean = (
+        node_sum_per_face(surface, connection, solution, frame_angle, degree)
+        / np.where(area > 0, area, 1)
+        / 3
+    )
     return RosyField(degree, from_representation(mean, x, y, degree))
 
 
 def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField:
-    """The field with other lengths; it stays undefined where it is.
+    """Replace the magnitudes of a field; faces where it is undefined stay undefined.
 
     Parameters
     ----------
     field : RosyField
     magnitude : (F,) ndarray or float
-        Not negative.
+        The new magnitudes, not negative.
     """
     magnitude = np.broadcast_to(magnitude, (len(field.vectors),))[:, None]
-    return replace(field, vectors=unit(field.vectors) * magnitude, given=None)
+    return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)
 
 
 def _check_rosy(surface: Surface, field: RosyField) -> None:
-    if field.deviations is not None:
+    """Raise an error if the directions of a field are not a RoSy."""
+    if field.direction_ratios is not None:
         raise RosyError(f"{surface.name}: the directions of its field are no RoSy")

@@ -1,4 +1,4 @@
-"""Tangent frames, and the minimal rotation that carries vectors from one to another."""
+"""Tangent frames, and the transport of tangent vectors by minimal rotations."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(...) scalar products of two (..., 3) arrays."""
+    """(...) dot products of the vectors of two (..., 3) arrays."""
     return np.einsum("...i,...i->...", a, b)
 
 
-def unit(vectors: np.ndarray) -> np.ndarray:
+def normalize(vectors: np.ndarray) -> np.ndarray:
     """(..., 3) vectors scaled to length 1; zero vectors stay zero."""
     length = np.sqrt(dot(vectors, vectors))[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
-def carry(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Rotate tangent vectors along the shortest arc that takes one normal to another.
+def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Rotate tangent vectors by the minimal rotation that takes one normal to another.
 
     Parameters
     ----------
@@ -31,73 +31,81 @@ def carry(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.nda
     Returns
     -------
     (..., 3) ndarray
-        v - (v.t) / (1 + s.t) (s + t): perpendicular to `target`, of unchanged length.
+        v - (v.t) / (1 + s.t) (s + t), for source s and target t. The vectors are perpendicular to
+        `target` and have their original lengths.
 
     Notes
     -----
-    The map is its own inverse with the two normals exchanged. Opposite normals have no shortest
-    arc; there the divisor is kept away from zero and the result is finite but arbitrary.
+    Exchanging the two normals gives the inverse. For opposite normals the minimal rotation is not
+    unique; the divisor is then bounded away from zero, and the result is finite but arbitrary.
     """
-    divisor = np.maximum(1 + dot(source, target), np.finfo(vectors.dtype).eps)
-    return vectors - (dot(vectors, target) / divisor)[..., None] * (source + target)
+    denominator = np.maximum(1 + dot(source, target), np.finfo(vectors.dtype).eps)
+    return vectors - (dot(vectors, target) / denominator)[..., None] * (source + target)
 
 
 def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    """`dot` of vectors given by their three components: quicker, as these lie in a row."""
+    """`dot` of vectors given as three component arrays; faster, because each is contiguous."""
     product = a[0] * b[0]
     product += a[1] * b[1]
     product += a[2] * b[2]
     return product
 
 
-def carry_components(
+def transport_components(
     vectors: Sequence[np.ndarray], source: Sequence[np.ndarray], target: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """`carry` of vectors given by their three components."""
-    share = dot_components(vectors, target)
-    share /= np.maximum(1 + dot_components(source, target), np.finfo(share.dtype).eps)
-    return [v - share * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
+    """`transport` of vectors given as three component arrays."""
+    factor = dot_components(vectors, target)
+    factor /= np.maximum(1 + dot_components(source, target), np.finfo(factor.dtype).eps)
+    return [v - factor * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
 
 
-def transformed(
-    vectors: Sequence[np.ndarray], matrix: np.ndarray, shift: np.ndarray | None = None
+def transform_components(
+    vectors: Sequence[np.ndarray], matrix: np.ndarray, offset: np.ndarray | None = None
 ) -> np.ndarray:
-    """Vectors given by their three components, times a matrix, in the precision of the vectors.
+    """Multiply vectors given as three component arrays by a matrix, in the vectors' precision.
 
     Parameters
     ----------
     vectors : 3 (n,) ndarrays
     matrix : (m, 3) ndarray
-    shift : (m,) ndarray, optional
-        Added.
+    offset : (m,) ndarray, optional
+        Added to the products.
 
     Returns
     -------
     (m, n) ndarray
+        In the dtype of the vectors.
 
     Notes
     -----
-    A matrix product would do, but that of a linear algebra library wakes all cores for so little,
-    and they keep each other waiting long after.
+    This avoids numpy's matrix product: the BLAS library would start its threads on all cores for a
+    small product, and their waiting slows down the code that follows.
     """
-    kind = vectors[0].dtype
-    result = np.empty((len(matrix), len(vectors[0])), dtype=kind)
-    for number, (row, out) in enumerate(zip(matrix.astype(kind), result, strict=True)):
+    dtype = vectors[0].dtype
+    result = np.empty((len(matrix), len(vectors[0])), dtype=dtype)
+    for index, (row, out) in enumerate(zip(matrix.astype(dtype), result, strict=True)):
         np.multiply(vectors[0], row[0], out=out)
         out += vectors[1] * row[1]
         out += vectors[2] * row[2]
-        if shift is not None:
-            out += kind.type(shift[number])
+        if offset is not None:
+            out += dtype.type(offset[index])
     return result
 
 
 def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit tangents x, y with x cross y = normal, a smooth choice for z > 0 and for z < 0.
+    """Two unit tangents x, y for each normal, with x cross y = normal.
+
+    The frames vary smoothly over normals with z > 0 and over those with z < 0.
 
     Parameters
     ----------
     normals : (..., 3) ndarray
         Unit vectors.
+
+    Returns
+    -------
+    x, y : (..., 3) ndarray
 
     References
     ----------
@@ -113,24 +121,25 @@ def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The camera's x and y axes carried to the plane across each pixel's ray.
+    """Transport the camera's x and y axes to the plane perpendicular to each pixel's ray.
 
-    In camera space the camera's own direction to the eye is (0, 0, 1); its x axis (1, 0, 0) and y
-    axis (0, 1, 0) are carried by the minimal rotation from there to `toward_eye`, which is
-    continuous over the whole image. For an orthographic camera they stay as they are.
+    The axes (1, 0, 0) and (0, 1, 0) of camera space are rotated by the minimal rotation from
+    (0, 0, 1), the direction to the eye on the optical axis, to `toward_eye`. This frame is
+    continuous over the whole image. For an orthographic camera it is the same at every pixel.
 
     Parameters
     ----------
     toward_eye : (..., 3) ndarray
-        Unit, camera space, z > -1.
+        Unit directions from the surface to the eye in camera space, z > -1.
 
     Returns
     -------
     x, y : (..., 3) ndarray
+        Unit, in camera space.
     """
     wx, wy, wz = toward_eye[..., 0], toward_eye[..., 1], toward_eye[..., 2]
     a = 1 / (1 + wz)
-    across = -wx * wy * a
-    x = np.stack([1 - wx * wx * a, across, -wx])
-    y = np.stack([across, 1 - wy * wy * a, -wy])
+    xy_term = -wx * wy * a
+    x = np.stack([1 - wx * wx * a, xy_term, -wx])
+    y = np.stack([xy_term, 1 - wy * wy * a, -wy])
     return np.moveaxis(x, 0, -1), np.moveaxis(y, 0, -1)

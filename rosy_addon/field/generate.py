@@ -1,6 +1,7 @@
-"""Where a field can come from: the kinds of fields that are made, by name, and two plain ones.
+"""Field generators: make a field on a surface by the name of its kind.
 
-Surfaces that cannot be oriented are cut where their sides meet; `surface.cut_edges` counts.
+Two of the generators, along an axis and along the curvature, are implemented here. Fields are cut
+along edges whose faces disagree on orientation; see `surface.count_inconsistent_edges`.
 """
 
 from __future__ import annotations
@@ -11,25 +12,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Work, drain, part
-from .corners import corner_angles, corner_rotations, smooth_faces
-from .frames import dot, unit
-from .guided import finding_guided
+from ..progress import Progress, Task, run_to_completion, subtask
+from .corner_fans import corner_angles, corner_rotations, smooth_face_values
+from .frames import dot, normalize
+from .guided import guided_task
 from .guides import (
-    along_edges,
-    along_handles,
-    along_strokes,
-    along_uv,
+    average_guides,
     feature_edges,
-    mean_guides,
+    guides_from_axes,
+    guides_from_edges,
+    guides_from_strokes,
+    guides_from_uv,
 )
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .smoothest import finding_smoothest
-from .surface import Surface, build_surface, sum_over_faces
+from .smoothest import smoothest_task
+from .surface import Surface, build_surface, sum_per_face
 
-#: What can be generated, in the words a user meets.
-KINDS = {
+#: Kinds of generated fields, with the descriptions shown in the interface.
+GENERATORS = {
     "smoothest": "As smooth as can be, with as few singularities as the shape allows",
     "curvature": "Along the principal directions of curvature (even degrees)",
     "features": "Along borders and sharp edges, and smooth between them",
@@ -38,181 +39,196 @@ KINDS = {
     "uv": "Along the axes of a UV map",
 }
 
-#: What the magnitude of a field can be made of, in the words a user meets.
+#: Kinds of magnitudes of a field, with the descriptions shown in the interface.
 MAGNITUDES = {
     "unit": "1 everywhere",
     "confidence": "How clear the direction of curvature is, from 0 to 1",
     "curvature": "How much the surface bends where it bends most, by the size of the mesh",
 }
 
-#: Rounds of averaging that take the jitter of the triangulation out of a curvature field.
-SMOOTHING = 2
+#: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
+CURVATURE_SMOOTHING_ROUNDS = 2
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """How a field is made.
+class GeneratorSettings:
+    """The settings of `generate`.
 
     Attributes
     ----------
     kind : str
-        One of `KINDS`.
+        One of `GENERATORS`.
     axis : 3 floats
-        Of the kind "axis": object space.
-    reach : float
-        As a share of the surface's size. Of the kind "curvature": how far clearly curved parts
-        reach into those that are not; 0 leaves every face what its own curvature says. Of
-        "guided": over what distance guides are smoothed; at 0 they are met exactly.
+        For "axis": the direction to follow, in object space.
+    smoothing_length : float
+        Relative to `Surface.extent`. For "curvature": the distance over which directions of high
+        confidence spread to regions of low confidence; 0 for none. For "guided": the distance over
+        which guides are smoothed; at 0 they are followed exactly.
     sharp_angle : float
-        Of the kind "features": radians by which the surface bends at a sharp edge, at least.
+        For "features": the smallest angle between face normals at a sharp edge, in radians.
     edges : (E, 2) int ndarray or None
-        Of the kinds "features" and "guided": which edges to follow; of the former, instead of
-        borders and sharp ones.
+        For "features" and "guided": pairs of vertices, the edges to follow. For "features", they
+        replace the border and sharp edges.
     strokes : sequence of (n, 3) float ndarray
-        Of "guided": points of lines drawn on the surface, object space.
-    handles : sequence of (place, axis, radius)
-        Of "guided": points, what they guide along, and how far from them; object space.
+        For "guided": polylines drawn on the surface, in object space.
+    axis_guides : sequence of (point, axis, radius)
+        For "guided": see `guides.guides_from_axes`; object space.
     uv : (C, 2) float ndarray or None
-        Of "guided" and "uv": of the corners.
+        For "guided" and "uv": texture coordinates of the corners.
     vectors : (F, 3) float ndarray or None
-        Of "guided": a member each, zero where there is none.
+        For "guided": a member vector for each face, zero where there is no guide.
     """
 
     kind: str
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    reach: float = 0.0
+    smoothing_length: float = 0.0
     sharp_angle: float = np.pi / 6
     edges: np.ndarray | None = None
     strokes: Sequence[np.ndarray] = ()
-    handles: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
+    axis_guides: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
     uv: np.ndarray | None = None
     vectors: np.ndarray | None = None
 
 
-def generate(surface: Surface, recipe: Recipe | str, degree: int) -> RosyField:
-    """Make a field; see `generating`."""
-    return drain(generating(surface, recipe, degree))
+def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -> RosyField:
+    """Generate a field; see `generate_task`."""
+    return run_to_completion(generate_task(surface, settings, degree))
 
 
-def generating(surface: Surface, recipe: Recipe | str, degree: int) -> Work[RosyField]:
-    """Make a field.
+def generate_task(
+    surface: Surface, settings: GeneratorSettings | str, degree: int
+) -> Task[RosyField]:
+    """Generate a field of one of the kinds in `GENERATORS`.
 
     Parameters
     ----------
     surface : Surface
-    recipe : Recipe or str
-        A kind alone is a recipe with nothing else changed.
+    settings : GeneratorSettings or str
+        A string is a kind, with the default settings.
     degree : int
+        N.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
 
     Raises
     ------
     RosyError
-        If there is no such kind, it does not make fields of this degree, or not on this surface.
+        If the kind is unknown, or cannot make a field of this degree on this surface.
     """
-    recipe = Recipe(recipe) if isinstance(recipe, str) else recipe
+    settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
     yield Progress(0.0, "making a field")
-    if recipe.kind == "smoothest":
-        return (yield from finding_smoothest(surface, degree))
-    if recipe.kind == "axis":
-        return axis_field(surface, degree, recipe.axis)
-    if recipe.kind == "curvature":
-        end = 0.4 if recipe.reach else 1.0
-        field = yield from part(finding_curvature(surface, degree), 0.0, end)
-        if not recipe.reach:
+    if settings.kind == "smoothest":
+        return (yield from smoothest_task(surface, degree))
+    if settings.kind == "axis":
+        return axis_field(surface, degree, settings.axis)
+    if settings.kind == "curvature":
+        split = 0.4 if settings.smoothing_length else 1.0
+        field = yield from subtask(curvature_task(surface, degree), 0.0, split)
+        if not settings.smoothing_length:
             return field
-        weight = (field.magnitude / (recipe.reach * surface.size)) ** 2
-        following = _following(surface, degree, unit(field.vectors), weight)
-        return (yield from part(following, end, 1.0))
-    if recipe.kind == "features":
-        return (yield from _following_features(surface, recipe, degree))
-    if recipe.kind == "guided":
-        return (yield from _following_guides(surface, recipe, degree))
-    if recipe.kind == "uv":
-        if recipe.uv is None:
+        weight = (field.magnitude / (settings.smoothing_length * surface.extent)) ** 2
+        task = _guided_or_smoothest_task(surface, degree, normalize(field.vectors), weight)
+        return (yield from subtask(task, split, 1.0))
+    if settings.kind == "features":
+        return (yield from _features_task(surface, settings, degree))
+    if settings.kind == "guided":
+        return (yield from _guides_task(surface, settings, degree))
+    if settings.kind == "uv":
+        if settings.uv is None:
             raise RosyError(f"{surface.name}: it has no UV map to follow")
-        return RosyField(degree, along_uv(surface, recipe.uv, check_degree(degree)))
-    raise RosyError(f"no generator is named '{recipe.kind}'; there are {', '.join(KINDS)}")
+        return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
+    raise RosyError(f"no generator is named '{settings.kind}'; there are {', '.join(GENERATORS)}")
 
 
-def _following_features(surface: Surface, recipe: Recipe, degree: int) -> Work[RosyField]:
+def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
+    """A field along the given edges or, without any, along border and sharp edges."""
     degree = check_degree(degree)
-    ends = recipe.edges
+    ends = settings.edges
     if ends is None:
-        ends = feature_edges(surface, recipe.sharp_angle)
+        ends = feature_edges(surface, settings.sharp_angle)
     if not len(ends):
         raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
-    guides = along_edges(surface, ends, degree)
+    guides = guides_from_edges(surface, ends, degree)
     if not guides.any():
         raise RosyError(
             f"{surface.name}: the edges of each face contradict each other in a field of degree "
             f"{degree}"
         )
-    return (yield from _following(surface, degree, guides))
+    return (yield from _guided_or_smoothest_task(surface, degree, guides))
 
 
-def _following(
+def _guided_or_smoothest_task(
     surface: Surface,
     degree: int,
     guides: np.ndarray,
     weight: np.ndarray | float | None = None,
-) -> Work[RosyField]:
-    """A guided field; pieces of the mesh without a guide have their smoothest one.
+) -> Task[RosyField]:
+    """A guided field, with the smoothest field on connected components without a guide.
 
-    Without a weight guides are met exactly.
+    Guides are followed exactly if `weight` is None.
     """
     hard = guides.any(axis=1) if weight is None else None
-    guided = finding_guided(surface, degree, guides, 0.0 if weight is None else weight, hard)
-    field = yield from part(guided, 0.0, 0.6)
-    left = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
-    if not left.any():
+    task = guided_task(surface, degree, guides, 0.0 if weight is None else weight, hard)
+    field = yield from subtask(task, 0.0, 0.6)
+    unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
+    if not unguided.any():
         return field
-    smoothest = yield from part(finding_smoothest(surface, degree), 0.6, 1.0)
-    return RosyField(degree, np.where(left[:, None], smoothest.vectors, field.vectors))
+    smoothest = yield from subtask(smoothest_task(surface, degree), 0.6, 1.0)
+    return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))
 
 
-def _following_guides(surface: Surface, recipe: Recipe, degree: int) -> Work[RosyField]:
+def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
+    """A field along the mean of all guides in the settings."""
     degree = check_degree(degree)
-    found = []
-    if recipe.edges is not None:
-        found.append(along_edges(surface, recipe.edges, degree))
-    if recipe.strokes:
-        found.append(along_strokes(surface, recipe.strokes, degree))
-    if recipe.handles:
-        place, axis, radius = (
-            np.array(part, dtype=np.float64) for part in zip(*recipe.handles, strict=True)
+    guide_sets = []
+    if settings.edges is not None:
+        guide_sets.append(guides_from_edges(surface, settings.edges, degree))
+    if settings.strokes:
+        guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
+    if settings.axis_guides:
+        position, axis, radius = (
+            np.array(part, dtype=np.float64) for part in zip(*settings.axis_guides, strict=True)
         )
-        found.append(along_handles(surface, place, axis, radius, degree))
-    if recipe.uv is not None:
-        found.append(along_uv(surface, recipe.uv, degree))
-    if recipe.vectors is not None:
-        found.append(unit(recipe.vectors))
-    if not found:
+        guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
+    if settings.uv is not None:
+        guide_sets.append(guides_from_uv(surface, settings.uv, degree))
+    if settings.vectors is not None:
+        guide_sets.append(normalize(settings.vectors))
+    if not guide_sets:
         raise RosyError(f"{surface.name}: there is nothing to follow")
-    every = np.tile(np.arange(surface.face_count), len(found))
-    guides = mean_guides(surface, every, np.concatenate(found), degree)
-    weight = (recipe.reach * surface.size) ** -2 if recipe.reach else None
-    return (yield from _following(surface, degree, guides, weight))
+    faces = np.tile(np.arange(surface.face_count), len(guide_sets))
+    guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
+    weight = (
+        (settings.smoothing_length * surface.extent) ** -2 if settings.smoothing_length else None
+    )
+    return (yield from _guided_or_smoothest_task(surface, degree, guides, weight))
 
 
 def axis_field(
     surface: Surface, degree: int, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 ) -> RosyField:
-    """One member along a direction, projected to each face.
+    """Make a field whose stored member is an axis projected to each face.
 
-    The magnitude is the length of the projection of the unit axis: 1 where the surface runs along
-    it, 0 where it stands across, which is where the field is singular.
+    The magnitude is the length of the projection of the unit axis: 1 where the surface is parallel
+    to the axis and 0 where it is perpendicular to it. There the field is undefined.
 
     Parameters
     ----------
     surface : Surface
     degree : int
     axis : 3 floats
-        Object space, of any length but 0.
+        Object space, of any nonzero length.
 
     Raises
     ------
     RosyError
-        If the axis has no direction.
+        If the axis is zero, not finite, or not a vector of 3 numbers.
     """
     direction = np.asarray(axis, dtype=np.float64).reshape(-1)
     length = np.linalg.norm(direction)
@@ -225,11 +241,20 @@ def axis_field(
     return RosyField(degree, vectors)
 
 
-def curvature_magnitude(surface: Surface, kind: str) -> np.ndarray:
-    """(F,) float64 magnitudes of one of `MAGNITUDES`.
+def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
+    """Compute magnitudes of one of the kinds in `MAGNITUDES`.
 
-    The curvature is the larger one of the two principal ones, times the largest side of the box of
-    the mesh, so that it has no unit.
+    "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
+    unit.
+
+    Returns
+    -------
+    (F,) float64 ndarray
+
+    Raises
+    ------
+    RosyError
+        If the kind is unknown.
     """
     if kind == "unit":
         return np.ones(surface.face_count)
@@ -237,35 +262,43 @@ def curvature_magnitude(surface: Surface, kind: str) -> np.ndarray:
         return curvature_field(surface, 4).magnitude
     if kind != "curvature":
         raise RosyError(f"no magnitude is named '{kind}'; there are {', '.join(MAGNITUDES)}")
-    whole = _shaded_smoothly(surface)
-    mean, deviator = _curvature_of_faces(whole, *face_frames(whole))
-    return (np.abs(mean) + np.abs(deviator)) * surface.size
+    smooth_surface = _with_smooth_normals(surface)
+    mean, deviator = _face_curvature(smooth_surface, *face_frames(smooth_surface))
+    return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
-def _shaded_smoothly(surface: Surface) -> Surface:
-    """A mesh shown flat or with sharp edges bends all the same."""
+def _with_smooth_normals(surface: Surface) -> Surface:
+    """The surface with smooth normals everywhere, without flat faces and sharp edges."""
     return build_surface(
         surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name
     )
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
-    """The field of `finding_curvature`."""
-    return drain(finding_curvature(surface, degree))
+    """Compute a curvature field; see `curvature_task`."""
+    return run_to_completion(curvature_task(surface, degree))
 
 
-def finding_curvature(surface: Surface, degree: int) -> Work[RosyField]:
-    """Members along the principal directions of curvature.
+def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
+    """Compute a field along the principal directions of curvature.
 
-    Degree 2 follows the direction in which the surface bends most toward its inside (the greater
-    signed curvature), degree 4 both principal directions. Of other even degrees one member follows
-    the former: of degree 6 it is one of three lines. A principal direction has no head, so there is
-    none of an odd degree.
+    Degree 2 follows the direction of the greater signed curvature (positive where the surface is
+    convex). Degree 4 follows both principal directions. In fields of other even degrees, one member
+    follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
+    possible.
 
-    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``: 0 at umbilics
-    and in planes, where there is no principal direction, 1 on cylinders and saddles. k0, a
-    curvature of a fiftieth over the mean radius of the mesh, keeps rounding errors in nearly flat
-    parts from passing for directions.
+    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``. It is 0 at
+    umbilics and in planes, which have no principal directions, and about 1 on cylinders and
+    saddles. k0 is 0.02 divided by the root mean square radius of the mesh. It suppresses rounding
+    errors in nearly flat regions.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
 
     Raises
     ------
@@ -274,57 +307,68 @@ def finding_curvature(surface: Surface, degree: int) -> Work[RosyField]:
 
     References
     ----------
-    The second fundamental form of a face is fitted to the differences of its corner normals, as
-    by Rusinkiewicz, "Estimating Curvatures and Their Derivatives on Triangle Meshes", 3DPVT 2004,
-    here for polygons; representations are then averaged over the vertices.
+    The second fundamental form of a face is fitted to the differences of its corner normals, as in
+    Rusinkiewicz, "Estimating Curvatures and Their Derivatives on Triangle Meshes", 3DPVT 2004, but
+    for polygons. Representations are then averaged over the vertices.
     """
     degree = check_degree(degree)
     if degree % 2:
         raise RosyError(f"a curvature field has an even degree, not {degree}")
     label = "finding the directions of curvature"
     yield Progress(0.0, label)
-    whole = _shaded_smoothly(surface)
+    smooth_surface = _with_smooth_normals(surface)
     yield Progress(0.3, label)
-    x, y = face_frames(whole)
-    mean, deviator = _curvature_of_faces(whole, x, y)
+    x, y = face_frames(smooth_surface)
+    mean, deviator = _face_curvature(smooth_surface, x, y)
     yield Progress(0.6, label)
-    amount = np.abs(deviator)
-    centre = whole.face_centre.mean(axis=0)
-    offset = whole.face_centre - centre
+    deviator_norm = np.abs(deviator)
+    center = smooth_surface.face_center.mean(axis=0)
+    offset = smooth_surface.face_center - center
     radius = np.sqrt(np.mean(dot(offset, offset)))
     # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
-    confidence = amount / (np.maximum(np.abs(mean), amount) + 0.01 / max(radius, 1e-30))
-    phase = np.divide(deviator, amount, out=np.zeros_like(deviator), where=amount > 0)
+    confidence = deviator_norm / (
+        np.maximum(np.abs(mean), deviator_norm) + 0.01 / max(radius, 1e-30)
+    )
+    phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=deviator_norm > 0)
     z = confidence * phase ** (degree // 2)
-    turn = corner_rotations(whole.face_normal, x, whole.corner_face, whole.corner_normal)
-    weights = corner_angles(whole)
-    for number in range(SMOOTHING):
-        yield Progress(0.7 + 0.1 * number, label)
-        z = smooth_faces(whole, z, turn, degree, weights)
+    rotation = corner_rotations(
+        smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
+    )
+    weights = corner_angles(smooth_surface)
+    for index in range(CURVATURE_SMOOTHING_ROUNDS):
+        yield Progress(0.7 + 0.1 * index, label)
+        z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
-def _curvature_of_faces(
+def _face_curvature(
     surface: Surface, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean curvature (F,) float, and deviator (F,) complex, of the form fitted to each face.
+    """Fit the second fundamental form of each face.
 
-    The symmetric form [[a, b], [b, c]] should take each edge (u, v) of the face to the difference
-    (p, q) of the normals at its ends; least squares over the edges. The deviator
-    (a - c) / 2 + i b has the modulus (k1 - k2) / 2 and twice the angle of the direction of k1.
+    The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
+    of the normals at its ends, in the least squares sense.
+
+    Returns
+    -------
+    mean : (F,) float64 ndarray
+        Mean curvature (k1 + k2) / 2, in 1 / Blender unit.
+    deviator : (F,) complex128 ndarray
+        (a - c) / 2 + i b. Its modulus is (k1 - k2) / 2, its phase twice the angle of the direction
+        of k1 in the frame x, y.
     """
-    face, ahead = surface.corner_face, surface.next_corner
+    face, next_corner = surface.corner_face, surface.next_corner
     points = surface.vertices[surface.corner_vertex]
-    edge = points[ahead] - points
-    bend = surface.corner_normal[ahead] - surface.corner_normal
+    edge = points[next_corner] - points
+    normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
     u, v = dot(edge, x[face]), dot(edge, y[face])
-    p, q = dot(bend, x[face]), dot(bend, y[face])
+    p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
-    uu, uv, vv, up, mixed, vq = (sum_over_faces(each, surface.face_start) for each in products)
-    size = uu + vv
-    size[size == 0] = 1.0
-    ridge = 1e-9 * size  # faces without area get no curvature instead of no solution
-    uu, vv = uu + ridge, vv + ridge
+    uu, uv, vv, up, mixed, vq = (sum_per_face(each, surface.face_start) for each in products)
+    trace = uu + vv
+    trace[trace == 0] = 1.0
+    regularization = 1e-9 * trace  # faces without area get curvature 0 instead of a singular system
+    uu, vv = uu + regularization, vv + regularization
     # uu a + uv b = up,  uv a + (uu + vv) b + uv c = mixed,  uv b + vv c = vq
     b = uu * vv * mixed - uv * (vv * up + uu * vq)
     b /= (uu + vv) * (uu * vv - uv * uv)

@@ -1,8 +1,8 @@
-"""Fields that follow directions where these are given, and are smooth between them.
+"""Smooth fields that follow given guide vectors.
 
-The Dirichlet energy of the connection Laplacian plus a penalty for leaving the guides: Knöppel,
-Crane, Pinkall and Schröder, SIGGRAPH 2013, section 4, with a weight that may differ from face to
-face, and without one where a guide must be followed.
+The field minimizes its Dirichlet energy plus a penalty for the difference from the guides, as by
+Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013, section 4. The weight of the penalty may vary
+between faces. Hard guides are constraints instead of penalties.
 """
 
 from __future__ import annotations
@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..memory import keep_freed_memory
-from ..progress import Progress, Work, drain, part
-from .connection import connect, laplacian
-from .representation import complex_sums, face_frames, from_representation, to_representation
+from ..memory import raise_mmap_threshold
+from ..progress import Progress, Task, run_to_completion, subtask
+from .connection import build_connection, laplacian
+from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .smoothest import corner_turns, sum_on_faces
-from .sparse import Rows, cycle, from_entries, hierarchy
+from .smoothest import corner_frame_angles, node_sum_per_face
+from .sparse_multigrid import CSRMatrix, from_coo, hierarchy_task, w_cycle
 from .surface import Surface
 
-#: Residual, as a share of the right side, at which the solution counts as found.
-FOUND = 1e-9
-MOST_ROUNDS = 400
+#: Residual norm relative to that of the right-hand side at which conjugate gradients stop.
+RELATIVE_TOLERANCE = 1e-9
+MAX_ITERATIONS = 400
 
 
 def guided_field(
@@ -31,31 +31,31 @@ def guided_field(
     weight: np.ndarray | float,
     hard: np.ndarray | None = None,
 ) -> RosyField:
-    """A guided field; see `finding_guided`."""
-    return drain(finding_guided(surface, degree, guides, weight, hard))
+    """Compute a guided field; see `guided_task`."""
+    return run_to_completion(guided_task(surface, degree, guides, weight, hard))
 
 
-def finding_guided(
+def guided_task(
     surface: Surface,
     degree: int,
     guides: np.ndarray,
     weight: np.ndarray | float,
     hard: np.ndarray | None = None,
-) -> Work[RosyField]:
-    """Find the field that is smooth and near to guides.
+) -> Task[RosyField]:
+    """Compute the smooth field that follows guides.
 
     Parameters
     ----------
     surface : Surface
     degree : int
     guides : (F, 3) ndarray
-        One member each, in object space; zero where there is no guide. Their lengths count: a guide
-        of length 1/2 is a field of magnitude 1/2 to be near to.
+        One member vector for each face, in object space; zero where there is no guide. Lengths
+        matter: a guide of length 1/2 asks for a field of magnitude 1/2.
     weight : (F,) ndarray or float
-        How much each face's guide counts, in 1 / area: away from a single guide of weight w the
-        field is free again over a distance of about 1 / sqrt(w).
+        Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
+        falls off over a distance of about 1 / sqrt(w).
     hard : (F,) bool ndarray, optional
-        Where the guide is followed exactly.
+        Faces on which the guide is followed exactly.
 
     Yields
     ------
@@ -64,97 +64,122 @@ def finding_guided(
     Returns
     -------
     RosyField
-        Of magnitude 1 but where nothing is known: on pieces of the mesh without a guide, and on
-        faces without area, it is 0.
+        Of magnitude 1; zero on connected components without a guide and on faces without area.
 
     Raises
     ------
     RosyError
-        If there is no guide on any face with an area.
+        If no face with an area has a guide, or the degree is out of range.
     """
     degree = check_degree(degree)
-    keep_freed_memory()
+    raise_mmap_threshold()
     yield Progress(0.0, "connecting the vertices")
     x, y = face_frames(surface)
-    wish = to_representation(np.asarray(guides, dtype=np.float64), x, y, degree)
-    hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (wish != 0)
-    if not wish.any():
+    target = to_representation(np.asarray(guides, dtype=np.float64), x, y, degree)
+    hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
+    if not target.any():
         raise RosyError(f"{surface.name}: there is no guide on any face with an area")
-    weight = np.where(wish != 0, np.broadcast_to(weight, wish.shape), 0.0)
-    connection = connect(surface)
+    weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
+    connection = build_connection(surface)
     yield Progress(0.04, "carrying the guides to the vertices")
-    turn = corner_turns(surface, connection, x, y)
-    toward_node = np.exp(-1j * degree * turn)
-    owner = np.repeat(surface.triangle_face, 3)
-    share = np.repeat(connection.area / 3, 3)
-    node, count = connection.node, connection.count
-    pull = np.bincount(node, share * weight[owner], count)
-    right = complex_sums(node, share * (weight * wish)[owner] * toward_node, count)
-    # Nodes between faces that must be followed take the mean, and none where these contradict.
-    given = complex_sums(node, share * (hard * wish)[owner] * toward_node, count)
-    most = np.bincount(node, share * (hard * np.abs(wish))[owner], count)
-    firm = np.abs(given) > 1e-6 * most
-    given[~firm] = 0
-    given[firm] /= np.abs(given[firm])
+    frame_angle = corner_frame_angles(surface, connection, x, y)
+    to_node = np.exp(-1j * degree * frame_angle)
+    corner_face = np.repeat(surface.triangle_face, 3)
+    corner_area = np.repeat(connection.area / 3, 3)
+    node, count = connection.corner_node, connection.node_count
+    penalty = np.bincount(node, corner_area * weight[corner_face], count)
+    rhs = complex_bincount(node, corner_area * (weight * target)[corner_face] * to_node, count)
+    # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
+    fixed_z = complex_bincount(node, corner_area * (hard * target)[corner_face] * to_node, count)
+    max_modulus = np.bincount(node, corner_area * (hard * np.abs(target))[corner_face], count)
+    fixed = np.abs(fixed_z) > 1e-6 * max_modulus
+    fixed_z[~fixed] = 0
+    fixed_z[fixed] /= np.abs(fixed_z[fixed])
     yield Progress(0.06, "connecting the vertices")
-    z = given.copy()
-    free = np.flatnonzero(~firm)
+    z = fixed_z.copy()
+    free = np.flatnonzero(~fixed)
     if len(free):
         matrix = laplacian(connection, degree)
         yield Progress(0.08, "connecting the vertices")
-        matrix, moved = _reduced(matrix, pull, firm, given)
-        solving = solve(matrix, (right - moved)[free])
-        z[free] = yield from part(solving, 0.1, 0.95)
+        matrix, fixed_terms = _eliminate_fixed(matrix, penalty, fixed, fixed_z)
+        solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free])
+        z[free] = yield from subtask(solver, 0.1, 0.95)
     yield Progress(0.95, "carrying the field to the faces")
-    found = sum_on_faces(surface, connection, z, turn, degree)
-    size = np.abs(found)
-    known = size > 1e-9 * max(float(size.max()), 1e-300)
-    found = np.divide(found, size, out=np.zeros_like(found), where=known)
-    found[hard] = wish[hard] / np.abs(wish[hard])
-    return RosyField(degree, from_representation(found, x, y, degree))
+    face_z = node_sum_per_face(surface, connection, z, frame_angle, degree)
+    modulus = np.abs(face_z)
+    defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
+    face_z = np.divide(face_z, modulus, out=np.zeros_like(face_z), where=defined)
+    face_z[hard] = target[hard] / np.abs(target[hard])
+    return RosyField(degree, from_representation(face_z, x, y, degree))
 
 
-def _reduced(
-    matrix: Rows, pull: np.ndarray, firm: np.ndarray, given: np.ndarray
-) -> tuple[Rows, np.ndarray]:
-    """The matrix of the nodes that are free, and (n,) what the others add on the left side."""
-    moved = matrix @ given
-    row, column = matrix.row, matrix.column
-    inner = ~firm[row] & ~firm[column]
-    number = np.cumsum(~firm) - 1
-    row, column, value = number[row[inner]], number[column[inner]], matrix.value[inner]
-    own = pull[~firm] + 1e-12 * matrix.diagonal[~firm]
-    every = np.arange(len(own))
-    return from_entries(
-        np.concatenate([row, every]),
-        np.concatenate([column, every]),
-        np.concatenate([value, own]),
-        len(own),
-        len(own),
-    ), moved
+def _eliminate_fixed(
+    matrix: CSRMatrix, penalty: np.ndarray, fixed: np.ndarray, fixed_z: np.ndarray
+) -> tuple[CSRMatrix, np.ndarray]:
+    """Eliminate the fixed nodes from the linear system.
+
+    Returns
+    -------
+    matrix : CSRMatrix
+        The system matrix of the free nodes, with the penalty on its diagonal.
+    fixed_terms : (n,) complex128 ndarray
+        The product of the full matrix and `fixed_z`, to subtract from the right-hand side.
+    """
+    fixed_terms = matrix @ fixed_z
+    row, column = matrix.row_indices, matrix.indices
+    is_free = ~fixed[row] & ~fixed[column]
+    free_index = np.cumsum(~fixed) - 1
+    row, column, value = free_index[row[is_free]], free_index[column[is_free]], matrix.data[is_free]
+    diagonal = penalty[~fixed] + 1e-12 * matrix.diagonal[~fixed]
+    diagonal_index = np.arange(len(diagonal))
+    return from_coo(
+        np.concatenate([row, diagonal_index]),
+        np.concatenate([column, diagonal_index]),
+        np.concatenate([value, diagonal]),
+        len(diagonal),
+        len(diagonal),
+    ), fixed_terms
 
 
-def solve(matrix: Rows, right: np.ndarray) -> Work[np.ndarray]:
-    """Conjugate gradients, preconditioned by cycles of multigrid."""
-    levels = yield from part(hierarchy(matrix), 0.0, 0.5)
-    found, rest = np.zeros_like(right), right.copy()
-    goal = FOUND * np.sqrt(_inner(right, right))
-    way, before = None, 1.0
-    for number in range(MOST_ROUNDS):
-        yield Progress(0.5 + 0.5 * (1 - 0.9**number), "smoothing between the guides")
-        if np.sqrt(_inner(rest, rest)) <= goal:
+def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarray]:
+    """Solve ``matrix @ solution = rhs`` by conjugate gradients, preconditioned with W-cycles.
+
+    Parameters
+    ----------
+    matrix : CSRMatrix
+        (n, n), Hermitian and positive definite.
+    rhs : (n,) complex ndarray
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (n,) complex ndarray
+        The last iterate, after at most `MAX_ITERATIONS`.
+    """
+    levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
+    solution, residual = np.zeros_like(rhs), rhs.copy()
+    tolerance = RELATIVE_TOLERANCE * np.sqrt(_real_inner_product(rhs, rhs))
+    direction, previous = None, 1.0
+    for iteration in range(MAX_ITERATIONS):
+        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), "smoothing between the guides")
+        if np.sqrt(_real_inner_product(residual, residual)) <= tolerance:
             break
-        better = cycle(levels, rest)
-        now = _inner(rest, better)
-        way = better if way is None else better + now / before * way
-        image = matrix @ way
-        length = now / _inner(way, image)
-        found += length * way
-        rest -= length * image
-        before = now
-    return found
+        preconditioned = w_cycle(levels, residual)
+        current = _real_inner_product(residual, preconditioned)
+        direction = (
+            preconditioned if direction is None else preconditioned + current / previous * direction
+        )
+        image = matrix @ direction
+        step = current / _real_inner_product(direction, image)
+        solution += step * direction
+        residual -= step * image
+        previous = current
+    return solution
 
 
-def _inner(a: np.ndarray, b: np.ndarray) -> float:
-    """The real part of a* b."""
+def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
+    """The real part of the inner product a* b."""
     return float(np.sum(a.real * b.real) + np.sum(a.imag * b.imag))

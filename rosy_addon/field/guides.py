@@ -1,7 +1,6 @@
-"""Directions to follow, from what is at hand.
+"""Guide vectors on faces: from mesh edges, strokes, UV maps and axes.
 
-The borders and sharp edges of a mesh or any edges of it, strokes drawn on it, its UV maps, and
-axes set up beside it.
+A guide is a member vector that a generated field should follow; it is zero on faces without one.
 """
 
 from __future__ import annotations
@@ -11,27 +10,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import RosyError
-from .frames import dot, unit
-from .nearest import nearest_triangles
-from .representation import complex_sums, face_frames, from_representation, to_representation
-from .surface import Surface, mean_over_faces, sum_over_faces, surface_edges
+from .closest_point import closest_triangles
+from .frames import dot, normalize
+from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .surface import Surface, build_edges, mean_per_face, sum_per_face
 
-#: Points of strokes that are farther from the surface, as a share of its size, do not count.
-AWAY = 0.05
+#: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
+#: away are ignored.
+MAX_STROKE_DISTANCE = 0.05
 
 
-def along_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
-    """Guides on the faces that have some edges, along these.
+def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
+    """Make guides along edges, on the faces that have these edges.
 
     Parameters
     ----------
     surface : Surface
     ends : (E, 2) int ndarray
-        Pairs of vertices, in any order; those that are no edge of the mesh do not count.
+        Pairs of vertices, in any order. Pairs that are not an edge of the mesh are ignored.
     degree : int
-        Of the field: where a face has several of the edges, it gets the mean of their RoSys, which
-        is zero if they contradict each other. Of odd degrees, edges point the way that the face
-        goes around them.
+        N of the field. A face with several of the edges gets the mean of their RoSys, which is zero
+        if they cancel. For odd degrees, the direction of an edge is that in which the face runs
+        along it.
 
     Returns
     -------
@@ -40,49 +40,54 @@ def along_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
     """
     tail = surface.corner_vertex.astype(np.int64)
     head = tail[surface.next_corner]
-    span = len(surface.vertices)
+    stride = len(surface.vertices)
     ends = np.sort(np.asarray(ends, dtype=np.int64).reshape(-1, 2), axis=1)
-    key = np.minimum(tail, head) * span + np.maximum(tail, head)
-    corner = np.flatnonzero(np.isin(key, ends[:, 0] * span + ends[:, 1]))
+    key = np.minimum(tail, head) * stride + np.maximum(tail, head)
+    corner = np.flatnonzero(np.isin(key, ends[:, 0] * stride + ends[:, 1]))
     face = surface.corner_face[corner]
-    edge = unit(surface.vertices[head[corner]] - surface.vertices[tail[corner]])
-    # In the plane of a face that is not flat an edge is shorter, but counts no less.
+    edge = normalize(surface.vertices[head[corner]] - surface.vertices[tail[corner]])
+    # On a face that is not planar, an edge is projected to the face plane and made unit again.
     edge -= dot(edge, surface.face_normal[face])[:, None] * surface.face_normal[face]
-    return mean_guides(surface, face, unit(edge), degree)
+    return average_guides(surface, face, normalize(edge), degree)
 
 
 def feature_edges(surface: Surface, angle: float) -> np.ndarray:
-    """(E, 2) int32: the ends of edges on the border, and of those where the surface bends sharply.
+    """Find the border edges and the sharp edges of a surface.
 
     Parameters
     ----------
     surface : Surface
     angle : float
-        Radians between the normals of two faces that meet at a sharp edge, at least.
+        Smallest angle in radians between the normals of the two faces at a sharp edge.
+
+    Returns
+    -------
+    (E, 2) int32 ndarray
+        Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    edges = surface_edges(surface.corner_vertex, surface.face_start)
-    chosen = np.ones(len(edges.ends), dtype=bool)
-    chosen[edges.inner] = False
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    is_feature = np.ones(len(edges.ends), dtype=bool)
+    is_feature[edges.interior] = False
     normal = surface.face_normal
-    one, other = (normal[surface.corner_face[side]] for side in edges.sides.T)
-    # Faces without area have no normal, and no angle with others.
-    bend = np.arccos(np.clip(dot(one, other), -1, 1))
-    sharp = (bend >= angle) & one.any(axis=1) & other.any(axis=1)
-    chosen[edges.inner[sharp]] = True
-    return edges.ends[chosen]
+    normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
+    # Faces without area have no normal, so their edges have no angle.
+    dihedral = np.arccos(np.clip(dot(normal_a, normal_b), -1, 1))
+    sharp = (dihedral >= angle) & normal_a.any(axis=1) & normal_b.any(axis=1)
+    is_feature[edges.interior[sharp]] = True
+    return edges.ends[is_feature]
 
 
-def along_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree: int) -> np.ndarray:
-    """Guides on the faces that strokes drawn on the surface pass, along these.
+def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree: int) -> np.ndarray:
+    """Make guides along strokes, on the faces that they cross.
 
     Parameters
     ----------
     surface : Surface
     strokes : sequence of (n, 3) float ndarray
-        Points in object space, in the order in which they were drawn. Trembling finer than the
-        mesh's edges is smoothed away.
+        Points in object space, in drawing order. Strokes are resampled at half the mean edge
+        length, which smooths finer jitter.
     degree : int
-        Of the field: where strokes cross, a face gets the mean of their RoSys.
+        N of the field. A face gets the mean RoSy of all stroke samples on it.
 
     Returns
     -------
@@ -92,120 +97,154 @@ def along_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree: int) 
     Raises
     ------
     RosyError
-        If no stroke comes near the surface.
+        If no stroke is within `MAX_STROKE_DISTANCE` of the surface.
     """
     corners = surface.vertices[surface.corner_vertex]
     edge = corners[surface.next_corner] - corners
     spacing = 0.5 * float(np.sqrt(dot(edge, edge)).mean())
-    points, ways = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    points, directions = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for stroke in strokes:
-        place, way = _evenly(np.asarray(stroke, dtype=np.float64).reshape(-1, 3), spacing)
-        points.append(place)
-        ways.append(way)
-    point, way = np.concatenate(points), np.concatenate(ways)
-    if len(point):
-        triangle, distance = nearest_triangles(surface, point)
-        near = distance <= AWAY * surface.size
-        face, way = surface.triangle_face[triangle[near]], way[near]
-    if not len(point) or not len(face):
+        positions, direction = _resample(
+            np.asarray(stroke, dtype=np.float64).reshape(-1, 3), spacing
+        )
+        points.append(positions)
+        directions.append(direction)
+    sample, direction = np.concatenate(points), np.concatenate(directions)
+    if len(sample):
+        triangle, distance = closest_triangles(surface, sample)
+        is_close = distance <= MAX_STROKE_DISTANCE * surface.extent
+        face, direction = surface.triangle_face[triangle[is_close]], direction[is_close]
+    if not len(sample) or not len(face):
         raise RosyError(f"{surface.name}: no stroke comes near it")
-    return mean_guides(surface, face, way, degree)
+    return average_guides(surface, face, direction, degree)
 
 
-def along_handles(
-    surface: Surface, place: np.ndarray, axis: np.ndarray, radius: np.ndarray, degree: int
+def guides_from_axes(
+    surface: Surface, position: np.ndarray, axis: np.ndarray, radius: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Guides around some points, along an axis each, projected to the surface.
+    """Make guides around points, along one axis for each point, projected to the surface.
 
     Parameters
     ----------
     surface : Surface
-    place, axis : (K, 3) float ndarray
+    position, axis : (K, 3) float ndarray
         Object space.
     radius : (K,) float ndarray
-        How far from its point each one guides; the nearest face it always does.
+        Faces whose center is within this distance of the point get a guide, in Blender units. If
+        there are none, the face closest to the point gets it.
     degree : int
+        N of the field.
 
     Returns
     -------
     (F, 3) float64 ndarray
         Unit, or zero.
     """
-    face, way = [], []
-    nearest = surface.triangle_face[nearest_triangles(surface, place)[0]]
-    for point, along, reach, first in zip(place, axis, radius, nearest, strict=True):
-        off = surface.face_centre - point
-        within = np.flatnonzero(dot(off, off) <= reach**2)
-        within = within if len(within) else np.array([first])
-        face.append(within)
-        way.append(np.tile(along, (len(within), 1)))
-    return mean_guides(surface, np.concatenate(face), np.concatenate(way), degree)
+    face, directions = [], []
+    closest_face = surface.triangle_face[closest_triangles(surface, position)[0]]
+    for point, direction, max_distance, closest in zip(
+        position, axis, radius, closest_face, strict=True
+    ):
+        offset = surface.face_center - point
+        chosen = np.flatnonzero(dot(offset, offset) <= max_distance**2)
+        chosen = chosen if len(chosen) else np.array([closest])
+        face.append(chosen)
+        directions.append(np.tile(direction, (len(chosen), 1)))
+    return average_guides(surface, np.concatenate(face), np.concatenate(directions), degree)
 
 
-def along_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
-    """Guides along the axes of a UV map, the way in which u grows.
+def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
+    """Make guides along the axes of a UV map, in the direction of increasing u.
 
     Parameters
     ----------
     surface : Surface
     uv : (C, 2) float ndarray
-        Of each corner.
+        Texture coordinates of each corner.
     degree : int
-        A multiple of 4 follows both axes alike: the rotation nearest to the map. Others follow u.
+        N of the field. Multiples of 4 follow both axes equally (the rotation closest to the map);
+        other degrees follow u.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit; zero on faces whose map has no area.
+        Unit; zero on faces without area in the map.
     """
     x, y = face_frames(surface)
     face = surface.corner_face
-    offset = surface.vertices[surface.corner_vertex] - surface.face_centre[face]
-    place = dot(offset, x[face]) + 1j * dot(offset, y[face])
-    middle = mean_over_faces(np.asarray(uv, dtype=np.float64), surface.face_start)
-    u, v = (np.asarray(uv, dtype=np.float64) - middle[face]).T
-    # The linear map from (u, v) to the face that fits its corners best: least squares.
-    uu, uv_, vv = (sum_over_faces(product, surface.face_start) for product in (u * u, u * v, v * v))
-    up, vp = (sum_over_faces(part * place, surface.face_start) for part in (u, v))
-    area = uu * vv - uv_**2
-    flat = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
-    along_u, along_v = vv * up - uv_ * vp, uu * vp - uv_ * up
+    offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
+    position = dot(offset, x[face]) + 1j * dot(offset, y[face])
+    mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
+    u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
+    # Least squares fit of the linear map from (u, v) to the face plane.
+    uu, uv_sum, vv = (
+        sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
+    )
+    up, vp = (sum_per_face(part * position, surface.face_start) for part in (u, v))
+    area = uu * vv - uv_sum**2
+    degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
+    along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
     if degree % 4 == 0:
-        # Of a mirrored map the other axis is turned over.
+        # In a mirrored map, the v axis is reversed.
         mirrored = (np.conj(along_u) * along_v).imag < 0
         size = np.maximum(np.abs(along_u), 1e-300), np.maximum(np.abs(along_v), 1e-300)
         along_u = along_u / size[0] - 1j * np.where(mirrored, -1, 1) * along_v / size[1]
     size = np.abs(along_u)
-    along_u = np.where(flat | (size == 0), 0, along_u / np.where(size > 0, size, 1))
+    along_u = np.where(degenerate | (size == 0), 0, along_u / np.where(size > 0, size, 1))
     return along_u.real[:, None] * x + along_u.imag[:, None] * y
 
 
-def mean_guides(surface: Surface, face: np.ndarray, vectors: np.ndarray, degree: int) -> np.ndarray:
-    """(F, 3) unit members of the mean RoSy of (n, 3) vectors on (n,) faces; zero where none is.
+def average_guides(
+    surface: Surface, face: np.ndarray, vectors: np.ndarray, degree: int
+) -> np.ndarray:
+    """Average vectors on each face as RoSys.
 
-    Vectors are projected to their face, and count by what is left of their length.
+    Vectors are projected to the plane of their face and weighted by their projected length.
+
+    Parameters
+    ----------
+    surface : Surface
+    face : (n,) int ndarray
+        Face of each vector.
+    vectors : (n, 3) float ndarray
+        Member vectors in object space.
+    degree : int
+        N of the field.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
+        Unit members of the mean RoSys; zero on faces without vectors, or where they cancel.
     """
     x, y = face_frames(surface)
     z = to_representation(vectors, x[face], y[face], degree)
-    total = complex_sums(face, z, surface.face_count)
-    most = np.bincount(face, np.abs(z), surface.face_count)
-    known = np.abs(total) > 1e-6 * np.where(most > 0, most, np.inf)
-    total = np.divide(total, np.abs(total), out=np.zeros_like(total), where=known)
+    total = complex_bincount(face, z, surface.face_count)
+    magnitude_sum = np.bincount(face, np.abs(z), surface.face_count)
+    defined = np.abs(total) > 1e-6 * np.where(magnitude_sum > 0, magnitude_sum, np.inf)
+    total = np.divide(total, np.abs(total), out=np.zeros_like(total), where=defined)
     return from_representation(total, x, y, degree)
 
 
-def _evenly(stroke: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places along a stroke, so far apart, and its unit direction around each."""
-    step = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
-    stroke = stroke[np.concatenate([[True], step > 0])] if len(stroke) else stroke
-    step = step[step > 0]
-    if not len(step):
+def _resample(stroke: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """Resample a polyline at about equal distances along it.
+
+    Returns
+    -------
+    points : (n, 3) float64 ndarray
+        About `spacing` apart along the polyline.
+    directions : (n, 3) float64 ndarray
+        Unit directions of the polyline at these points, by central differences.
+    """
+    segment_length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
+    stroke = stroke[np.concatenate([[True], segment_length > 0])] if len(stroke) else stroke
+    segment_length = segment_length[segment_length > 0]
+    if not len(segment_length):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    length = np.concatenate([[0], np.cumsum(step)])
-    count = max(int(length[-1] / spacing), 1)
-    middle = (np.arange(count) + 0.5) * (length[-1] / count)
+    arc_length = np.concatenate([[0], np.cumsum(segment_length)])
+    count = max(int(arc_length[-1] / spacing), 1)
+    midpoint = (np.arange(count) + 0.5) * (arc_length[-1] / count)
 
     def at(distance: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(distance, length, column) for column in stroke.T], axis=1)
+        return np.stack([np.interp(distance, arc_length, column) for column in stroke.T], axis=1)
 
-    return at(middle), unit(at(middle + spacing) - at(middle - spacing))
+    return at(midpoint), normalize(at(midpoint + spacing) - at(midpoint - spacing))

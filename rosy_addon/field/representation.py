@@ -1,59 +1,65 @@
 """The representation of an N-RoSy: the complex number z = rho exp(i N t).
 
-All N members share it, and averages of it are averages of RoSys (Palacios and Zhang 2007), which
-averages of members are not. Every average, interpolation and comparison goes through z.
+rho is the length of the members and t the angle of any one of them from the x axis of a frame. All
+N members give the same z, so the mean of representations is a mean of RoSys (Palacios and Zhang
+2007); the mean of member vectors is not. All averages, interpolations and comparisons use z.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from .frames import dot, unit
+from .frames import dot, normalize
 from .rosy_field import RosyField
 from .surface import Surface, face_blocks, next_corners
 
 
-def power(numbers: np.ndarray, degree: int) -> np.ndarray:
-    """`numbers` ** `degree` by repeated squaring: exact in the phase, and quick for arrays."""
+def power(base: np.ndarray, degree: int) -> np.ndarray:
+    """`base` ** `degree` by repeated squaring, which is fast for arrays; `degree` is at least 1."""
     result = None
     while True:
         if degree & 1:
-            result = numbers if result is None else result * numbers
+            result = base if result is None else result * base
         degree >>= 1
         if not degree:
             return result
-        numbers = numbers * numbers
+        base = base * base
 
 
-def signed_power(numbers: np.ndarray, order: int) -> np.ndarray | int:
-    """`numbers`, of modulus 1 or 0, to a whole power; to a negative one by their conjugates."""
-    if order == 0:
+def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
+    """`base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
+
+    Negative powers are conjugates of the positive ones, so those of 0 are 0.
+    """
+    if exponent == 0:
         return 1
-    found = power(numbers, abs(order))
-    return found if order > 0 else found.conj()
+    result = power(base, abs(exponent))
+    return result if exponent > 0 else result.conj()
 
 
-def complex_sums(group: np.ndarray, numbers: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex sums of the numbers of each group: `bincount`, of complex weights."""
-    real = np.bincount(group, numbers.real, count)
-    return real + 1j * np.bincount(group, numbers.imag, count)
+def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
+    """(count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
+    real = np.bincount(index, weights.real, count)
+    return real + 1j * np.bincount(index, weights.imag, count)
 
 
 def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
-    """z of member vectors in the frames x, y.
+    """Convert member vectors to representations z in the frames x, y.
 
     Parameters
     ----------
     vectors : (..., 3) ndarray
-        A member each.
+        One member of each RoSy.
     x, y : (..., 3) ndarray
-        Orthonormal tangents, counter-clockwise about the normal.
+        Orthonormal tangents; y is a quarter turn counter-clockwise from x about the normal.
     degree : int
+        N.
 
     Returns
     -------
     (...) complex ndarray
-        rho exp(i N t): the member's length, and N times its angle from x. Zero for a zero vector.
+        rho exp(i N t), where rho is the length of the member and t its angle from x. Zero for a
+        zero vector.
     """
     member = dot(vectors, x) + 1j * dot(vectors, y)
     rho = np.abs(member)
@@ -62,38 +68,45 @@ def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree:
 
 
 def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
-    """The member vector nearest to x that has the representation z; the inverse of the above.
+    """Convert representations z in the frames x, y to member vectors.
+
+    This is the inverse of `to_representation`, except that it returns the member nearest to x.
 
     Returns
     -------
     (..., 3) ndarray
+        Members at angles from -pi / N to pi / N from x.
     """
     rho, angle = np.abs(z)[..., None], (np.angle(z) / degree)[..., None]
     return rho * (np.cos(angle) * x + np.sin(angle) * y)
 
 
 def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """(F, 3) unit tangents of each face: x along its first edge that has a length, y = normal x x.
+    """The tangent frame x, y of each face.
 
-    For faces without area both are zero, so that a field's representation is zero there too.
+    Returns
+    -------
+    x, y : (F, 3) ndarray
+        Unit tangents. x runs along the first edge of nonzero length, y is the cross product of the
+        normal and x. Both are zero for faces without area, so that representations are zero there.
     """
     normal = surface.face_normal
     x = np.empty_like(normal)
     for faces, corners, starts in face_blocks(surface.face_start):
         points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
-        across = np.repeat(normal[faces], np.diff(starts), axis=0)
+        corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
         edge = points[next_corners(starts)] - points
-        edge -= dot(edge, across)[:, None] * across
+        edge -= dot(edge, corner_normal)[:, None] * corner_normal
         length = np.sqrt(dot(edge, edge))
-        last = np.repeat(starts[1:] - 1, np.diff(starts))
-        usable = np.where(length > 0, np.arange(len(length)), last)
-        x[faces] = unit(edge[np.minimum.reduceat(usable, starts[:-1])])
+        last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
+        candidate = np.where(length > 0, np.arange(len(length)), last_corner)
+        x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
     x[~normal.any(axis=1)] = 0.0
     return x, np.cross(normal, x)
 
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
-    """(F,) complex128: z of a field in `face_frames`."""
+    """(F,) complex128 representations z of a field in `face_frames`."""
     x, y = face_frames(surface)
     return to_representation(field.vectors, x, y, field.degree)
 
@@ -107,12 +120,34 @@ def matching_angles(
     a: np.ndarray,
     b: np.ndarray,
 ) -> np.ndarray:
-    """(I,) radians from a member on side a to the nearest on side b, the two faces unfolded."""
-    from_face, to_face = surface.corner_face[a], surface.corner_face[b]
+    """The angle between matching members of the two faces at each interior edge.
+
+    The faces are unfolded into one plane. A member of the first face matches the nearest member of
+    the second face.
+
+    Parameters
+    ----------
+    surface : Surface
+    x, y : (F, 3) ndarray
+        Frames of the faces.
+    z : (F,) complex ndarray
+        Representations in these frames.
+    degree : int
+        N of the representations.
+    a, b : (I,) int ndarray
+        The columns of `Edges.halfedges`: the corners of both faces where the edge starts.
+
+    Returns
+    -------
+    (I,) float64 ndarray
+        Counter-clockwise angle in radians from a member on side a to the nearest on side b, from
+        -pi / N to pi / N.
+    """
+    source_face, target_face = surface.corner_face[a], surface.corner_face[b]
     edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
-    here = dot(edge, x[from_face]) + 1j * dot(edge, y[from_face])
-    there = dot(edge, x[to_face]) + 1j * dot(edge, y[to_face])
-    unfold = there * here.conj()
-    size = np.abs(unfold)
-    unfold = np.divide(unfold, size, out=np.ones_like(unfold), where=size > 0)
-    return np.angle(z[to_face] * (z[from_face] * power(unfold, degree)).conj()) / degree
+    edge_in_source = dot(edge, x[source_face]) + 1j * dot(edge, y[source_face])
+    edge_in_target = dot(edge, x[target_face]) + 1j * dot(edge, y[target_face])
+    unfolding = edge_in_target * edge_in_source.conj()
+    modulus = np.abs(unfolding)
+    unfolding = np.divide(unfolding, modulus, out=np.ones_like(unfolding), where=modulus > 0)
+    return np.angle(z[target_face] * (z[source_face] * power(unfolding, degree)).conj()) / degree

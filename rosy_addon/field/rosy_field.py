@@ -1,6 +1,7 @@
-"""What an N-RoSy field is: one member vector a face, and its degree.
+"""The N-RoSy field of a surface: its degree and one member vector for each face.
 
-And what a field of N directions is that are free: a RoSy and by how much they deviate from it.
+A field of N directions that are not rotationally symmetric is stored as a RoSy field and the ratios
+of its directions to the members.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ import numpy as np
 
 from ..errors import RosyError
 
-#: Degrees that can be drawn. Past 6 or so directions get hard to tell apart (the paper's Figure 10).
+#: Largest degree N that is supported. The directions of a field are hard to distinguish above about
+#: 6 (Figure 10 of the paper).
 MAX_DEGREE = 12
 
 
 def check_degree(degree: int) -> int:
-    """Return `degree` as an int.
+    """Return `degree` as an int, after checking its range.
 
     Raises
     ------
@@ -32,36 +34,36 @@ def check_degree(degree: int) -> int:
 class RosyField:
     """An N-RoSy field on the faces of a surface.
 
-    The N member vectors of a face are the rotations of the stored one by 2 pi k / N about the
-    face normal, so which of them is stored makes no difference.
+    The N member vectors of a face are the rotations of the stored one by 2 pi k / N about the face
+    normal. For a RoSy it makes no difference which member is stored.
 
     Attributes
     ----------
     degree : int
         N, from 1 to `MAX_DEGREE`.
     vectors : (F, 3) float64 ndarray
-        One member vector a face, in the space of the surface (object space). Its length is the
-        magnitude rho; a zero vector says that the field is undefined on that face.
-    deviations : (F, N) complex128 ndarray or None
-        Of directions that are not a RoSy: direction k is member k, counter-clockwise from the
-        stored one, turned by the phase and as many times as long as the modulus. None of a RoSy.
-    families : int
-        How many lines are told apart by the stored member: 1 if it could be any of them, or as many
-        as there are, as of a tensor's 2, the major and the minor.
-    given : (F, N, 3) float64 ndarray or None
-        The directions as they came, in their order, if the field was made of such: for those who
-        write them again.
+        One member vector for each face, in object space. Its length is the magnitude rho. The field
+        is undefined on faces with a zero vector.
+    direction_ratios : (F, N) complex128 ndarray or None
+        None for a RoSy. Otherwise direction k is member k (counted counter-clockwise from the
+        stored one) rotated by the phase of ratio k and scaled by its modulus.
+    family_count : int
+        Number of line families that the stored member distinguishes: 1 if it may be on any line,
+        otherwise the number of lines. A tensor field has 2: the major and the minor directions.
+    source_directions : (F, N, 3) float64 ndarray or None
+        The unmodified input directions in their original order, if the field was made from
+        directions. Writers use them to reproduce the input.
 
     See Also
     --------
-    rosy_addon.field.directions : Where fields of free directions are made.
+    rosy_addon.field.directional_field : Make fields from N directions.
     """
 
     degree: int
     vectors: np.ndarray
-    deviations: np.ndarray | None = None
-    families: int = 1
-    given: np.ndarray | None = None
+    direction_ratios: np.ndarray | None = None
+    family_count: int = 1
+    source_directions: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "degree", check_degree(self.degree))
@@ -69,12 +71,12 @@ class RosyField:
         if vectors.ndim != 2 or vectors.shape[1] != 3:
             raise RosyError(f"a field holds one vector a face, (F, 3), not {vectors.shape}")
         object.__setattr__(self, "vectors", vectors)
-        if self.deviations is None:
+        if self.direction_ratios is None:
             return
-        deviations = np.ascontiguousarray(self.deviations, dtype=np.complex128)
-        if deviations.shape != (len(vectors), self.degree):
-            raise RosyError(f"deviations are (F, N) numbers, not {deviations.shape}")
-        object.__setattr__(self, "deviations", deviations)
+        direction_ratios = np.ascontiguousarray(self.direction_ratios, dtype=np.complex128)
+        if direction_ratios.shape != (len(vectors), self.degree):
+            raise RosyError(f"deviations are (F, N) numbers, not {direction_ratios.shape}")
+        object.__setattr__(self, "direction_ratios", direction_ratios)
 
     @property
     def magnitude(self) -> np.ndarray:

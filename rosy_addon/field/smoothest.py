@@ -1,7 +1,8 @@
-"""The smoothest field of degree N: Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013.
+"""The smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
 
-It is the smallest eigenvector of the connection Laplacian raised to the power N, found on vertices
-and carried to the faces. Pieces of a mesh that hang together by nothing have each their own.
+It is the eigenvector of the connection Laplacian of degree N with the smallest eigenvalue. It is
+computed at the nodes (see `field.connection`) and transported to the faces. Disconnected components
+of a mesh are solved separately.
 """
 
 from __future__ import annotations
@@ -9,43 +10,46 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..memory import keep_freed_memory
-from ..progress import Progress, Work, drain, part
-from .connection import Connection, connect, laplacian
+from ..memory import raise_mmap_threshold
+from ..progress import Progress, Task, run_to_completion, subtask
+from .connection import Connection, build_connection, laplacian
 from .frames import dot
-from .representation import complex_sums, face_frames, from_representation
+from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .sparse import Level, cycle, hierarchy
+from .sparse_multigrid import Level, hierarchy_task, w_cycle
 from .surface import Surface
 
-#: Change of the eigenvector, as a sine, at which it counts as found: its energy is, to eight digits.
-#: Of fewer nodes than `FEW` more is asked, so that the field is the same however they are numbered;
-#: of more it would take seconds to tell almost equal eigenvectors apart, and nobody would see it.
-FOUND, FINELY_FOUND, FEW = 1e-4, 1e-8, 30_000
-MOST_ROUNDS = 60
+#: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
+#: an angle). At `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
+#: `SMALL_MESH_NODES` nodes use the smaller tolerance, so that the field does not depend on the
+#: numbering of the vertices. On larger meshes, separating almost equal eigenvectors would take
+#: seconds and make no visible difference.
+TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
+MAX_ITERATIONS = 60
 
-#: Triangles that are worked on at once: bounds memory, and fits the caches.
-BLOCK = 1 << 14
+#: Triangles processed at once, to bound memory and fit in the CPU caches.
+BLOCK_TRIANGLES = 1 << 14
 
-#: Rounds on coarser levels, which save some on the finest.
-COARSE_ROUNDS = 12
+#: Largest number of iterations on each intermediate level; they reduce those on the finest level.
+COARSE_ITERATIONS = 12
 
-#: Of the matrix that multigrid inverts, in eigenvalues of a sphere of the same area.
-SHIFT = 0.02
+#: Multiple of the mass matrix that is added for multigrid, in units of 4 pi / area.
+SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """The smoothest field; see `finding_smoothest`."""
-    return drain(finding_smoothest(surface, degree))
+    """Compute the smoothest field; see `smoothest_task`."""
+    return run_to_completion(smoothest_task(surface, degree))
 
 
-def finding_smoothest(surface: Surface, degree: int) -> Work[RosyField]:
-    """Find the unit field of the least Dirichlet energy among those of one mean square.
+def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
+    """Compute the field of least Dirichlet energy among those of equal L2 norm, made unit.
 
     Parameters
     ----------
     surface : Surface
     degree : int
+        N.
 
     Yields
     ------
@@ -54,208 +58,292 @@ def finding_smoothest(surface: Surface, degree: int) -> Work[RosyField]:
     Returns
     -------
     RosyField
-        Of magnitude 1; 0 on faces without area. Turned as a whole so that it best follows the
-        edges of the mesh, as any angle would do.
+        Of magnitude 1; 0 on faces without area. The energy does not determine the rotation of the
+        whole field, so it is chosen to align the field with the edges of the mesh.
 
     Raises
     ------
     RosyError
-        If no face has an area.
+        If no face has an area, or the degree is out of range.
     """
     degree = check_degree(degree)
-    keep_freed_memory()
+    raise_mmap_threshold()
     yield Progress(0.0, "connecting the vertices")
-    connection = connect(surface)
+    connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area, so there is no room for a field")
-    z, _ = yield from part(smallest(connection, degree), 0.1, 0.95)
-    z = _along_edges(connection, z, degree)
+    z, _ = yield from subtask(smallest_eigenvectors_task(connection, degree), 0.1, 0.95)
+    z = _align_to_edges(connection, z, degree)
     yield Progress(0.95, "carrying the field to the faces")
-    return RosyField(degree, vectors_on_faces(surface, connection, z, degree))
+    return RosyField(degree, face_vectors_from_nodes(surface, connection, z, degree))
 
 
-def smallest(connection: Connection, degree: int) -> Work[tuple[np.ndarray, np.ndarray]]:
-    """The smallest eigenvectors of L z = e M z, of each connected piece.
+def smallest_eigenvectors_task(
+    connection: Connection, degree: int
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Compute the eigenvector of L z = e M z with the smallest e on each connected component.
 
     Returns
     -------
     z : (n,) complex128 ndarray
-        At the nodes; of mean square 1 over each piece.
-    energy : (pieces,) float64 ndarray
-        e.
+        At the nodes; z* M z is 1 on each component.
+    energy : (components,) float64 ndarray
+        The eigenvalues e.
     """
-    piece = connection.piece
+    component = connection.component
     mass = np.maximum(connection.mass, 1e-12 * max(float(connection.mass.mean()), 1e-300))
-    shift = SHIFT * 4 * np.pi / mass.sum()
-    levels = yield from part(hierarchy(laplacian(connection, degree, shift)), 0.1, 0.4)
-    masses, pieces = [mass], [piece]
+    shift = SPECTRAL_SHIFT * 4 * np.pi / mass.sum()
+    levels = yield from subtask(hierarchy_task(laplacian(connection, degree, shift)), 0.1, 0.4)
+    masses, components = [mass], [component]
     for level in levels[:-1]:
-        share = np.abs(level.prolongation.value)
-        column = level.prolongation.column
-        coarse = len(levels[len(masses)].matrix)
-        masses.append(np.bincount(column, masses[-1][level.prolongation.row] * share, coarse))
-        below = np.zeros(coarse, dtype=piece.dtype)
-        below[column] = pieces[-1][level.prolongation.row]
-        pieces.append(below)
+        weight = np.abs(level.prolongation.data)
+        coarse_node = level.prolongation.indices
+        coarse_count = len(levels[len(masses)].matrix)
+        masses.append(
+            np.bincount(
+                coarse_node, masses[-1][level.prolongation.row_indices] * weight, coarse_count
+            )
+        )
+        coarse_component = np.zeros(coarse_count, dtype=component.dtype)
+        coarse_component[coarse_node] = components[-1][level.prolongation.row_indices]
+        components.append(coarse_component)
     random = np.random.default_rng(0)
     count = len(masses[-1])
     z = random.standard_normal(count) + 1j * random.standard_normal(count)
-    for number in reversed(range(len(levels))):
-        last = number == 0
-        rounds = MOST_ROUNDS if last or number == len(levels) - 1 else COARSE_ROUNDS
-        descent = _descend(levels[number:], masses[number], pieces[number], z, rounds)
-        start = 0.5 - 0.1 * number / len(levels)
-        z, energy = yield from part(descent, start, start + 0.1 / len(levels) if number else 1.0)
-        if not last:
-            z = levels[number - 1].prolongation @ z
+    for index in reversed(range(len(levels))):
+        is_finest = index == 0
+        max_iterations = (
+            MAX_ITERATIONS if is_finest or index == len(levels) - 1 else COARSE_ITERATIONS
+        )
+        task = _lobpcg_task(levels[index:], masses[index], components[index], z, max_iterations)
+        start = 0.5 - 0.1 * index / len(levels)
+        z, energy = yield from subtask(task, start, start + 0.1 / len(levels) if index else 1.0)
+        if not is_finest:
+            z = levels[index - 1].prolongation @ z
     return z, energy - shift
 
 
-def _descend(
-    levels: list[Level], mass: np.ndarray, piece: np.ndarray, z: np.ndarray, rounds: int
-) -> Work[tuple[np.ndarray, np.ndarray]]:
-    """Locally optimal descent of the Rayleigh quotient of each piece (Knyazev 2001)."""
-    matrix, count = levels[0].matrix, int(piece.max()) + 1
-    goal = FOUND if len(matrix) > FEW else FINELY_FOUND
+def _lobpcg_task(
+    levels: list[Level], mass: np.ndarray, component: np.ndarray, z: np.ndarray, max_iterations: int
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Minimize the Rayleigh quotient of each component by LOBPCG (Knyazev 2001).
 
-    def products(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
-        """(pieces, k, k) a_i* b_j of each piece, a Hermitian matrix."""
-        found = np.empty((count, len(a), len(b)), dtype=np.complex128)
-        for i, one in enumerate(a):
-            one = one.conj()
+    Parameters
+    ----------
+    levels : list of Level
+        The first holds the matrix; all of them precondition it by a W-cycle.
+    mass : (n,) float64 ndarray
+    component : (n,) int32 ndarray
+        Connected component of each node.
+    z : (n,) complex128 ndarray
+        The initial vector.
+    max_iterations : int
+
+    Returns
+    -------
+    z : (n,) complex128 ndarray
+    energy : (components,) float64 ndarray
+        The Rayleigh quotients.
+    """
+    matrix, component_count = levels[0].matrix, int(component.max()) + 1
+    tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
+
+    def gram_matrices(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
+        """(components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
+        gram = np.empty((component_count, len(a), len(b)), dtype=np.complex128)
+        for i, conjugate in enumerate(a):
+            conjugate = conjugate.conj()
             for j in range(i, len(b)):
-                found[:, i, j] = _sums(piece, one * b[j], count)
-                found[:, j, i] = found[:, i, j].conj()
-        return found
+                gram[:, i, j] = _component_sums(component, conjugate * b[j], component_count)
+                gram[:, j, i] = gram[:, i, j].conj()
+        return gram
 
-    def spread(values: np.ndarray) -> np.ndarray:
-        """Of each piece, to its nodes."""
-        return values[piece] if count > 1 else values
+    def broadcast(values: np.ndarray) -> np.ndarray:
+        """Expand a value for each component to its nodes."""
+        return values[component] if component_count > 1 else values
 
-    def scaled(vector: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """In place."""
-        size = np.sqrt(_sums(piece, mass * (vector.real**2 + vector.imag**2), count).real)
-        factor = spread(1 / np.where(size > 0, size, 1))
+    def normalize_in_place(vector: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Divide a vector and its image by the mass norm of the vector, on each component."""
+        norm = np.sqrt(
+            _component_sums(
+                component, mass * (vector.real**2 + vector.imag**2), component_count
+            ).real
+        )
+        factor = broadcast(1 / np.where(norm > 0, norm, 1))
         vector *= factor
         image *= factor
         return vector, image
 
-    def mixed(vectors: list[np.ndarray], mixing: np.ndarray) -> np.ndarray:
-        total = vectors[0] * spread(mixing[:, 0])
+    def combine(vectors: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
+        """The linear combination of vectors with (components, k) coefficients."""
+        total = vectors[0] * broadcast(coefficients[:, 0])
         for number, vector in enumerate(vectors[1:], 1):
-            total += vector * spread(mixing[:, number])
+            total += vector * broadcast(coefficients[:, number])
         return total
 
-    z, image = scaled(z, matrix @ z)
-    ahead: list[tuple[np.ndarray, np.ndarray]] = []
-    energy = _sums(piece, z.conj() * image, count).real
-    for number in range(rounds):
-        # Twenty to fifty rounds are usual.
-        yield Progress(1 - 0.95**number, "finding the smoothest field")
-        rest = image - spread(energy) * (mass * z)
-        way = cycle(levels, rest)
-        way -= spread(_sums(piece, mass * (z.conj() * way), count)) * z
-        step = scaled(way, matrix @ way)
-        basis = [(z, image), step, *ahead]
+    z, image = normalize_in_place(z, matrix @ z)
+    previous_step: list[tuple[np.ndarray, np.ndarray]] = []
+    energy = _component_sums(component, z.conj() * image, component_count).real
+    for iteration in range(max_iterations):
+        # 20 to 50 iterations are usual; the progress bar is scaled for that.
+        yield Progress(1 - 0.95**iteration, "finding the smoothest field")
+        residual = image - broadcast(energy) * (mass * z)
+        direction = w_cycle(levels, residual)
+        direction -= (
+            broadcast(_component_sums(component, mass * (z.conj() * direction), component_count))
+            * z
+        )
+        search = normalize_in_place(direction, matrix @ direction)
+        basis = [(z, image), search, *previous_step]
         vectors, images = [one for one, _ in basis], [one for _, one in basis]
         weighted = [mass * one for one in vectors]
-        mixing, energy = _lowest(products(vectors, images), products(vectors, weighted))
-        own = np.stack([mixing[:, 0], np.ones(count)], axis=1)
-        z_change, i_change = mixed(vectors[1:], mixing[:, 1:]), mixed(images[1:], mixing[:, 1:])
-        change = np.sqrt(
-            _sums(piece, mass * (z_change.real**2 + z_change.imag**2), count).real.max()
+        coefficients, energy = _rayleigh_ritz(
+            gram_matrices(vectors, images), gram_matrices(vectors, weighted)
         )
-        z, image = mixed([z, z_change], own), mixed([image, i_change], own)
-        z, image = scaled(z, image)
-        ahead = [scaled(z_change, i_change)]
-        if change < goal:
+        new_coefficients = np.stack([coefficients[:, 0], np.ones(component_count)], axis=1)
+        z_change, image_change = (
+            combine(vectors[1:], coefficients[:, 1:]),
+            combine(images[1:], coefficients[:, 1:]),
+        )
+        change = np.sqrt(
+            _component_sums(
+                component, mass * (z_change.real**2 + z_change.imag**2), component_count
+            ).real.max()
+        )
+        z, image = (
+            combine([z, z_change], new_coefficients),
+            combine([image, image_change], new_coefficients),
+        )
+        z, image = normalize_in_place(z, image)
+        previous_step = [normalize_in_place(z_change, image_change)]
+        if change < tolerance:
             break
     return z, energy
 
 
-def _lowest(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(pieces, k) smallest eigenvectors and (pieces,) eigenvalues of small pencils A x = e B x.
+def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the small generalized eigenproblems A x = e B x for the smallest e.
 
-    Directions in which B is nearly singular are left out.
+    Directions in which B is nearly singular are excluded.
+
+    Parameters
+    ----------
+    a, b : (components, k, k) complex128 ndarray
+        Hermitian.
+
+    Returns
+    -------
+    coefficients : (components, k) complex128 ndarray
+        Eigenvectors x, with a real first coefficient.
+    energy : (components,) float64 ndarray
+        Eigenvalues e.
     """
-    size, basis = np.linalg.eigh(b)
-    usable = size > 1e-10 * size[:, -1:]
-    white = basis * np.where(usable, 1 / np.sqrt(np.where(usable, size, 1)), 0)[:, None, :]
-    inner = white.conj().swapaxes(1, 2) @ a @ white
-    top = np.abs(inner).max(axis=(1, 2)) * 10 + 1
-    inner += np.einsum("pk,kl->pkl", np.where(usable, 0, top[:, None]), np.eye(a.shape[1]))
-    energy, found = np.linalg.eigh(inner)
-    mixing = (white @ found[:, :, :1])[:, :, 0]
-    # A real share of the vector so far, so that convergence can be seen.
-    phase = np.where(mixing[:, 0] == 0, 1, mixing[:, 0])
-    return mixing * (np.abs(phase) / phase)[:, None], energy[:, 0]
+    eigenvalue, basis = np.linalg.eigh(b)
+    usable = eigenvalue > 1e-10 * eigenvalue[:, -1:]
+    whitening = (
+        basis * np.where(usable, 1 / np.sqrt(np.where(usable, eigenvalue, 1)), 0)[:, None, :]
+    )
+    reduced = whitening.conj().swapaxes(1, 2) @ a @ whitening
+    penalty = np.abs(reduced).max(axis=(1, 2)) * 10 + 1
+    reduced += np.einsum("pk,kl->pkl", np.where(usable, 0, penalty[:, None]), np.eye(a.shape[1]))
+    energy, eigenvectors = np.linalg.eigh(reduced)
+    coefficients = (whitening @ eigenvectors[:, :, :1])[:, :, 0]
+    # Make the coefficient of the current vector real and positive, so that the change per iteration
+    # measures convergence.
+    phase = np.where(coefficients[:, 0] == 0, 1, coefficients[:, 0])
+    return coefficients * (np.abs(phase) / phase)[:, None], energy[:, 0]
 
 
-def _sums(piece: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex sums over each piece."""
+def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """(count,) complex128 sums of (n,) values over each component."""
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
-    return complex_sums(piece, values, count)
+    return complex_bincount(component, values, count)
 
 
-def _along_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
-    """The field turned as a whole, each piece alone, so that it best follows the edges.
+def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
+    """Rotate the field of each component by one angle so that it best aligns with the edges.
 
-    An eigenvector may be turned by any angle; this one depends on nothing but the mesh.
+    Eigenvectors are unique only up to such a rotation. This choice depends on the mesh alone.
     """
-    piece = connection.piece
-    count = int(piece.max()) + 1
-    node = connection.node
-    own = np.exp(1j * degree * connection.along) * np.repeat(connection.area, 3)
-    total = _sums(piece[node], own * z[node].conj(), count)
-    size = np.abs(total)
-    turn = np.divide(total, size, out=np.ones_like(total), where=size > 0)
-    return z * turn[piece]
+    component = connection.component
+    count = int(component.max()) + 1
+    node = connection.corner_node
+    edge_z = np.exp(1j * degree * connection.edge_direction) * np.repeat(connection.area, 3)
+    total = _component_sums(component[node], edge_z * z[node].conj(), count)
+    modulus = np.abs(total)
+    rotation = np.divide(total, modulus, out=np.ones_like(total), where=modulus > 0)
+    return z * rotation[component]
 
 
-def vectors_on_faces(
+def face_vectors_from_nodes(
     surface: Surface, connection: Connection, z: np.ndarray, degree: int
 ) -> np.ndarray:
-    """(F, 3) unit members on the faces of values at the nodes."""
+    """(F, 3) unit members on the faces, from (n,) representations at the nodes.
+
+    Zero on faces where the mean is zero.
+    """
     x, y = face_frames(surface)
-    turn = corner_turns(surface, connection, x, y)
-    mean = sum_on_faces(surface, connection, z, turn, degree)
-    size = np.abs(mean)
-    mean = np.divide(mean, size, out=np.zeros_like(mean), where=size > 0)
+    frame_angle = corner_frame_angles(surface, connection, x, y)
+    mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
+    modulus = np.abs(mean)
+    mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
     return from_representation(mean, x, y, degree)
 
 
-def corner_turns(
+def corner_frame_angles(
     surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """(3 T,) radians from the map of each corner's node to the frame x, y of its face.
+    """The angles that convert directions at the nodes to the frames of the faces.
 
-    The middle of a corner is the same direction in both.
+    The bisector of a corner is the same direction in the polar map of the node and on the face.
+
+    Returns
+    -------
+    (3 T,) float64 ndarray
+        For each corner, the angle in radians to add to a direction in the map of its node to get
+        its direction in the frame x, y of its face.
     """
-    first = np.empty(surface.triangle_vertex.shape)
-    for start in range(0, len(first), BLOCK):
-        part = slice(start, start + BLOCK)
-        face = surface.triangle_face[part]
-        here_x, here_y = x.take(face, axis=0), y.take(face, axis=0)
-        points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[part].T]
+    angle = np.empty(surface.triangle_vertex.shape)
+    for start in range(0, len(angle), BLOCK_TRIANGLES):
+        block = slice(start, start + BLOCK_TRIANGLES)
+        face = surface.triangle_face[block]
+        block_x, block_y = x.take(face, axis=0), y.take(face, axis=0)
+        points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[block].T]
         for corner in range(3):
             edge = points[(corner + 1) % 3] - points[corner]
-            first[part, corner] = np.arctan2(dot(edge, here_y), dot(edge, here_x))
-    first = first.ravel()
-    first += 0.5 * connection.opening
-    first -= connection.middle
-    return first
+            angle[block, corner] = np.arctan2(dot(edge, block_y), dot(edge, block_x))
+    angle = angle.ravel()
+    angle += 0.5 * connection.corner_angle
+    angle -= connection.bisector_direction
+    return angle
 
 
-def sum_on_faces(
-    surface: Surface, connection: Connection, z: np.ndarray, turn: np.ndarray, degree: int
+def node_sum_per_face(
+    surface: Surface, connection: Connection, z: np.ndarray, frame_angle: np.ndarray, degree: int
 ) -> np.ndarray:
-    """(F,) complex: values at the corners of each face, summed with the areas of triangles."""
-    total = np.empty((len(connection.area), 3), dtype=np.complex128)
-    node, turn = connection.node.reshape(-1, 3), turn.reshape(-1, 3)
-    for start in range(0, len(total), BLOCK):
-        part = slice(start, start + BLOCK)
-        angle = degree * turn[part]
-        np.multiply(z.take(node[part]), np.cos(angle) + 1j * np.sin(angle), out=total[part])
-        total[part] *= connection.area[part, None]
-    return complex_sums(surface.triangle_face, total.sum(axis=1), surface.face_count)
+    """Sum node values over the triangle corners of each face, weighted by triangle area.
+
+    Parameters
+    ----------
+    surface : Surface
+    connection : Connection
+    z : (n,) complex ndarray
+        Representations at the nodes.
+    frame_angle : (3 T,) float64 ndarray
+        From `corner_frame_angles`.
+    degree : int
+
+    Returns
+    -------
+    (F,) complex128 ndarray
+        In the frames of the faces; not divided by the weights.
+    """
+    weighted = np.empty((len(connection.area), 3), dtype=np.complex128)
+    node, frame_angle = connection.corner_node.reshape(-1, 3), frame_angle.reshape(-1, 3)
+    for start in range(0, len(weighted), BLOCK_TRIANGLES):
+        block = slice(start, start + BLOCK_TRIANGLES)
+        angle = degree * frame_angle[block]
+        np.multiply(z.take(node[block]), np.cos(angle) + 1j * np.sin(angle), out=weighted[block])
+        weighted[block] *= connection.area[block, None]
+    return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)

@@ -1,4 +1,4 @@
-"""A polygon mesh as flat arrays, and the parts of its topology that a field needs."""
+"""Polygon meshes as flat arrays, with their edges, smooth fans, normals and connectivity."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import RosyError
-from .frames import dot, unit
+from .frames import dot, normalize
 from .triangulate import triangulate
 
-#: Corner normals that differ by no more from that of their fan are the fan's.
-SAME_NORMAL = 1e-6
+#: Largest difference, in each component, at which a corner normal equals the mean of its fan.
+NORMAL_TOLERANCE = 1e-6
 
-#: Faces or corners that are worked on at once: bounds memory, and fits the caches.
-BLOCK = 1 << 14
+#: Faces or corners processed at once, to bound memory and fit in the CPU caches.
+BLOCK_ELEMENTS = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,26 +24,29 @@ class Surface:
     """A polygon mesh: V vertices, F faces, C corners (face-vertex pairs), T triangles.
 
     The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``, counter-clockwise about
-    the outward normal, as in Blender. Make one with `build_surface`.
+    the outward normal, as in Blender. Use `build_surface` to make a surface.
 
     Attributes
     ----------
     name : str
-        For messages.
+        Name for messages.
     vertices : (V, 3) float64 ndarray
-        Object space, as seen (deformed).
+        Positions in object space, after deformation.
     corner_vertex : (C,) int32 ndarray
+        Vertex of each corner.
     face_start : (F + 1,) int32 ndarray
+        First corner of each face, and C.
     triangles : (T, 3) int32 ndarray
-        Corner indices.
+        Corner indices (not vertices) of each triangle.
     triangle_face : (T,) int32 ndarray
+        Face of each triangle.
     corner_normal : (C, 3) float64 ndarray
         Unit shading normals.
     corner_fan : (C,) int32 ndarray
-        Corners with the same number share a vertex and a smooth normal: field values mix over
-        them. Sharp edges and flat faces keep corners apart.
-    rest : (V, 3) float64 ndarray or None
-        Undeformed positions, in which a field's vectors were given; None if not deformed.
+        Smooth fan of each corner. The corners of a fan share a vertex and a smooth normal, and
+        field values are averaged over them. Sharp edges and flat faces separate fans.
+    rest_vertices : (V, 3) float64 ndarray or None
+        Positions before deformation, which field vectors refer to; None if not deformed.
     """
 
     name: str
@@ -54,27 +57,27 @@ class Surface:
     triangle_face: np.ndarray
     corner_normal: np.ndarray
     corner_fan: np.ndarray
-    rest: np.ndarray | None = None
+    rest_vertices: np.ndarray | None = None
 
     @property
     def face_count(self) -> int:
-        """F."""
+        """F, the number of faces."""
         return len(self.face_start) - 1
 
     @cached_property
-    def size(self) -> float:
-        """The longest side of its box, Blender units."""
+    def extent(self) -> float:
+        """The longest side of the bounding box, in Blender units."""
         return float(np.ptp(self.vertices, axis=0).max())
 
     @cached_property
-    def bounds(self) -> np.ndarray:
-        """(8, 3) float64: corners of the box around it; vertices of no face have no say."""
+    def box_corners(self) -> np.ndarray:
+        """(8, 3) float64: corners of the bounding box; vertices without a face are ignored."""
         used = np.zeros(len(self.vertices), dtype=bool)
         used[self.corner_vertex] = True
         points = self.vertices[used]
-        ends = np.stack([points.min(axis=0), points.max(axis=0)])
-        which = np.indices((2, 2, 2)).reshape(3, 8)
-        return np.stack([ends[which[axis], axis] for axis in range(3)], axis=1)
+        limits = np.stack([points.min(axis=0), points.max(axis=0)])
+        selector = np.indices((2, 2, 2)).reshape(3, 8)
+        return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)
 
     @cached_property
     def corner_face(self) -> np.ndarray:
@@ -88,33 +91,35 @@ class Surface:
 
     @cached_property
     def triangle_vertex(self) -> np.ndarray:
-        """(T, 3) int32: the vertices of the triangles."""
+        """(T, 3) int32: the vertex indices of the triangles."""
         return self.corner_vertex.take(self.triangles)
 
     @cached_property
     def fan_normal(self) -> np.ndarray:
-        """(K, 3) float64: the mean direction of the corner normals of each fan, unit."""
-        return unit(mix_over_fans(self.corner_normal, self.corner_fan))
+        """(K, 3) float64: the unit mean of the corner normals of each of the K fans."""
+        return normalize(sum_per_fan(self.corner_normal, self.corner_fan))
 
     @cached_property
     def fans_share_normals(self) -> bool:
-        """Whether no corner normal differs from that of its fan, as custom ones may."""
-        for start in range(0, len(self.corner_fan), BLOCK):
-            part = slice(start, start + BLOCK)
-            apart = self.corner_normal[part] - self.fan_normal.take(self.corner_fan[part], axis=0)
-            if np.abs(apart).max() > SAME_NORMAL:
+        """Whether all corner normals equal that of their fan; custom normals may differ."""
+        for start in range(0, len(self.corner_fan), BLOCK_ELEMENTS):
+            block = slice(start, start + BLOCK_ELEMENTS)
+            difference = self.corner_normal[block] - self.fan_normal.take(
+                self.corner_fan[block], axis=0
+            )
+            if np.abs(difference).max() > NORMAL_TOLERANCE:
                 return False
         return True
 
     @cached_property
     def face_normal(self) -> np.ndarray:
         """(F, 3) float64 unit normals by Newell's formula; zero for a face without area."""
-        return unit(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))
+        return normalize(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))
 
     @cached_property
-    def face_centre(self) -> np.ndarray:
-        """(F, 3) float64: mean of each face's corners."""
-        return mean_over_faces(self.vertices[self.corner_vertex], self.face_start)
+    def face_center(self) -> np.ndarray:
+        """(F, 3) float64: the mean of the corner positions of each face."""
+        return mean_per_face(self.vertices[self.corner_vertex], self.face_start)
 
 
 def build_surface(
@@ -130,9 +135,9 @@ def build_surface(
     corner_fan: np.ndarray | None = None,
     triangles: np.ndarray | None = None,
     triangle_face: np.ndarray | None = None,
-    rest: np.ndarray | None = None,
+    rest_vertices: np.ndarray | None = None,
 ) -> Surface:
-    """Make a `Surface` of plain arrays, working out what is not given.
+    """Make a `Surface` from arrays, and compute the parts that are not given.
 
     Parameters
     ----------
@@ -143,16 +148,16 @@ def build_surface(
     sharp_edges : (E, 2) array_like of int, optional
         Vertex pairs across which normals and field values do not mix.
     sharp_angle : float, optional
-        Radians; edges whose faces meet at a larger angle are sharp too.
+        Angle between face normals in radians. Edges with a larger angle are also sharp.
     flat_faces : (F,) array_like of bool, optional
-        Faces that mix with none of their neighbours.
+        Faces with flat shading, which do not share normals or field values with other faces.
     corner_normal : (C, 3) array_like, optional
-        Angle-weighted means over each smooth fan if not given.
+        Shading normals. If not given, the face normals averaged over each fan, weighted by angle.
     corner_fan : (C,) array_like of int, optional
-        Of `smooth_fans`, if that is known.
+        The result of `smooth_fans`, if it is known.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
-        Each face triangulated if not given.
-    rest : (V, 3) array_like, optional
+        The result of `triangulate`, if it is known.
+    rest_vertices : (V, 3) array_like, optional
 
     Raises
     ------
@@ -181,7 +186,9 @@ def build_surface(
         triangle_face=np.ascontiguousarray(triangle_face, dtype=np.int32).ravel(),
         corner_normal=np.ascontiguousarray(corner_normal, dtype=np.float64),
         corner_fan=corner_fan,
-        rest=None if rest is None else np.ascontiguousarray(rest, dtype=np.float64),
+        rest_vertices=None
+        if rest_vertices is None
+        else np.ascontiguousarray(rest_vertices, dtype=np.float64),
     )
 
 
@@ -193,14 +200,14 @@ def smooth_fans(
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(C,) int32 `Surface.corner_fan`; see `build_surface`.
+    """(C,) int32: `Surface.corner_fan`; the parameters are those of `build_surface`.
 
-    Without a sharp angle the positions of the vertices make no difference.
+    Without a sharp angle, the result does not depend on the vertex positions.
     """
     pairs = _smooth_corner_pairs(
         vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
     )
-    return connected(len(corner_vertex), pairs)
+    return connected_components(len(corner_vertex), pairs)
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:
@@ -215,15 +222,15 @@ def next_corners(face_start: np.ndarray) -> np.ndarray:
     return following
 
 
-def sum_over_faces(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """(F, ...) sums of (C, ...) corner values."""
+def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
+    """(F, ...) sums of (C, ...) corner values over each face."""
     return np.add.reduceat(values, face_start[:-1], axis=0)
 
 
-def mean_over_faces(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """(F, ...) means of (C, ...) corner values."""
+def mean_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
+    """(F, ...) means of (C, ...) corner values over each face."""
     count = np.diff(face_start).reshape((-1,) + (1,) * (values.ndim - 1))
-    return sum_over_faces(values, face_start) / count
+    return sum_per_face(values, face_start) / count
 
 
 def face_area_vectors(
@@ -231,105 +238,113 @@ def face_area_vectors(
 ) -> np.ndarray:
     """(F, 3) area vectors (normal times area) of polygons, by Newell's formula.
 
-    Positions are taken relative to each face's first corner, so that a mesh far from the origin
-    loses no digits.
+    Positions are relative to the first corner of each face, so that no precision is lost far from
+    the origin.
     """
     area = np.empty((len(face_start) - 1, 3))
     for faces, corners, starts in face_blocks(face_start):
-        points = _from_first(vertices, corner_vertex[corners], starts)
-        twice = sum_over_faces(np.cross(points, points[next_corners(starts)]), starts)
+        points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
+        twice = sum_per_face(np.cross(points, points[next_corners(starts)]), starts)
         np.multiply(twice, 0.5, out=area[faces])
     return area
 
 
-def _from_first(
+def _relative_to_first_corner(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> np.ndarray:
-    """(C, 3) corners of faces relative to the first of each."""
+    """(C, 3) positions of corners relative to the first corner of their face."""
     points = vertices[corner_vertex]
     return points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
 
 
 def face_blocks(face_start: np.ndarray) -> Iterator[tuple[slice, slice, np.ndarray]]:
-    """Some faces at once, which bounds memory: they, their corners, and starts among these."""
+    """Split the faces into consecutive blocks, to bound memory.
+
+    Yields
+    ------
+    faces, corners : slice
+        The faces of the block and their corners.
+    starts : (faces + 1,) ndarray
+        `face_start` of the block, counted from its first corner.
+    """
     count = len(face_start) - 1
-    for first in range(0, count, BLOCK):
-        faces = slice(first, min(first + BLOCK, count))
+    for first in range(0, count, BLOCK_ELEMENTS):
+        faces = slice(first, min(first + BLOCK_ELEMENTS, count))
         starts = face_start[faces.start : faces.stop + 1]
         yield faces, slice(int(starts[0]), int(starts[-1])), starts - starts[0]
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The E edges of a surface, and the two corners on each side of the interior ones.
+    """The E edges of a surface, and the two halfedges of each of the I interior edges.
 
     Attributes
     ----------
     corner_edge : (C,) int32 ndarray
-        Edge from each corner to the next one of its face.
+        The edge from each corner to the next corner of its face.
     ends : (E, 2) int32 ndarray
         Vertex pairs, the smaller first.
-    uses : (E,) int32 ndarray
-        How many faces meet there: 1 at a boundary, 2 inside, more where not manifold.
-    inner : (I,) int32 ndarray
-        The edges with exactly two faces on opposite sides.
-    sides : (I, 2) int32 ndarray
-        For each of them the corner of either face that the edge starts from. Oppositely oriented
-        neighbours run along the edge in opposite directions; equally oriented ones do not count
-        as `inner`, for there the surface does not continue.
+    face_count : (E,) int32 ndarray
+        Number of faces at the edge: 1 at a boundary, 2 inside, more at nonmanifold edges.
+    interior : (I,) int32 ndarray
+        Edges with exactly two faces that are oriented consistently.
+    halfedges : (I, 2) int32 ndarray
+        For each interior edge, the corner in either face where the edge starts. Consistently
+        oriented faces run along the edge in opposite directions. Edges whose faces run in the same
+        direction are not `interior`, because fields do not continue across them.
     """
 
     corner_edge: np.ndarray
     ends: np.ndarray
-    uses: np.ndarray
-    inner: np.ndarray
-    sides: np.ndarray
+    face_count: np.ndarray
+    interior: np.ndarray
+    halfedges: np.ndarray
 
 
-def surface_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
-    """Find the edges of a polygon mesh."""
+def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
+    """Find the edges of a polygon mesh; the parameters are arrays of `Surface`."""
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
-    span = int(corner_vertex.max(initial=0)) + 1
-    key = np.minimum(tail, head) * span + np.maximum(tail, head)
-    edge_key, corner_edge, uses = np.unique(key, return_inverse=True, return_counts=True)
+    stride = int(corner_vertex.max(initial=0)) + 1
+    key = np.minimum(tail, head) * stride + np.maximum(tail, head)
+    edge_key, corner_edge, face_count = np.unique(key, return_inverse=True, return_counts=True)
     corner_edge = corner_edge.ravel().astype(np.int32)
-    by_edge = np.argsort(corner_edge, kind="stable")
-    first = np.concatenate([[0], np.cumsum(uses)[:-1]])
-    inner = np.flatnonzero(uses == 2)
-    a, b = by_edge[first[inner]], by_edge[first[inner] + 1]
+    corner_by_edge = np.argsort(corner_edge, kind="stable")
+    first = np.concatenate([[0], np.cumsum(face_count)[:-1]])
+    interior = np.flatnonzero(face_count == 2)
+    a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
     return Edges(
         corner_edge=corner_edge,
-        ends=np.stack([edge_key // span, edge_key % span], axis=1).astype(np.int32),
-        uses=uses.astype(np.int32),
-        inner=inner[opposite].astype(np.int32),
-        sides=np.stack([a, b], axis=1)[opposite].astype(np.int32),
+        ends=np.stack([edge_key // stride, edge_key % stride], axis=1).astype(np.int32),
+        face_count=face_count.astype(np.int32),
+        interior=interior[opposite].astype(np.int32),
+        halfedges=np.stack([a, b], axis=1)[opposite].astype(np.int32),
     )
 
 
-def cut_edges(surface: Surface) -> int:
-    """How many edges join two faces (with an area) that do not agree on which side is out.
+def count_inconsistent_edges(surface: Surface) -> int:
+    """Count the edges between two faces that disagree on which side is out.
 
-    There is no field across such an edge. Only flipping faces helps, and of a Möbius strip not even
-    that: some edges are left, along which the field is cut.
+    Faces without area are ignored. Fields are cut along such edges. Flipping faces removes them,
+    except on nonorientable surfaces such as a Möbius strip.
     """
-    edges = surface_edges(surface.corner_vertex, surface.face_start)
-    flat = ~surface.face_normal.any(axis=1)
-    beside_flat = np.zeros(len(edges.uses), dtype=bool)
-    beside_flat[edges.corner_edge[flat[surface.corner_face]]] = True
-    doubtful = (edges.uses == 2) & ~beside_flat
-    doubtful[edges.inner] = False
-    return int(np.count_nonzero(doubtful))
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    degenerate = ~surface.face_normal.any(axis=1)
+    borders_degenerate = np.zeros(len(edges.face_count), dtype=bool)
+    borders_degenerate[edges.corner_edge[degenerate[surface.corner_face]]] = True
+    inconsistent = (edges.face_count == 2) & ~borders_degenerate
+    inconsistent[edges.interior] = False
+    return int(np.count_nonzero(inconsistent))
 
 
-def cut_note(surface: Surface) -> str:
-    """What a user should know of that; empty if there is nothing."""
-    cut = cut_edges(surface)
-    if not cut:
+def orientation_warning(surface: Surface) -> str:
+    """The warning to show for inconsistently oriented faces; empty if there are none."""
+    count = count_inconsistent_edges(surface)
+    if not count:
         return ""
     return (
-        f"{surface.name}: along {cut} edges faces disagree on which side is out, and the field is "
+        f"{surface.name}: along {count} edges faces disagree on which side is out, and the field is "
         "cut there: recalculate the normals, unless it is a Möbius strip, which has but one side"
     )
 
@@ -337,12 +352,15 @@ def cut_note(surface: Surface) -> str:
 def _check_polygons(
     name: str, vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> None:
+    """Raise an error unless the arrays of `build_surface` are a valid mesh with faces."""
     if len(face_start) < 2:
         raise RosyError(f"{name}: the mesh has no faces")
-    corners = np.diff(face_start)
-    if corners.min() < 3:
-        face = int(np.argmin(corners))
-        raise RosyError(f"{name}: face {face} has {corners[face]} corners, at least 3 are wanted")
+    corner_counts = np.diff(face_start)
+    if corner_counts.min() < 3:
+        face = int(np.argmin(corner_counts))
+        raise RosyError(
+            f"{name}: face {face} has {corner_counts[face]} corners, at least 3 are wanted"
+        )
     if corner_vertex.min() < 0 or corner_vertex.max() >= len(vertices):
         raise RosyError(f"{name}: a face refers to a vertex that does not exist")
     finite = np.isfinite(vertices).all(axis=1)
@@ -360,33 +378,45 @@ def _smooth_corner_pairs(
     sharp_angle: float | None,
     flat_faces: np.ndarray | None,
 ) -> np.ndarray:
-    """(K, 2) pairs of corners that face each other across a smooth edge, at either end of it."""
-    edges = surface_edges(corner_vertex, face_start)
-    face_of, following = corner_faces(face_start), next_corners(face_start)
-    a, b = edges.sides[:, 0], edges.sides[:, 1]
+    """(K, 2) pairs of corners at the same vertex of two faces that share a smooth edge."""
+    edges = build_edges(corner_vertex, face_start)
+    corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     smooth = np.ones(len(a), dtype=bool)
     if flat_faces is not None:
         flat = np.asarray(flat_faces, dtype=bool)
-        smooth &= ~(flat[face_of[a]] | flat[face_of[b]])
+        smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
     if sharp_angle is not None:
-        normal = unit(face_area_vectors(vertices, corner_vertex, face_start))
-        smooth &= dot(normal[face_of[a]], normal[face_of[b]]) >= np.cos(sharp_angle)
+        normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
+        smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
     if sharp_edges is not None and len(sharp_edges):
-        span = int(corner_vertex.max()) + 1
+        stride = int(corner_vertex.max()) + 1
         sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
-        ends = edges.ends[edges.inner].astype(np.int64)
-        smooth &= ~np.isin(ends[:, 0] * span + ends[:, 1], sharp[:, 0] * span + sharp[:, 1])
+        ends = edges.ends[edges.interior].astype(np.int64)
+        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
     a, b = a[smooth], b[smooth]
     return np.concatenate(
-        [np.stack([a, following[b]], axis=1), np.stack([following[a], b], axis=1)]
+        [np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)]
     )
 
 
-def connected(count: int, pairs: np.ndarray) -> np.ndarray:
-    """(count,) int32 number of the connected component of each node, from 0 without gaps.
+def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Label the connected components of a graph.
 
-    Every node points at the smallest node known to be connected with it; pairs hook the roots
-    together and pointer jumping flattens the trees, a logarithmic number of rounds.
+    Each node points to the smallest node known to be in its component. Each round links the roots
+    of connected nodes, then flattens the trees by pointer jumping.
+
+    Parameters
+    ----------
+    count : int
+        Number of nodes.
+    pairs : (n, 2) int ndarray
+        Edges of the graph.
+
+    Returns
+    -------
+    (count,) int32 ndarray
+        Component of each node, numbered from 0 without gaps.
     """
     root = np.arange(count, dtype=np.int32)
     a, b = pairs[:, 0], pairs[:, 1]
@@ -394,40 +424,43 @@ def connected(count: int, pairs: np.ndarray) -> np.ndarray:
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         np.minimum.at(root, high, low)
         while True:
-            flat = root[root]
-            if np.array_equal(flat, root):
+            flattened = root[root]
+            if np.array_equal(flattened, root):
                 break
-            root = flat
-        open_pairs = root[a] != root[b]
-        a, b = a[open_pairs], b[open_pairs]
+            root = flattened
+        unmerged = root[a] != root[b]
+        a, b = a[unmerged], b[unmerged]
     return np.unique(root, return_inverse=True)[1].ravel().astype(np.int32)
 
 
 def _fan_normals(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
-    """(C, 3) face normals averaged over each fan, weighted by the angle at the corner."""
+    """(C, 3) unit corner normals: face normals averaged over each fan, weighted by corner angle.
+
+    Where the mean is zero, the face normal; (0, 0, 1) if that is zero, too.
+    """
     angle = np.empty(len(corner_vertex))
     for _, corners, starts in face_blocks(face_start):
-        points = _from_first(vertices, corner_vertex[corners], starts)
+        points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
         following = next_corners(starts)
-        ahead = unit(points[following] - points)
-        behind = np.empty_like(ahead)
-        behind[following] = -ahead
-        angle[corners] = np.arccos(np.clip(dot(ahead, behind), -1, 1))
-    face_normal = unit(face_area_vectors(vertices, corner_vertex, face_start))
+        to_next = normalize(points[following] - points)
+        to_previous = np.empty_like(to_next)
+        to_previous[following] = -to_next
+        angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
+    face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
     face = corner_faces(face_start)
-    fans = int(corner_fan.max()) + 1
-    total = [np.bincount(corner_fan, angle * column[face], fans) for column in face_normal.T]
-    normal = unit(np.stack(total, axis=1))[corner_fan]
-    lost = ~normal.any(axis=1)
-    normal[lost] = face_normal[face[lost]]
+    fan_count = int(corner_fan.max()) + 1
+    total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
+    normal = normalize(np.stack(total, axis=1))[corner_fan]
+    undefined = ~normal.any(axis=1)
+    normal[undefined] = face_normal[face[undefined]]
     normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
     return normal
 
 
-def mix_over_fans(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
-    """(fans, k) sums of (C, k) real corner values over the corners of each fan."""
-    fans = int(corner_fan.max()) + 1
-    columns = [np.bincount(corner_fan, weights=column, minlength=fans) for column in values.T]
+def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
+    """(K, k) sums of (C, k) real corner values over the corners of each of the K fans."""
+    fan_count = int(corner_fan.max()) + 1
+    columns = [np.bincount(corner_fan, weights=column, minlength=fan_count) for column in values.T]
     return np.stack(columns, axis=1)

@@ -1,21 +1,21 @@
-"""Polygons cut into triangles: fans where that is right, ear by ear where it is not."""
+"""Triangulate polygons, as fans where possible and by ear clipping otherwise."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Sine of the turn at a corner up to which it counts as flat, reflex if it turns the other way.
-FLAT = 1e-6
+#: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
+COLLINEAR_SINE = 1e-6
 
 
 def triangulate(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cut every face into triangles, k - 2 for a face of k corners, in the order of the faces.
+    """Split each face with k corners into k - 2 triangles, in the order of the faces.
 
-    No triangle of a concave face lies outside it, and none is without area on account of corners
-    in a line. Faces are seen along their (Newell) normal; those that cross themselves give
-    triangles of which nothing more is promised.
+    Triangles of a concave face lie inside it, and collinear corners cause no triangles without
+    area. Faces are projected along their Newell normal. Self-intersecting faces are also split, but
+    their triangles may overlap.
 
     Parameters
     ----------
@@ -28,76 +28,93 @@ def triangulate(
     triangles : (T, 3) int32 ndarray
         Corner indices.
     triangle_face : (T,) int32 ndarray
+        Face of each triangle, ascending.
 
     Notes
     -----
-    Convex faces are cut into the fan around their first corner. A face with a single flat or reflex
-    corner is cut into the fan around that one, which sees all others: shortest paths inside a
-    polygon bend at reflex corners only. The few others are cut in a Python loop.
+    Convex faces become a fan around their first corner. A face with a single flat or reflex corner
+    becomes a fan around that corner. All other corners are visible from it, because shortest paths
+    inside a polygon bend only at reflex corners. The remaining faces, usually few, are ear-clipped
+    in a Python loop.
     """
     size = np.diff(face_start)
-    hub = np.zeros(len(size), dtype=np.int32)
+    apex = np.zeros(len(size), dtype=np.int32)
     faces = np.flatnonzero(size > 3)
-    by_ears = faces[:0]
+    ear_faces = faces[:0]
     if len(faces):
-        hub[faces], needs_ears = _fan_hubs(vertices, corner_vertex, face_start, faces)
-        by_ears = faces[needs_ears]
-    triangles, triangle_face = _fans(face_start, hub)
+        apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
+        ear_faces = faces[needs_ears]
+    triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)
-    for face in by_ears:
+    for face in ear_faces:
         corners = np.arange(face_start[face], face_start[face + 1])
-        ears = _cut_ears(_flattened(vertices[corner_vertex[corners]]))
+        ears = _ear_clip(_project_to_plane(vertices[corner_vertex[corners]]))
         first = first_triangle[face]
         triangles[first : first + len(ears)] = corners[ears]
     return triangles, triangle_face
 
 
-def _fans(face_start: np.ndarray, hub: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of all faces as fans, each around its corner number `hub`."""
+def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`triangles` and `triangle_face` of fans; (F,) `apex` is the corner within each face."""
     size = np.diff(face_start)
     count = size - 2
     triangle_face = np.repeat(np.arange(len(size), dtype=np.int32), count)
     first_triangle = (np.cumsum(count) - count)[triangle_face]
     step = np.arange(len(triangle_face), dtype=np.int32) - first_triangle
-    first, size, hub = face_start[triangle_face], size[triangle_face], hub[triangle_face]
-    ahead = np.stack([hub, hub + step + 1, hub + step + 2], axis=1)
-    ahead -= np.where(ahead >= size[:, None], size[:, None], 0).astype(ahead.dtype)
-    return (first[:, None] + ahead).astype(np.int32), triangle_face
+    first, size, apex = face_start[triangle_face], size[triangle_face], apex[triangle_face]
+    local_corners = np.stack([apex, apex + step + 1, apex + step + 2], axis=1)
+    local_corners -= np.where(local_corners >= size[:, None], size[:, None], 0).astype(
+        local_corners.dtype
+    )
+    return (first[:, None] + local_corners).astype(np.int32), triangle_face
 
 
-def _fan_hubs(
+def _fan_apexes(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Around which of its corners to fan each of some faces, and which no fan is right for."""
+    """Choose the apex of the fan of each face, and find the faces that need ear clipping.
+
+    Parameters
+    ----------
+    vertices, corner_vertex, face_start : ndarray
+    faces : (n,) int ndarray
+        Faces with more than three corners.
+
+    Returns
+    -------
+    apex : (n,) int32 ndarray
+        Corner within each face, from 0.
+    needs_ears : (n,) bool ndarray
+    """
     size = np.diff(face_start)[faces]
-    hub = np.zeros(len(faces), dtype=np.int32)
+    apex = np.zeros(len(faces), dtype=np.int32)
     needs_ears = np.zeros(len(faces), dtype=bool)
     for count in np.unique(size):
-        of_size = np.flatnonzero(size == count)
-        corners = face_start[faces[of_size]][:, None] + np.arange(count)
-        turn = _turns(vertices[corner_vertex[corners]])
-        least = np.argmin(turn, axis=1)
-        bent = turn.min(axis=1) <= FLAT
-        hub[of_size] = np.where(bent, least, 0)
+        group = np.flatnonzero(size == count)
+        corners = face_start[faces[group]][:, None] + np.arange(count)
+        sine = _corner_sines(vertices[corner_vertex[corners]])
+        sharpest = np.argmin(sine, axis=1)
+        not_convex = sine.min(axis=1) <= COLLINEAR_SINE
+        apex[group] = np.where(not_convex, sharpest, 0)
         if count > 4:
-            needs_ears[of_size] = (turn <= FLAT).sum(axis=1) > 1
-    return hub, needs_ears
+            needs_ears[group] = (sine <= COLLINEAR_SINE).sum(axis=1) > 1
+    return apex, needs_ears
 
 
-def _turns(points: np.ndarray) -> np.ndarray:
-    """(F, k) sine of the turn at each corner of (F, k, 3) polygons, negative at reflex ones."""
+def _corner_sines(points: np.ndarray) -> np.ndarray:
+    """(F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
     edge = np.roll(points, -1, axis=1) - points
-    before = np.roll(edge, 1, axis=1)
+    previous_edge = np.roll(edge, 1, axis=1)
     relative = points - points[:, :1]
     normal = np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
     length = np.linalg.norm(edge, axis=2)
     scale = np.roll(length, 1, axis=1) * length * np.linalg.norm(normal, axis=1)[:, None]
-    turn = np.einsum("fki,fi->fk", np.cross(before, edge), normal)
-    return np.divide(turn, scale, out=np.zeros_like(turn), where=scale > 0)
+    sine = np.einsum("fki,fi->fk", np.cross(previous_edge, edge), normal)
+    return np.divide(sine, scale, out=np.zeros_like(sine), where=scale > 0)
 
 
-def _flattened(points: np.ndarray) -> np.ndarray:
-    """(k, 2) a polygon's corners seen along its normal, which they run counter-clockwise about."""
+def _project_to_plane(points: np.ndarray) -> np.ndarray:
+    """(k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)
@@ -107,42 +124,52 @@ def _flattened(points: np.ndarray) -> np.ndarray:
     return np.stack([relative @ x, relative @ y / (np.linalg.norm(normal) or 1.0)], axis=1)
 
 
-def _cut_ears(points: np.ndarray) -> np.ndarray:
-    """(k - 2, 3) triangles of a simple counter-clockwise polygon of (k, 2) points.
+def _ear_clip(points: np.ndarray) -> np.ndarray:
+    """Triangulate a simple counter-clockwise polygon by ear clipping.
 
-    Of the corners whose triangle holds no other corner, the one with the widest smallest angle is
-    cut off first.
+    Each step cuts off the ear whose smallest angle is the largest. An ear is a corner whose
+    triangle contains no other corner.
+
+    Parameters
+    ----------
+    points : (k, 2) ndarray
+
+    Returns
+    -------
+    (k - 2, 3) int ndarray
+        Indices of points.
     """
-    left = np.arange(len(points))
+    remaining = np.arange(len(points))
     triangles = []
-    while len(left) > 3:
-        behind, ahead = np.roll(left, 1), np.roll(left, -1)
-        a, b, c = points[behind], points[left], points[ahead]
+    while len(remaining) > 3:
+        previous, following = np.roll(remaining, 1), np.roll(remaining, -1)
+        a, b, c = points[previous], points[remaining], points[following]
         quality = _smallest_sine(a, b, c)
-        blocked = _holds_a_corner(a, b, c, points[left])
-        # A polygon that crosses itself may have no ear: then the best triangle there is.
+        blocked = _contains_vertex(a, b, c, points[remaining])
+        # A self-intersecting polygon may have no ear; then take the triangle of best quality.
         ear = int(np.argmax(np.where(blocked, quality - 2, quality)))
-        triangles.append((behind[ear], left[ear], ahead[ear]))
-        left = np.delete(left, ear)
-    return np.array([*triangles, left])
+        triangles.append((previous[ear], remaining[ear], following[ear]))
+        remaining = np.delete(remaining, ear)
+    return np.array([*triangles, remaining])
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(...) z components of the cross products of (..., 2) vectors."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """(k,) least sine of the angles of triangles, negative for clockwise ones."""
+    """(k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
     area = _cross(b - a, c - a)
     one, two, three = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = one * two * three / np.maximum(np.minimum(np.minimum(one, two), three), 1e-300)
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
 
 
-def _holds_a_corner(a: np.ndarray, b: np.ndarray, c: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(k,) whether a point lies in or on a triangle, its own corners' places excepted."""
-    held = np.ones((len(a), len(points)), dtype=bool)
+def _contains_vertex(a: np.ndarray, b: np.ndarray, c: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) whether a point lies in or on each triangle; points at its corners do not count."""
+    contained = np.ones((len(a), len(points)), dtype=bool)
     for start, stop in ((a, b), (b, c), (c, a)):
-        held &= _cross((stop - start)[:, None], points[None] - start[:, None]) >= 0
-        held &= (points[None] != start[:, None]).any(axis=2)
-    return held.any(axis=1)
+        contained &= _cross((stop - start)[:, None], points[None] - start[:, None]) >= 0
+        contained &= (points[None] != start[:, None]).any(axis=2)
+    return contained.any(axis=1)

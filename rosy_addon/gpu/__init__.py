@@ -1,1 +1,1 @@
-"""The G-buffer and the sheets compositor once more, on the graphics card."""
+"""The renderer on the graphics card: shaders, and the numpy data they work on."""

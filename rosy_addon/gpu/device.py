@@ -1,6 +1,6 @@
-"""Blender's `gpu` module as the few things that drawing a picture takes.
+"""A thin layer over Blender's `gpu` module: textures, batches and shader runs.
 
-Another device (`Device`) may stand in for it where there is no Blender.
+Tests and benchmarks implement the protocol `Device` without Blender.
 """
 
 from __future__ import annotations
@@ -11,82 +11,93 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import DeviceError
-from .passes import GROUP, Compute, Constants, Drawing
+from .passes import WORKGROUP_SIZE, ComputePass, RasterPass, Uniforms
 
-Values = Mapping[str, Any]
+NamedValues = Mapping[str, Any]
 
-#: What the block of a shader's constants is called in it.
-BLOCK = "rosy_constants"
+#: Name of the uniform block in shaders.
+UNIFORM_BLOCK = "rosy_constants"
 
-#: Words of 32 bits that a constant takes.
-SIZES = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
+#: 32-bit words of each type of uniform.
+UNIFORM_WORDS = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
 
 
 class Device(Protocol):
-    """What a picture is drawn with. Textures and batches are handles that only it looks into.
+    """A graphics device. Textures and batches are opaque handles.
 
     Attributes
     ----------
-    largest : int
-        Texels that a side of a texture may have.
+    max_texture_size : int
+        Maximum side of a texture, in texels.
     """
 
-    largest: int
+    max_texture_size: int
 
     def texture(
-        self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
+        self,
+        width: int,
+        height: int,
+        texel_format: str,
+        layers: int = 0,
+        data: np.ndarray | None = None,
     ) -> Any:
-        """A texture of ``RGBA32F`` or ``RGBA16F``, an array if it has layers.
+        """Return a texture of ``RGBA32F`` or ``RGBA16F``, an array if it has layers.
 
-        `data` are (height, width, 4) float32 values for it.
+        `data` is its (height, width, 4) float32 contents.
         """
 
-    def depth(self, width: int, height: int) -> Any:
-        """A texture for depths."""
+    def depth_texture(self, width: int, height: int) -> Any:
+        """Return a depth buffer."""
 
     def clear(self, texture: Any) -> None:
-        """Set a texture to zero."""
+        """Set a texture to 0."""
 
-    def batch(self, corners: np.ndarray) -> Any:
-        """Triangles given by their (3 T, 4) float32 corners."""
+    def batch(self, vertices: np.ndarray) -> Any:
+        """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
 
     def compute(
         self,
-        shader: Compute,
+        shader: ComputePass,
         size: Sequence[int],
-        textures: Values,
-        images: Values,
-        constants: Values,
+        textures: NamedValues,
+        images: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
-        """Run a shader for so many pixels across and up, and layers."""
+        """Run a compute shader over width, height and, optionally, layers."""
 
     def draw(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
         target: tuple[Any, Any],
-        constants: Values,
+        uniforms: NamedValues,
     ) -> None:
-        """Draw batches, each with constants of its own, into a colour and a depth texture."""
+        """Draw batches, each with its own uniforms, into a color and a depth texture."""
 
-    def draw_over(
+    def draw_to_view(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
-        textures: Values,
-        constants: Values,
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
+        textures: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
-        """Draw batches into the view that is being drawn, where nothing is in front."""
+        """Draw batches into the current view, with its depth test."""
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """Left, bottom, width and height of that view in what it is drawn into."""
+        """Return left, bottom, width and height of the current view in its frame buffer."""
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        """(height, width, 4) float32: what is in a texture."""
+        """Return the (height, width, 4) float32 contents of a texture."""
 
 
 class BlenderDevice:
-    """The context that Blender draws with."""
+    """Blender's graphics context.
+
+    Raises
+    ------
+    DeviceError
+        If Blender has none.
+    """
 
     def __init__(self) -> None:
         import gpu
@@ -98,61 +109,68 @@ class BlenderDevice:
             )
         self._gpu = gpu
         self._shaders: dict[str, Any] = {}
-        self.largest: int = gpu.capabilities.max_texture_size_get()
+        self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
 
     def texture(
-        self, width: int, height: int, kind: str, layers: int = 0, data: np.ndarray | None = None
+        self,
+        width: int,
+        height: int,
+        texel_format: str,
+        layers: int = 0,
+        data: np.ndarray | None = None,
     ) -> Any:
         """As `Device.texture`."""
-        more = {}
+        options = {}
         if data is not None:
             flat = np.ascontiguousarray(data, dtype=np.float32).reshape(-1)
-            more["data"] = self._gpu.types.Buffer("FLOAT", len(flat), flat)
-        return self._gpu.types.GPUTexture((width, height), layers=layers, format=kind, **more)
+            options["data"] = self._gpu.types.Buffer("FLOAT", len(flat), flat)
+        return self._gpu.types.GPUTexture(
+            (width, height), layers=layers, format=texel_format, **options
+        )
 
-    def depth(self, width: int, height: int) -> Any:
-        """As `Device.depth`."""
+    def depth_texture(self, width: int, height: int) -> Any:
+        """As `Device.depth_texture`."""
         return self._gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
 
     def clear(self, texture: Any) -> None:
         """As `Device.clear`."""
         texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
 
-    def batch(self, corners: np.ndarray) -> Any:
+    def batch(self, vertices: np.ndarray) -> Any:
         """As `Device.batch`."""
         layout = self._gpu.types.GPUVertFormat()
-        layout.attr_add(id="corner", comp_type="F32", len=4, fetch_mode="FLOAT")
-        buffer = self._gpu.types.GPUVertBuf(layout, len(corners))
-        buffer.attr_fill("corner", np.ascontiguousarray(corners, dtype=np.float32))
+        layout.attr_add(id="vertex_data", comp_type="F32", len=4, fetch_mode="FLOAT")
+        buffer = self._gpu.types.GPUVertBuf(layout, len(vertices))
+        buffer.attr_fill("vertex_data", np.ascontiguousarray(vertices, dtype=np.float32))
         return self._gpu.types.GPUBatch(type="TRIS", buf=buffer)
 
     def compute(
         self,
-        shader: Compute,
+        shader: ComputePass,
         size: Sequence[int],
-        textures: Values,
-        images: Values,
-        constants: Values,
+        textures: NamedValues,
+        images: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
         """As `Device.compute`."""
-        program, _block = self._bound(shader, textures, constants)
+        program, _block = self._bind(shader, textures, uniforms)
         for name, _ in shader.images:
-            program.image(_plain(name), images[_plain(name)])
+            program.image(_base_name(name), images[_base_name(name)])
         width, height, layers = (*size, 1)[:3]
-        groups = -(-width // GROUP[0]), -(-height // GROUP[1]), layers
+        groups = -(-width // WORKGROUP_SIZE[0]), -(-height // WORKGROUP_SIZE[1]), layers
         self._gpu.compute.dispatch(program, *groups)
 
     def draw(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
         target: tuple[Any, Any],
-        constants: Values,
+        uniforms: NamedValues,
     ) -> None:
         """As `Device.draw`."""
-        state, (colour, depth) = self._gpu.state, target
-        framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(colour,))
-        before = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
+        state, (color, depth) = self._gpu.state, target
+        framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+        saved_state = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         with framebuffer.bind():
             framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             state.depth_test_set("LESS")
@@ -160,27 +178,27 @@ class BlenderDevice:
             state.blend_set("NONE")
             state.face_culling_set("NONE")
             try:
-                self._draw(shader, batches, {}, constants)
+                self._draw_batches(shader, batches, {}, uniforms)
             finally:
-                state.depth_test_set(before[0])
-                state.depth_mask_set(before[1])
-                state.blend_set(before[2])
+                state.depth_test_set(saved_state[0])
+                state.depth_mask_set(saved_state[1])
+                state.blend_set(saved_state[2])
 
-    def draw_over(
+    def draw_to_view(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
-        textures: Values,
-        constants: Values,
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
+        textures: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
-        """As `Device.draw_over`."""
+        """As `Device.draw_to_view`."""
         state = self._gpu.state
         state.depth_test_set("LESS_EQUAL")
-        # Of all that lies behind each other at a pixel the picture is drawn once.
+        # With depth writes, the picture is drawn once where surfaces overlap.
         state.depth_mask_set(True)
         state.blend_set("ALPHA")
         try:
-            self._draw(shader, batches, textures, constants)
+            self._draw_batches(shader, batches, textures, uniforms)
         finally:
             state.blend_set("NONE")
             state.depth_mask_set(False)
@@ -190,76 +208,78 @@ class BlenderDevice:
         """As `Device.viewport`."""
         return tuple(self._gpu.state.viewport_get())
 
-    def _draw(
+    def _draw_batches(
         self,
-        shader: Drawing,
-        batches: Sequence[tuple[Any, Values]],
-        textures: Values,
-        constants: Values,
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, NamedValues]],
+        textures: NamedValues,
+        uniforms: NamedValues,
     ) -> None:
-        for batch, own in batches:
-            program, _block = self._bound(shader, textures, {**constants, **own})
+        for batch, item_uniforms in batches:
+            program, _block = self._bind(shader, textures, {**uniforms, **item_uniforms})
             batch.draw(program)
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
         """As `Device.read`."""
         return np.asarray(texture.read(), dtype=np.float32).reshape(height, width, 4)
 
-    def _bound(
-        self, shader: Compute | Drawing, textures: Values, constants: Values
+    def _bind(
+        self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> tuple[Any, Any]:
-        """The program, ready to run, and the block of constants, which has to live till it ran."""
+        """Return the bound program and its uniform block, which must outlive the run."""
         program = self._program(shader)
         program.bind()
         for name in shader.textures:
-            program.uniform_sampler(_plain(name), textures[_plain(name)])
-        # A new one each time: what was run before may not have read its own yet.
-        block = self._gpu.types.GPUUniformBuf(_packed(shader.constants, constants))
-        program.uniform_block(BLOCK, block)
+            program.uniform_sampler(_base_name(name), textures[_base_name(name)])
+        # A new block for each run: the device may not have read the previous one yet.
+        block = self._gpu.types.GPUUniformBuf(_pack_uniforms(shader.uniforms, uniforms))
+        program.uniform_block(UNIFORM_BLOCK, block)
         return program, block
 
-    def _program(self, shader: Compute | Drawing) -> Any:
-        """The compiled shader.
+    def _program(self, shader: ComputePass | RasterPass) -> Any:
+        """Return the compiled shader.
 
         Raises
         ------
         DeviceError
-            If the driver does not take it.
+            If the driver rejects it.
         """
         if shader.name not in self._shaders:
             try:
-                self._shaders[shader.name] = self._gpu.shader.create_from_info(self._info(shader))
+                self._shaders[shader.name] = self._gpu.shader.create_from_info(
+                    self._shader_info(shader)
+                )
             except Exception as error:
                 raise DeviceError(
                     f"the graphics driver does not take the shader '{shader.name}': {error}"
                 ) from error
         return self._shaders[shader.name]
 
-    def _info(self, shader: Compute | Drawing) -> Any:
+    def _shader_info(self, shader: ComputePass | RasterPass) -> Any:
         info = self._gpu.types.GPUShaderCreateInfo()
         for slot, name in enumerate(shader.textures):
             kind = "FLOAT_2D_ARRAY" if name.endswith("[]") else "FLOAT_2D"
-            info.sampler(slot, kind, _plain(name))
-        # Push constants would be too many for some devices.
-        members = "".join(f"{kind} {name}; " for name, kind in _aligned(shader.constants))
+            info.sampler(slot, kind, _base_name(name))
+        # A uniform block: some devices have too few push constants.
+        members = "".join(f"{kind} {name}; " for name, kind in _std140_order(shader.uniforms))
         info.typedef_source(f"struct RosyConstants {{{members}}};\n")
-        info.uniform_buf(0, "RosyConstants", BLOCK)
-        named = "".join(f"#define {name} {BLOCK}.{name}\n" for name, _ in shader.constants)
-        if isinstance(shader, Compute):
+        info.uniform_buf(0, "RosyConstants", UNIFORM_BLOCK)
+        defines = "".join(f"#define {name} {UNIFORM_BLOCK}.{name}\n" for name, _ in shader.uniforms)
+        if isinstance(shader, ComputePass):
             for slot, (name, format_) in enumerate(shader.images):
                 kind = "FLOAT_2D_ARRAY" if name.endswith("[]") else "FLOAT_2D"
-                info.image(slot, format_, kind, _plain(name), qualifiers={"WRITE"})
-            info.local_group_size(*GROUP)
-            info.compute_source(named + shader.source)
+                info.image(slot, format_, kind, _base_name(name), qualifiers={"WRITE"})
+            info.local_group_size(*WORKGROUP_SIZE)
+            info.compute_source(defines + shader.source)
             return info
         interface = self._gpu.types.GPUStageInterfaceInfo(f"rosy_{shader.name}")
         for name, kind in shader.varyings:
-            (interface.flat if name == "triangle" else interface.smooth)(kind.upper(), name)
-        info.vertex_in(0, "VEC4", "corner")
+            (interface.flat if name == "triangle_id" else interface.smooth)(kind.upper(), name)
+        info.vertex_in(0, "VEC4", "vertex_data")
         info.vertex_out(interface)
-        info.fragment_out(0, "VEC4", shader.target)
-        info.vertex_source(named + shader.vertex_source)
-        info.fragment_source(named + shader.fragment_source)
+        info.fragment_out(0, "VEC4", shader.output)
+        info.vertex_source(defines + shader.vertex_source)
+        info.fragment_source(defines + shader.fragment_source)
         return info
 
 
@@ -267,7 +287,7 @@ _device: BlenderDevice | None = None
 
 
 def blender_device() -> BlenderDevice:
-    """The one device, whose shaders are compiled once.
+    """Return the device. It is created once, and its shaders are compiled once.
 
     Raises
     ------
@@ -281,32 +301,32 @@ def blender_device() -> BlenderDevice:
 
 
 def release() -> None:
-    """Let go of the compiled shaders."""
+    """Free the compiled shaders."""
     global _device
     _device = None
 
 
-def _aligned(constants: Constants) -> Constants:
-    """In an order in which each lies where the layout std140 wants it, without a gap."""
-    return tuple(sorted(constants, key=lambda constant: -SIZES[constant[1]]))
+def _std140_order(uniforms: Uniforms) -> Uniforms:
+    """Return uniforms in an order that std140 aligns without gaps."""
+    return tuple(sorted(uniforms, key=lambda uniform: -UNIFORM_WORDS[uniform[1]]))
 
 
-def _packed(constants: Constants, values: Values) -> np.ndarray:
-    """The bytes of a block of constants, whole rows of 16."""
+def _pack_uniforms(uniforms: Uniforms, values: NamedValues) -> np.ndarray:
+    """Return a uniform block in std140, padded to whole rows of 16 bytes."""
     words: list[np.ndarray] = []
-    for name, kind in _aligned(constants):
+    for name, kind in _std140_order(uniforms):
         type_ = np.int32 if kind in ("int", "ivec2") else np.float32
         words.append(np.atleast_1d(np.asarray(values[name], dtype=type_)).view(np.float32))
     flat = np.concatenate(words)
     return np.concatenate([flat, np.zeros(-len(flat) % 4, dtype=np.float32)])
 
 
-def _plain(name: str) -> str:
+def _base_name(name: str) -> str:
     return name.removesuffix("[]")
 
 
 def _is_usable(gpu: Any) -> bool:
-    """Whether there is a graphics context, made here if Blender can make one without a window."""
+    """Return whether there is a graphics context. Without a window, create one if Blender can."""
     try:
         gpu.capabilities.max_texture_size_get()
     except SystemError:

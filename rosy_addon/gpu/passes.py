@@ -1,7 +1,7 @@
-"""The shaders, and what each of them reads and writes: all that a device has to be told.
+"""The shaders, with what each of them reads and writes.
 
-The sources stand beside this, in GLSL without declarations: these differ from one device to the
-next, and are made from what is listed here.
+The sources are GLSL files in the folder `glsl`, without declarations. Each device generates the
+declarations in its own form from the lists here.
 """
 
 from __future__ import annotations
@@ -9,389 +9,414 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-SOURCES = Path(__file__).with_name("glsl")
+from ..compositor.look import Look
+from ..settings import Number, settings_of
+from .defines import shader_defines
 
-#: Pixels of a work group, across and up.
-GROUP = (8, 8)
+SHADER_FOLDER = Path(__file__).with_name("glsl")
 
-#: Names and types of what a shader is told for one run.
-Constants = tuple[tuple[str, str], ...]
+#: Width and height of a work group, in pixels.
+WORKGROUP_SIZE = (8, 8)
 
-_CLIP: Constants = tuple((f"clip_{axis}", "vec4") for axis in "xyzw")
-_PLANES: Constants = tuple((f"plane{number}", "vec4") for number in range(6))
-_WINDOW: Constants = (("corner", "ivec2"),)
-_CAMERA: Constants = (("across", "vec4"), ("shift", "vec2"), ("perspective", "int"))
-_COVERING: Constants = (("degree", "int"), ("lines", "int"), ("around", "int"))
-_GUIDE: Constants = (("guiding_angle", "float"),)
+#: Names and GLSL types of the uniforms of a shader.
+Uniforms = tuple[tuple[str, str], ...]
+
+_CLIP_MATRIX: Uniforms = tuple((f"clip_{axis}", "vec4") for axis in "xyzw")
+_CLIP_PLANES: Uniforms = tuple((f"plane{number}", "vec4") for number in range(6))
+_BOX_ORIGIN: Uniforms = (("box_origin", "ivec2"),)
+_CAMERA: Uniforms = (("clip_to_camera", "vec4"), ("lens_shift", "vec2"), ("is_perspective", "int"))
+_INSTANCE: Uniforms = (
+    ("model_view_x", "vec4"),
+    ("model_view_y", "vec4"),
+    ("model_view_z", "vec4"),
+    ("instance_id", "float"),
+    ("texels_per_record", "int"),
+)
+_COVERING: Uniforms = (("degree", "int"), ("line_count", "int"), ("sheet_count", "int"))
+_GUIDING: Uniforms = (("guiding_angle", "float"),)
+
+#: Settings of a look that shaders read unchanged, as uniforms of the same names. Lengths are in
+#: pixels of the supersampled frame.
+LIC_SETTINGS = ("taper", "grain", "clear_paper", "layers", "layering", "breaks", "outline")
+TONE_SETTINGS = ("shading", "tone_lit")
+
+
+def setting_uniforms(names: tuple[str, ...]) -> Uniforms:
+    """Return the names and GLSL types of uniforms for settings of a look."""
+    settings = [settings_of(Look)[name] for name in names]
+    return tuple(
+        (
+            setting.name,
+            "float" if isinstance(setting, Number) and not setting.is_integer else "int",
+        )
+        for setting in settings
+    )
 
 
 @dataclass(frozen=True)
-class Compute:
-    """A shader over the pixels of an image.
+class ComputePass:
+    """A compute shader over the pixels of an image.
 
     Attributes
     ----------
     name : str
-        Of its source.
+        Of the source file.
     textures : tuple of str
-        What it reads; names that end in ``[]`` are arrays.
+        Textures that it reads. Names that end in ``[]`` are texture arrays.
     images : tuple of (str, str)
-        What it writes, and the format; names likewise.
-    constants : tuple of (str, str)
+        Images that it writes, with their formats. Names as those of textures.
+    uniforms : tuple of (str, str)
         Names and GLSL types.
+    includes : tuple of str
+        Names of source files that precede it, besides ``common``.
     """
 
     name: str
     textures: tuple[str, ...]
     images: tuple[tuple[str, str], ...]
-    constants: Constants
+    uniforms: Uniforms
+
+    includes: tuple[str, ...] = ()
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the source files, in their order."""
+        shared = [f"{name}.glsl" for name in ("common", *self.includes)]
+        return (*shared, f"{self.name}.comp.glsl")
 
     @property
     def source(self) -> str:
         """GLSL without declarations."""
-        parts = ["common.glsl", f"{self.name}.comp.glsl"]
-        if "triangles" in self.textures:
-            parts.insert(1, "triangle.glsl")
-        return "".join(map(_read, parts))
+        return shader_defines() + "".join(map(read_source, self.files))
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """A shader over the triangles of a surface.
+class RasterPass:
+    """A vertex and a fragment shader for the triangles of a mesh.
 
     Attributes
     ----------
     name : str
-        Of its sources.
+        Of the source files.
     textures : tuple of str
     varyings : tuple of (str, str)
-        From the vertices to the pixels: names and GLSL types.
-    target : str
-        What a pixel is given, a vec4.
-    constants : tuple of (str, str)
+        Names and GLSL types.
+    output : str
+        Name of the fragment's output, a vec4.
+    uniforms : tuple of (str, str)
     """
 
     name: str
     textures: tuple[str, ...]
-    varyings: Constants
-    target: str
-    constants: Constants
+    varyings: Uniforms
+    output: str
+    uniforms: Uniforms
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the source files."""
+        return "common.glsl", f"{self.name}.vert.glsl", f"{self.name}.frag.glsl"
 
     @property
     def vertex_source(self) -> str:
         """GLSL without declarations."""
-        return _read(f"{self.name}.vert.glsl")
+        return read_source(f"{self.name}.vert.glsl")
 
     @property
     def fragment_source(self) -> str:
         """GLSL without declarations."""
-        return _read("common.glsl") + _read(f"{self.name}.frag.glsl")
+        files = "common.glsl", f"{self.name}.frag.glsl"
+        return shader_defines() + "".join(map(read_source, files))
 
 
-def _read(name: str) -> str:
-    return (SOURCES / name).read_text(encoding="utf-8")
+def read_source(name: str) -> str:
+    """Return the text of a source file."""
+    return (SHADER_FOLDER / name).read_text(encoding="utf-8")
 
 
-_BEYOND: Constants = (("beyond", "vec4"), ("beyond_too", "vec2"))
+_CLIP_DISTANCES: Uniforms = (("clip_distances", "vec4"), ("more_clip_distances", "vec2"))
 
-SEEN = Drawing("seen", (), (("triangle", "float"),), "seen", (*_CLIP, ("body", "float")))
-
-#: As SEEN, where planes cut something away: looking at them takes a third of its time.
-SEEN_CUT = Drawing(
-    "seen_cut",
+VISIBILITY = RasterPass(
+    "visibility",
     (),
-    (("triangle", "float"), *_BEYOND),
-    "seen",
-    (*_CLIP, *_PLANES, ("body", "float")),
+    (("triangle_id", "float"),),
+    "visibility",
+    (*_CLIP_MATRIX, ("instance_id", "float")),
 )
 
-RESOLVE = Compute(
+#: `VISIBILITY` with clip planes, which take a third of its time.
+VISIBILITY_CLIPPED = RasterPass(
+    "visibility_clipped",
+    (),
+    (("triangle_id", "float"), *_CLIP_DISTANCES),
+    "visibility",
+    (*_CLIP_MATRIX, *_CLIP_PLANES, ("instance_id", "float")),
+)
+
+RESOLVE = ComputePass(
     "resolve",
-    ("seen", "triangles"),
+    ("visibility", "triangle_records"),
     (
         ("normals", "RGBA32F"),
-        ("values_seen", "RGBA32F"),
-        ("slopes", "RGBA32F"),
-        ("traits_seen[]", "RGBA32F"),
+        ("field_values", "RGBA32F"),
+        ("depth_slopes", "RGBA32F"),
+        ("field_channels[]", "RGBA32F"),
     ),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
         ("pixels_per_unit", "float"),
-        ("place_x", "vec4"),
-        ("place_y", "vec4"),
-        ("place_z", "vec4"),
-        ("scale", "float"),
-        ("body", "float"),
-        ("texels", "int"),
-        ("row_bits", "int"),
-        ("traits", "int"),
-        ("STEEPEST", "float"),
-        ("TOLERANCE", "float"),
-        ("OBLIQUE_TOLERANCE", "float"),
+        *_INSTANCE,
+        ("model_scale", "float"),
+        ("channel_count", "int"),
     ),
+    includes=("triangle_record",),
 )
 
-ANCHORED = Compute(
-    "anchored",
-    ("seen", "triangles"),
+SURFACE_NOISE = ComputePass(
+    "surface_noise",
+    ("visibility", "triangle_records"),
     (("raw_noise", "RGBA32F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
-        ("place_x", "vec4"),
-        ("place_y", "vec4"),
-        ("place_z", "vec4"),
-        ("body", "float"),
-        ("texels", "int"),
-        ("row_bits", "int"),
+        *_INSTANCE,
         ("lattice_x", "vec4"),
         ("lattice_y", "vec4"),
         ("lattice_z", "vec4"),
-        ("unit_of_pixel", "float"),
-        ("unit_of_cell", "float"),
-        ("least_growth", "float"),
+        ("pixel_size", "float"),
+        ("cell_size", "float"),
+        ("min_cell_scale", "float"),
         ("amplitude", "float"),
         ("density", "float"),
-        ("bright_below", "int"),
-        ("channels", "int"),
+        ("density_threshold", "int"),
+        ("noise_channels", "int"),
         ("seed", "int"),
-        ("identity", "int"),
-        ("LOWEST", "int"),
-        ("OCTAVES", "int"),
+        ("instance_hash", "int"),
     ),
+    includes=("triangle_record",),
 )
 
-WAVER = Compute(
-    "waver",
-    ("seen", "triangles", "waves"),
-    (("wavering", "RGBA32F"),),
+WOBBLE = ComputePass(
+    "wobble",
+    ("visibility", "triangle_records", "wave_table"),
+    (("wobble_angles", "RGBA32F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
-        ("place_x", "vec4"),
-        ("place_y", "vec4"),
-        ("place_z", "vec4"),
-        ("body", "float"),
-        ("texels", "int"),
-        ("row_bits", "int"),
+        *_INSTANCE,
         ("on_surface", "int"),
-        ("unit_of_pixel", "float"),
-        ("unit_of_cell", "float"),
-        ("least_growth", "float"),
-        ("wave_count", "int"),
-        ("evened", "float"),
+        ("pixel_size", "float"),
+        ("cell_size", "float"),
+        ("min_cell_scale", "float"),
     ),
+    includes=("triangle_record",),
 )
 
-SMOOTH = Compute(
-    "smooth", ("rough",), (("smoother", "RGBA32F"),), (("along", "ivec2"), ("reach", "int"))
+BOX_BLUR = ComputePass(
+    "box_blur",
+    ("source_image",),
+    (("blurred_image", "RGBA32F"),),
+    (("blur_axis", "ivec2"), ("radius", "int")),
 )
 
-SETTLE = Compute(
-    "settle",
-    ("raw_noise", "smooth_noise"),
+CENTER_NOISE = ComputePass(
+    "center_noise",
+    ("raw_noise", "blurred_noise"),
     (("noise", "RGBA32F"),),
     (("high_passed", "int"),),
 )
 
-FLOW = Compute(
-    "flow",
-    ("normals", "values_seen", "slopes", "traits_seen[]", "noise", "wavering"),
-    (("cells", "RGBA32F"), ("ways[]", "RGBA16F")),
+DIRECTIONS = ComputePass(
+    "directions",
+    ("normals", "field_values", "depth_slopes", "field_channels[]", "noise", "wobble_angles"),
+    (("cells", "RGBA32F"), ("directions[]", "RGBA16F")),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
         *_COVERING,
-        *_GUIDE,
-        ("to_pixels", "vec4"),
-        ("aligned", "float"),
+        *_GUIDING,
+        ("camera_to_pixels", "vec4"),
+        ("min_normal_cosine", "float"),
         ("foreshorten", "int"),
-        ("harmonics", "int"),
-        ("lowest", "int"),
-        ("wobble", "float"),
+        ("harmonic_count", "int"),
+        ("first_harmonic", "int"),
+        ("wobble_strength", "float"),
     ),
 )
 
-TURNING = Compute(
-    "turning",
-    ("cells", "ways[]"),
-    (("turning[]", "RGBA16F"),),
-    (*_WINDOW, *_COVERING[1:]),
+ANGLE_GRADIENT = ComputePass(
+    "angle_gradient",
+    ("cells", "directions[]"),
+    (("angle_gradients[]", "RGBA16F"),),
+    (*_BOX_ORIGIN, *_COVERING[1:]),
 )
 
-#: What a light sees.
-SHADOW = Drawing("shadow", (), (("away", "float"),), "nearest", (*_CLIP, ("ahead", "vec4")))
+#: The depth map of a light.
+SHADOW_MAP = RasterPass(
+    "shadow_map",
+    (),
+    (("light_depth", "float"),),
+    "shadow_depth",
+    (*_CLIP_MATRIX, ("depth_row", "vec4")),
+)
 
-REACH = Compute(
-    "reach",
-    ("normals", "shadow", "reach_before"),
-    (("reach", "RGBA16F"),),
+SHADOW_VISIBILITY = ComputePass(
+    "shadow_visibility",
+    ("normals", "shadow_map", "previous_visibility"),
+    (("shadow_visibility", "RGBA16F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
-        ("lamp_x", "vec4"),
-        ("lamp_y", "vec4"),
-        ("lamp_z", "vec4"),
-        ("lens_x", "vec4"),
-        ("lens_y", "vec4"),
-        ("lamp_perspective", "int"),
-        ("offset_of_pixel", "float"),
-        ("first_time", "int"),
-        ("WIDTH", "int"),
+        ("light_view_x", "vec4"),
+        ("light_view_y", "vec4"),
+        ("light_view_z", "vec4"),
+        ("light_projection_x", "vec4"),
+        ("light_projection_y", "vec4"),
+        ("light_is_perspective", "int"),
+        ("normal_bias", "float"),
+        ("is_first", "int"),
     ),
 )
 
-LIT = Compute(
-    "lit",
-    ("normals", "reach", "lit_before"),
-    (("lit", "RGBA32F"),),
+LIGHTING = ComputePass(
+    "lighting",
+    ("normals", "shadow_visibility", "previous_lighting"),
+    (("lighting", "RGBA32F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
-        ("source", "vec4"),
-        ("colour", "vec4"),
-        ("kind", "int"),
-        ("shadowed", "int"),
-        ("first_time", "int"),
+        ("light_vector", "vec4"),
+        ("light_color", "vec4"),
+        ("light_kind", "int"),
+        ("is_shadowed", "int"),
+        ("is_first", "int"),
     ),
 )
 
-TONE = Compute(
+TONE = ComputePass(
     "tone",
-    ("seen", "triangles", "normals", "lit", "shown"),
+    ("visibility", "triangle_records", "normals", "lighting", "tone_image"),
     (("tones", "RGBA32F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_CAMERA,
-        ("place_x", "vec4"),
-        ("place_y", "vec4"),
-        ("place_z", "vec4"),
-        ("body", "float"),
-        ("texels", "int"),
-        ("row_bits", "int"),
+        *_INSTANCE,
         ("pixels_per_unit", "float"),
-        ("shading", "float"),
-        ("origin_of_tone", "int"),
-        ("tone_bends_light", "int"),
-        ("tone_lit", "int"),
+        *setting_uniforms(TONE_SETTINGS),
+        ("tone_source", "int"),
+        ("curve_light", "int"),
         ("curve_black", "float"),
         ("curve_scale", "float"),
         ("curve_power", "float"),
         ("image_size", "ivec2"),
         ("image_level", "int"),
-        ("taken_x", "vec4"),
-        ("taken_y", "vec4"),
-        ("taken_w", "vec4"),
-        ("EDGEWISE", "float"),
+        ("to_reference_x", "vec4"),
+        ("to_reference_y", "vec4"),
+        ("to_reference_w", "vec4"),
     ),
+    includes=("triangle_record",),
 )
 
-WALK = Compute(
-    "walk",
+LIC = ComputePass(
+    "lic",
     (
         "cells",
-        "turning[]",
+        "angle_gradients[]",
         "tones",
-        "values_seen",
-        "slopes",
-        "traits_seen[]",
-        "largest",
-        "colours",
+        "field_values",
+        "depth_slopes",
+        "field_channels[]",
+        "max_magnitude",
+        "color_map",
         "palette",
-        "thresholds",
-        "inks",
-        "wavering",
-        "tooth",
+        "ink_thresholds",
+        "ink_table",
+        "wobble_angles",
+        "paper_grain",
     ),
     (("picture", "RGBA32F"),),
     (
-        *_WINDOW,
+        *_BOX_ORIGIN,
         *_COVERING,
-        *_GUIDE,
-        ("walk_length", "int"),
-        ("taper", "int"),
-        ("whole_samples", "float"),
+        *_GUIDING,
+        *setting_uniforms(LIC_SETTINGS),
+        ("half_length", "int"),
+        ("full_samples", "float"),
         ("step_length", "float"),
-        ("grain", "float"),
-        ("crossing", "float"),
+        ("crossing_correlation", "float"),
         ("gain", "float"),
-        ("channels", "int"),
-        ("families", "int"),
-        ("family_layer", "int"),
-        ("sharpness", "float"),
-        ("magnitude_drives", "int"),
-        ("largest_known", "float"),
-        ("paper_light", "vec4"),
+        ("noise_channels", "int"),
+        ("family_count", "int"),
+        ("family_channel", "int"),
+        ("hue_sharpness", "float"),
+        ("magnitude_mode", "int"),
+        ("magnitude_range", "float"),
+        ("paper_color", "vec4"),
         ("ink_count", "int"),
-        ("ink_turn", "float"),
-        ("ink_floor", "float"),
-        ("hatch", "int"),
-        ("light_ink", "int"),
-        ("clear_paper", "int"),
-        ("layers", "int"),
-        ("layering", "float"),
+        ("ink_mid_tone", "float"),
+        ("min_transmittance", "float"),
+        ("is_hatched", "int"),
+        ("is_light_ink", "int"),
         ("softness", "float"),
-        ("deviation", "float"),
-        ("breaks", "float"),
-        ("piece_length", "int"),
-        ("run_on", "int"),
-        ("outline", "float"),
-        ("IN_FRONT", "float"),
-        ("piece_samples", "float"),
-        ("piece_deviation", "float"),
-        ("wobble", "float"),
-        ("SWELL", "float"),
-        ("tooth_depth", "float"),
-        ("tooth_stretch", "int"),
-        ("teeth", "int"),
-        ("subpixels", "int"),
-        ("JOINING", "float"),
-        ("EARLY", "float"),
-        ("LEAST", "float"),
+        ("streak_std", "float"),
+        ("break_steps", "int"),
+        ("overshoot_steps", "int"),
+        ("break_samples", "float"),
+        ("break_std", "float"),
+        ("wobble_strength", "float"),
+        ("paper_grain_depth", "float"),
+        ("paper_grain_shift", "int"),
+        ("paper_grain_channels", "int"),
+        ("supersampling", "int"),
+        ("onset_range", "float"),
+        ("onset_lead", "float"),
     ),
+    includes=("lic_trace", "lic_inks", "lic_outline"),
 )
 
-LARGEST = Compute(
-    "largest",
-    ("magnitudes",),
+MAX_REDUCE = ComputePass(
+    "max_reduce",
+    ("source_values",),
     (("tiles", "RGBA32F"),),
-    (("degree", "int"), ("first_time", "int")),
+    (("degree", "int"), ("is_first", "int")),
 )
 
-AVERAGE = Compute("average", ("fine",), (("picture", "RGBA32F"),), (("side", "int"),))
+DOWNSAMPLE = ComputePass(
+    "downsample", ("fine_picture",), (("picture", "RGBA32F"),), (("block_side", "int"),)
+)
 
-SHOW = Drawing(
-    "show",
+COMPOSITE = RasterPass(
+    "composite",
     ("picture",),
-    _BEYOND,
-    "shown",
+    _CLIP_DISTANCES,
+    "view_color",
     (
-        *_CLIP,
-        *_PLANES,
-        ("nearer", "float"),
-        ("origin", "vec2"),
-        ("pixels", "vec2"),
+        *_CLIP_MATRIX,
+        *_CLIP_PLANES,
+        ("depth_bias", "float"),
+        ("view_origin", "vec2"),
+        ("pixel_scale", "vec2"),
         ("opacity", "float"),
     ),
 )
 
-ALL = (
-    SEEN,
-    SEEN_CUT,
+ALL_PASSES = (
+    VISIBILITY,
+    VISIBILITY_CLIPPED,
     RESOLVE,
-    ANCHORED,
-    WAVER,
-    SMOOTH,
-    SETTLE,
-    FLOW,
-    TURNING,
-    SHADOW,
-    REACH,
-    LIT,
+    SURFACE_NOISE,
+    WOBBLE,
+    BOX_BLUR,
+    CENTER_NOISE,
+    DIRECTIONS,
+    ANGLE_GRADIENT,
+    SHADOW_MAP,
+    SHADOW_VISIBILITY,
+    LIGHTING,
     TONE,
-    WALK,
-    LARGEST,
-    AVERAGE,
-    SHOW,
+    LIC,
+    MAX_REDUCE,
+    DOWNSAMPLE,
+    COMPOSITE,
 )

@@ -1,4 +1,4 @@
-"""A camera as two matrices and a frame of pixels."""
+"""Cameras: view and projection matrices, pixel rays, and cameras that frame given objects."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..field.frames import unit
+from ..field.frames import normalize
 from ..field.surface import Surface
 
-#: The longest side of a picture, in pixels.
-MAX_SIZE = 16384
+#: Largest width or height of a picture, in pixels.
+MAX_SIDE_PIXELS = 16384
 
-#: Blender's default camera: millimetres of focal length and of sensor width.
-DEFAULT_FOCAL, DEFAULT_SENSOR = 50.0, 36.0
+#: Focal length and sensor width of Blender's default camera, in millimeters.
+DEFAULT_FOCAL_LENGTH, DEFAULT_SENSOR_WIDTH = 50.0, 36.0
 
 
 def check_size(width: int, height: int) -> tuple[int, int]:
@@ -24,40 +24,43 @@ def check_size(width: int, height: int) -> tuple[int, int]:
     Raises
     ------
     RosyError
-        If a side is not a whole number of pixels from 1 to `MAX_SIZE`.
+        If a side is not a whole number of pixels from 1 to `MAX_SIDE_PIXELS`.
     """
     for side in (width, height):
-        if int(side) != side or not 1 <= side <= MAX_SIZE:
-            raise RosyError(f"size {width}x{height}: a side must be from 1 to {MAX_SIZE} pixels")
+        if int(side) != side or not 1 <= side <= MAX_SIDE_PIXELS:
+            raise RosyError(
+                f"size {width}x{height}: a side must be from 1 to {MAX_SIDE_PIXELS} pixels"
+            )
     return int(width), int(height)
 
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Where the eye is and how it sees.
+    """A camera: view matrix, projection matrix and picture size.
 
     Camera space is Blender's: x right, y up, looking down -z, in Blender units. Pixels are counted
-    from the lower left: pixel (column c, row r) has its centre at (c + 0.5, r + 0.5) and the flat
+    from the lower left: pixel (column c, row r) has its center at (c + 0.5, r + 0.5) and the flat
     index ``r * width + c``.
 
     Attributes
     ----------
     view : (4, 4) float64 ndarray
-        World to camera space, rigid.
+        World to camera space, a rotation and a translation.
     projection : (4, 4) float64 ndarray
-        Camera to clip space, OpenGL's convention: visible is -w <= x, y, z <= w. Perspective if
-        ``projection[3, 2]`` is not 0, orthographic otherwise. Kept scaled so that w is the depth
-        along the camera's axis, or 1.
+        Camera to clip space in OpenGL's convention: the visible range is -w <= x, y, z <= w. The
+        camera is perspective if ``projection[3, 2]`` is not 0, and orthographic otherwise. The
+        matrix is scaled on construction so that w is the depth along the camera axis (perspective)
+        or 1 (orthographic).
     width, height : int
         Size of the picture in pixels.
     name : str
-        For messages and for naming what is baked.
+        Used in messages and in the names of baked pictures.
 
     Raises
     ------
     RosyError
-        If a matrix is not finite, the camera is mirrored, the view scales or shears, or the
-        projection is neither perspective nor orthographic.
+        If the size is invalid, a matrix is not 4 x 4 or not finite, the camera is mirrored, the
+        view scales or shears, or the projection is neither perspective nor orthographic.
     """
 
     view: np.ndarray
@@ -70,92 +73,102 @@ class Camera:
         width, height = check_size(self.width, self.height)
         object.__setattr__(self, "width", width)
         object.__setattr__(self, "height", height)
-        object.__setattr__(self, "view", _checked_view(self.view, self.name))
-        object.__setattr__(self, "projection", _checked_projection(self.projection, self.name))
+        object.__setattr__(self, "view", _validated_view(self.view, self.name))
+        object.__setattr__(self, "projection", _validated_projection(self.projection, self.name))
 
     @property
     def is_perspective(self) -> bool:
-        """Whether rays meet in the eye."""
+        """Whether the camera is perspective, not orthographic."""
         return bool(self.projection[3, 2] != 0.0)
 
     @property
     def pixels_per_unit(self) -> float:
-        """Pixels that a Blender unit across the camera's axis takes, at depth 1 if perspective.
+        """Pixels per Blender unit, perpendicular to the camera axis; at depth 1 if perspective.
 
-        The geometric mean of both directions where pixels are not square.
+        If pixels are not square, the geometric mean of both directions.
         """
-        scale = _determinant(self.projection) * self.width * self.height / 4
+        scale = _xy_determinant(self.projection) * self.width * self.height / 4
         return float(np.sqrt(scale))
 
     @property
     def eye(self) -> np.ndarray:
-        """(3,) world space: where the rays of a perspective camera meet."""
+        """(3,) float64 position of a perspective camera in world space."""
         return -self.view[:3, :3].T @ self.view[:3, 3]
 
-    def toward(self, points: np.ndarray) -> np.ndarray:
-        """(..., 3) unit directions from points in world space to this camera."""
+    def view_directions(self, points: np.ndarray) -> np.ndarray:
+        """Return (..., 3) unit directions, in world space, from (..., 3) points to this camera.
+
+        All directions of an orthographic camera are equal.
+        """
         if not self.is_perspective:
             return np.broadcast_to(self.view[2, :3], points.shape)
-        return unit(self.eye - points)
+        return normalize(self.eye - points)
 
     def resized(self, width: int, height: int) -> Camera:
-        """The same camera with other pixels."""
+        """Return the same camera with another picture size in pixels."""
         return Camera(self.view, self.projection, width, height, self.name)
 
     def scaled(self, factor: int) -> Camera:
-        """The same camera with so many times the pixels each way."""
+        """Return the same camera with `factor` times the width and height in pixels."""
         return self.resized(self.width * factor, self.height * factor)
 
     @property
-    def across_axis(self) -> np.ndarray:
-        """(2, 2): x and y in clip space to x and y at depth 1, or at any if orthographic."""
-        # In closed form: linear algebra libraries wake all their threads for any system.
+    def clip_to_camera_xy(self) -> np.ndarray:
+        """(2, 2) inverse of the upper left part of the projection matrix.
+
+        Maps x and y of clip space, after the lens shift is removed, to x and y of camera space: at
+        depth 1 if perspective, at any depth if orthographic.
+        """
+        # In closed form, because linear algebra libraries start all their threads for any system.
         (a, b), (c, d) = self.projection[:2, :2]
-        return np.array([[d, -b], [-c, a]]) / _determinant(self.projection)
+        return np.array([[d, -b], [-c, a]]) / _xy_determinant(self.projection)
 
 
-def _determinant(projection: np.ndarray) -> float:
-    """Of how a projection maps x and y."""
+def _xy_determinant(projection: np.ndarray) -> float:
+    """Return the determinant of the part of a projection matrix that maps x and y."""
     (a, b), (c, d) = projection[:2, :2]
     return float(a * d - b * c)
 
 
-def _checked_matrix(matrix: np.ndarray, what: str, name: str) -> np.ndarray:
+def _validated_matrix(matrix: np.ndarray, matrix_kind: str, name: str) -> np.ndarray:
+    """Return a float64 copy of a matrix, or raise `RosyError` if it is not 4 x 4 and finite."""
     matrix = np.array(matrix, dtype=np.float64)
     if matrix.shape != (4, 4):
-        raise RosyError(f"camera '{name}': its {what} matrix is {matrix.shape}, not (4, 4)")
+        raise RosyError(f"camera '{name}': its {matrix_kind} matrix is {matrix.shape}, not (4, 4)")
     if not np.isfinite(matrix).all():
-        raise RosyError(f"camera '{name}': its {what} matrix is not finite")
+        raise RosyError(f"camera '{name}': its {matrix_kind} matrix is not finite")
     return matrix
 
 
-def _checked_view(view: np.ndarray, name: str) -> np.ndarray:
-    view = _checked_matrix(view, "view", name)
-    turn = view[:3, :3]
-    if np.cross(turn[0], turn[1]) @ turn[2] < 0:
+def _validated_view(view: np.ndarray, name: str) -> np.ndarray:
+    """Return the view matrix, or raise `RosyError` if it is not a rotation and a translation."""
+    view = _validated_matrix(view, "view", name)
+    rotation = view[:3, :3]
+    if np.cross(rotation[0], rotation[1]) @ rotation[2] < 0:
         raise RosyError(f"camera '{name}' is mirrored: one of its scales is negative")
-    rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
-    if not rigid or not np.allclose(view[3], (0, 0, 0, 1), atol=1e-6):
+    is_rigid = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3)
+    if not is_rigid or not np.allclose(view[3], (0, 0, 0, 1), atol=1e-6):
         raise RosyError(f"camera '{name}': its view matrix is not a rotation and a shift")
     return view
 
 
-def _checked_projection(projection: np.ndarray, name: str) -> np.ndarray:
-    projection = _checked_matrix(projection, "projection", name)
-    last, shift = projection[3], projection[:2]
-    if last[2] < 0 and not last[[0, 1, 3]].any() and not shift[:, 3].any():
-        projection = projection / -last[2]
-    elif last[3] > 0 and not last[:3].any() and not shift[:, 2].any():
-        projection = projection / last[3]
+def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
+    """Return the projection matrix, scaled as `Camera` states, or raise `RosyError`."""
+    projection = _validated_matrix(projection, "projection", name)
+    w_row, xy_rows = projection[3], projection[:2]
+    if w_row[2] < 0 and not w_row[[0, 1, 3]].any() and not xy_rows[:, 3].any():
+        projection = projection / -w_row[2]
+    elif w_row[3] > 0 and not w_row[:3].any() and not xy_rows[:, 2].any():
+        projection = projection / w_row[3]
     else:
         raise RosyError(f"camera '{name}' is neither perspective nor orthographic")
-    if _determinant(projection) <= 0:
+    if _xy_determinant(projection) <= 0:
         raise RosyError(f"camera '{name}' is mirrored or flat: its projection turns pictures over")
     return projection
 
 
 def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the rays through the centres of pixels meet the plane across the camera's axis.
+    """Return x and y of the rays through the centers of pixels, in camera space.
 
     Parameters
     ----------
@@ -166,20 +179,20 @@ def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarra
     Returns
     -------
     x, y : (P,) float64 ndarray
-        Camera space, at depth 1 (z = -1) for a perspective camera, at any depth for an
-        orthographic one.
+        For a perspective camera, the intersection with the plane at depth 1 (z = -1). For an
+        orthographic camera, the position of the ray, which is the same at any depth.
     """
     row, column = np.divmod(pixel, camera.width)
     projection = camera.projection
     shift = projection[:2, 2] if camera.is_perspective else -projection[:2, 3]
-    across = (2.0 / camera.width) * (column + 0.5) + (shift[0] - 1.0)
-    upward = (2.0 / camera.height) * (row + 0.5) + (shift[1] - 1.0)
-    inverse = camera.across_axis
-    if inverse[0, 1] == 0 and inverse[1, 0] == 0:
-        return inverse[0, 0] * across, inverse[1, 1] * upward
+    clip_x = (2.0 / camera.width) * (column + 0.5) + (shift[0] - 1.0)
+    clip_y = (2.0 / camera.height) * (row + 0.5) + (shift[1] - 1.0)
+    clip_to_camera = camera.clip_to_camera_xy
+    if clip_to_camera[0, 1] == 0 and clip_to_camera[1, 0] == 0:
+        return clip_to_camera[0, 0] * clip_x, clip_to_camera[1, 1] * clip_y
     return (
-        inverse[0, 0] * across + inverse[0, 1] * upward,
-        inverse[1, 0] * across + inverse[1, 1] * upward,
+        clip_to_camera[0, 0] * clip_x + clip_to_camera[0, 1] * clip_y,
+        clip_to_camera[1, 0] * clip_x + clip_to_camera[1, 1] * clip_y,
     )
 
 
@@ -189,13 +202,13 @@ def perspective_camera(
     height: int,
     *,
     fov: float | None = None,
-    focal: float = DEFAULT_FOCAL,
-    sensor: float = DEFAULT_SENSOR,
+    focal: float = DEFAULT_FOCAL_LENGTH,
+    sensor: float = DEFAULT_SENSOR_WIDTH,
     shift: tuple[float, float] = (0.0, 0.0),
     clip: tuple[float, float] = (0.1, 1000.0),
     name: str = "camera",
 ) -> Camera:
-    """A perspective camera with square pixels.
+    """Return a perspective camera with square pixels.
 
     Parameters
     ----------
@@ -204,14 +217,15 @@ def perspective_camera(
     width, height : int
         Pixels.
     fov : float, optional
-        Angle of view over the longer side of the picture, in radians. Instead of `focal`.
+        Angle of view over the longer side of the picture, in radians. Replaces `focal` and
+        `sensor`.
     focal, sensor : float
         Focal length, and the length of the sensor along the longer side of the picture (Blender's
         sensor fit "auto"), in the same unit.
     shift : (float, float)
         Blender's lens shift, in units of the longer side.
     clip : (float, float)
-        Nearest and farthest depth seen, in Blender units.
+        Depths of the near and the far plane, in Blender units.
     name : str
 
     Raises
@@ -223,20 +237,23 @@ def perspective_camera(
     if fov is not None:
         if not 0 < fov < np.pi:
             raise RosyError(f"camera '{name}': an angle of view of {fov} is not between 0 and pi")
-        half = np.tan(fov / 2)
+        tan_half_fov = np.tan(fov / 2)
     else:
         if not (focal > 0 and sensor > 0):
             raise RosyError(f"camera '{name}': focal length and sensor must be above 0")
-        half = sensor / (2 * focal)
+        tan_half_fov = sensor / (2 * focal)
     near, far = clip
     if not 0 < near < far:
         raise RosyError(f"camera '{name}': clip range {near} to {far} is not 0 < start < end")
-    longer = max(width, height)
+    longer_side = max(width, height)
     projection = np.zeros((4, 4))
-    projection[0, 0], projection[1, 1] = longer / (width * half), longer / (height * half)
+    projection[0, 0], projection[1, 1] = (
+        longer_side / (width * tan_half_fov),
+        longer_side / (height * tan_half_fov),
+    )
     projection[0, 2], projection[1, 2] = (
-        2 * shift[0] * longer / width,
-        2 * shift[1] * longer / height,
+        2 * shift[0] * longer_side / width,
+        2 * shift[1] * longer_side / height,
     )
     projection[2, 2], projection[2, 3] = (
         -(far + near) / (far - near),
@@ -256,7 +273,7 @@ def orthographic_camera(
     clip: tuple[float, float] = (0.1, 1000.0),
     name: str = "camera",
 ) -> Camera:
-    """An orthographic camera with square pixels.
+    """Return an orthographic camera with square pixels.
 
     Parameters
     ----------
@@ -267,7 +284,7 @@ def orthographic_camera(
     scale : float
         Blender units along the longer side of the picture (Blender's orthographic scale).
     shift, clip, name
-        As for `perspective_camera`; the clip range may begin behind the camera.
+        As for `perspective_camera`, but the clip range may start behind the camera.
 
     Raises
     ------
@@ -280,12 +297,15 @@ def orthographic_camera(
         raise RosyError(f"camera '{name}': an orthographic scale of {scale} is not above 0")
     if not near < far:
         raise RosyError(f"camera '{name}': clip range {near} to {far} is not start < end")
-    longer = max(width, height)
+    longer_side = max(width, height)
     projection = np.eye(4)
-    projection[0, 0], projection[1, 1] = 2 * longer / (width * scale), 2 * longer / (height * scale)
+    projection[0, 0], projection[1, 1] = (
+        2 * longer_side / (width * scale),
+        2 * longer_side / (height * scale),
+    )
     projection[0, 3], projection[1, 3] = (
-        -2 * shift[0] * longer / width,
-        -2 * shift[1] * longer / height,
+        -2 * shift[0] * longer_side / width,
+        -2 * shift[1] * longer_side / height,
     )
     projection[2, 2], projection[2, 3] = -2 / (far - near), -(far + near) / (far - near)
     return Camera(view, projection, width, height, name)
@@ -294,12 +314,19 @@ def orthographic_camera(
 def look_at(
     eye: Sequence[float], target: Sequence[float], up: Sequence[float] = (0, 0, 1)
 ) -> np.ndarray:
-    """(4, 4) float64 view matrix of an eye that looks at a target, `up` upright in the picture.
+    """Return the (4, 4) float64 view matrix of a camera at `eye` that looks at `target`.
+
+    Parameters
+    ----------
+    eye, target : sequence of 3 float
+        Points in world space.
+    up : sequence of 3 float
+        World direction that points up in the picture.
 
     Raises
     ------
     RosyError
-        If eye and target are one point, or the eye looks along `up`.
+        If `eye` and `target` are equal, or the camera looks along `up`.
     """
     eye, target, up = (np.asarray(point, dtype=np.float64) for point in (eye, target, up))
     back = eye - target
@@ -315,16 +342,17 @@ def look_at(
 def _view_from_axes(
     right: np.ndarray, up: np.ndarray, back: np.ndarray, eye: np.ndarray
 ) -> np.ndarray:
+    """Return the (4, 4) view matrix of a camera, given its unit axes and position, world space."""
     view = np.eye(4)
     view[:3, :3] = [right, up, back]
     view[:3, 3] = -view[:3, :3] @ eye
     return view
 
 
-def orbit_axes(azimuth: float, elevation: float) -> np.ndarray:
-    """(3, 3) rows right, up and back of a camera that looks from a direction given in degrees.
+def orbit_basis(azimuth: float, elevation: float) -> np.ndarray:
+    """Return (3, 3) rows right, up and back of a camera, given its direction in degrees.
 
-    z is up. Azimuth 0, elevation 0 looks along +y (Blender's front view), azimuth 90 along -x
+    World z is up. Azimuth 0, elevation 0 looks along +y (Blender's front view), azimuth 90 along -x
     (its right view), elevation 90 down along -z (its top view).
     """
     a, e = np.radians(azimuth), np.radians(elevation)
@@ -334,32 +362,32 @@ def orbit_axes(azimuth: float, elevation: float) -> np.ndarray:
 
 
 def orbit_camera(
-    bodies: Surface | np.ndarray | Sequence[Surface | np.ndarray],
+    targets: Surface | np.ndarray | Sequence[Surface | np.ndarray],
     azimuth: float,
     elevation: float,
     width: int,
     height: int,
     *,
     perspective: bool = True,
-    fov: float = 2 * np.arctan(DEFAULT_SENSOR / (2 * DEFAULT_FOCAL)),
+    fov: float = 2 * np.arctan(DEFAULT_SENSOR_WIDTH / (2 * DEFAULT_FOCAL_LENGTH)),
     margin: float = 0.04,
     name: str = "view",
 ) -> Camera:
-    """A camera that looks from a direction and has everything in its frame, as large as fits.
+    """Return a camera in a given direction that frames all targets, as large as possible.
 
     Parameters
     ----------
-    bodies : Surface, (V, 3) ndarray, or a sequence of them
+    targets : Surface, (V, 3) ndarray, or a sequence of them
         What to frame, in world space.
     azimuth, elevation : float
-        Degrees, see `orbit_axes`.
+        Degrees, see `orbit_basis`.
     width, height : int
         Pixels.
     perspective : bool
     fov : float
-        Angle of view over the longer side, radians.
+        Angle of view over the longer side, in radians. Only for perspective.
     margin : float
-        Share of the frame left free at each border.
+        Fraction of the frame that stays empty at each border.
     name : str
 
     Raises
@@ -369,55 +397,64 @@ def orbit_camera(
 
     Notes
     -----
-    A point at (u, v, w) along right, up and back is within the left and right borders of an eye at
-    (eu, ev, ew) if |u - eu| <= k (ew - w), with k the tangent of half the angle of view. Both are
-    linear in the eye, so the nearest eye follows from the largest k w + u and k w - u alone.
+    Let a point have the coordinates (u, v, w) along right, up and back, and the eye (eu, ev, ew).
+    The point is between the left and the right border if |u - eu| <= k (ew - w), where k is the
+    tangent of half the angle of view. These are two inequalities that are linear in the eye
+    position, so the nearest possible eye follows from the largest k w + u and the largest k w - u
+    over all points.
     """
     width, height = check_size(width, height)
     if not np.isfinite([azimuth, elevation]).all():
         raise RosyError(f"view {azimuth},{elevation}: azimuth and elevation must be finite degrees")
-    axes = orbit_axes(azimuth, elevation)
-    u, v, w = (_points(bodies) @ axes.T).T
-    longer = max(width, height)
-    free = 1 - 2 * margin
-    size = max(np.ptp(u), np.ptp(v), np.ptp(w)) or 1.0
+    basis = orbit_basis(azimuth, elevation)
+    u, v, w = (_framed_points(targets) @ basis.T).T
+    longer_side = max(width, height)
+    frame_fraction = 1 - 2 * margin
+    extent = max(np.ptp(u), np.ptp(v), np.ptp(w)) or 1.0
     if not perspective:
-        scale = max(np.ptp(u) * longer / width, np.ptp(v) * longer / height) / free or size
-        back = w.max() + size
-        eye = np.array([(u.min() + u.max()) / 2, (v.min() + v.max()) / 2, back]) @ axes
-        clip = (0.5 * size, back - w.min() + 0.5 * size)
-        view = _view_from_axes(*axes, eye)
+        scale = (
+            max(np.ptp(u) * longer_side / width, np.ptp(v) * longer_side / height) / frame_fraction
+            or extent
+        )
+        back = w.max() + extent
+        eye = np.array([(u.min() + u.max()) / 2, (v.min() + v.max()) / 2, back]) @ basis
+        clip = (0.5 * extent, back - w.min() + 0.5 * extent)
+        view = _view_from_axes(*basis, eye)
         return orthographic_camera(view, width, height, scale=scale, clip=clip, name=name)
-    half = np.tan(fov / 2) * free
-    centre, back = zip(
+    framing_slope = np.tan(fov / 2) * frame_fraction
+    center, back = zip(
         *(
-            _nearest_eye(along, w, half * side / longer)
-            for along, side in ((u, width), (v, height))
+            _framing_eye(coordinate, w, framing_slope * side / longer_side)
+            for coordinate, side in ((u, width), (v, height))
         ),
         strict=True,
     )
-    back = max(*back, w.max() + 1e-3 * size)
-    eye = np.array([*centre, back]) @ axes
-    clip = (0.5 * (back - w.max()), 2 * (back - w.min()) + size)
-    view = _view_from_axes(*axes, eye)
+    back = max(*back, w.max() + 1e-3 * extent)
+    eye = np.array([*center, back]) @ basis
+    clip = (0.5 * (back - w.max()), 2 * (back - w.min()) + extent)
+    view = _view_from_axes(*basis, eye)
     return perspective_camera(view, width, height, fov=fov, clip=clip, name=name)
 
 
-def _nearest_eye(along: np.ndarray, back: np.ndarray, slope: float) -> tuple[float, float]:
-    """Where, across and back, an eye stands that just sees all points between its two borders."""
-    upper, lower = (slope * back + along).max(), (slope * back - along).max()
+def _framing_eye(coordinate: np.ndarray, back: np.ndarray, slope: float) -> tuple[float, float]:
+    """Return the position, across and back, of the nearest eye that sees all points.
+
+    Solves one direction of `orbit_camera`. `coordinate` and `back` are the points' coordinates
+    across and back, `slope` is k.
+    """
+    upper, lower = (slope * back + coordinate).max(), (slope * back - coordinate).max()
     return (upper - lower) / 2, (upper + lower) / (2 * slope)
 
 
-def _points(bodies: Surface | np.ndarray | Sequence[Surface | np.ndarray]) -> np.ndarray:
-    """(V, 3) all vertices that some face uses; of plain arrays, all points."""
-    if isinstance(bodies, Surface) or (isinstance(bodies, np.ndarray) and bodies.ndim == 2):
-        bodies = [bodies]
+def _framed_points(targets: Surface | np.ndarray | Sequence[Surface | np.ndarray]) -> np.ndarray:
+    """Return the (V, 3) points to frame: vertices that a face uses, and all points of arrays."""
+    if isinstance(targets, Surface) or (isinstance(targets, np.ndarray) and targets.ndim == 2):
+        targets = [targets]
     points = [
-        body.vertices[np.unique(body.corner_vertex)]
-        if isinstance(body, Surface)
-        else np.asarray(body, dtype=np.float64).reshape(-1, 3)
-        for body in bodies
+        target.vertices[np.unique(target.corner_vertex)]
+        if isinstance(target, Surface)
+        else np.asarray(target, dtype=np.float64).reshape(-1, 3)
+        for target in targets
     ]
     if not sum(map(len, points)):
         raise RosyError("there is nothing to look at")

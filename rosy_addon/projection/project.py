@@ -1,8 +1,9 @@
-"""From bodies and a camera to the G-buffer: who is seen where, and the field there.
+"""Projection: compute the G-buffer from mesh instances and a camera.
 
-The field comes from the corners of triangles (`carried`) to the pixels, and from each pixel's
-tangent plane into the view plane. Both is done on the representation z = rho exp(i N t), so that
-nothing depends on which of the N members is stored.
+The rasterizer finds the visible pixels. The field is interpolated from the corners of the triangles
+(`corner_field`) to the pixels, and is transported from the tangent plane of each pixel to the view
+plane. Both steps work on the representation z = rho exp(i N t), so that the result does not depend
+on which of the N members is stored.
 """
 
 from __future__ import annotations
@@ -12,44 +13,66 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..cache import Cache
 from ..errors import NothingInViewError, RosyError
-from ..field.frames import carry_components, dot_components, transformed
+from ..field.frames import dot_components, transform_components, transport_components
 from ..field.representation import signed_power
-from ..memory import keep_freed_memory
-from ..progress import Progress, Work, drain, part
+from ..memory import raise_mmap_threshold
+from ..progress import Progress, Task, run_to_completion, subtask
 from .camera import Camera, pixel_rays
-from .carried import Carried, carrying, order_of
-from .gbuffer import Body, GBuffer
-from .raster import Fragments, rasterise
-from .steps import links, screen_axes
+from .corner_field import CornerField, cached_corner_field_task, rotation_order
+from .gbuffer import GBuffer, MeshInstance
+from .pixel_neighbors import neighbor_masks, screen_jacobians
+from .rasterizer import Fragments, rasterize
 
-__all__ = ["links", "project", "projecting", "screen_axes"]
+__all__ = ["neighbor_masks", "project", "project_task", "screen_jacobians"]
 
-#: Pixels that are worked on at once: bounds memory, and fits the caches.
-BLOCK = 1 << 14
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 14
 
-#: Radians by which directions may turn on the way over a triangle without being turned back.
-FLAT = 3e-4
+#: Largest holonomy over a triangle, in radians, that is neglected in the interpolation of values.
+HOLONOMY_EPS = 3e-4
 
+#: How a field is shown: averaged over smooth fans and interpolated, or constant on each face.
 DISPLAYS = ("smooth", "flat")
 
 
-def project(bodies: Sequence[Body], camera: Camera, display: str = "smooth") -> GBuffer:
-    """What a camera sees of RoSy surfaces; see `projecting`."""
-    return drain(projecting(bodies, camera, display))
+def project(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    display: str = "smooth",
+    cache: Cache | None = None,
+) -> GBuffer:
+    """Return the G-buffer of mesh instances as seen by a camera; see `project_task`.
+
+    Examples
+    --------
+    ::
+
+        camera = orbit_camera(surface, 30, 20, 640, 480)
+        gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    """
+    return run_to_completion(project_task(instances, camera, display, cache))
 
 
-def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") -> Work[GBuffer]:
-    """Find the visible pixels of all RoSy surfaces and the field's value at each.
+def project_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    display: str = "smooth",
+    cache: Cache | None = None,
+) -> Task[GBuffer]:
+    """Compute the G-buffer: the visible pixels of all surfaces with a field, and the field there.
 
     Parameters
     ----------
-    bodies : sequence of Body
-        Those without a field only hide others.
+    instances : sequence of MeshInstance
+        Instances without a field only hide others.
     camera : Camera
     display : {"smooth", "flat"}
-        Whether values and normals are averaged at the corners and interpolated, or each face is
-        shown as it is.
+        Average values and normals over smooth fans and interpolate them, or keep those of each
+        face.
+    cache : Cache, optional
+        Stores corner fields, which do not depend on the camera.
 
     Yields
     ------
@@ -58,309 +81,424 @@ def projecting(bodies: Sequence[Body], camera: Camera, display: str = "smooth") 
     Returns
     -------
     GBuffer
-        At least one pixel.
+        With at least one pixel.
 
     Raises
     ------
     RosyError
-        If no body has a field, a field does not fit its surface, a matrix is not finite, or no
-        RoSy surface is in view.
+        If `display` is unknown, no instance has a field, a field does not fit its surface or is not
+        finite, or a matrix is not finite.
+    NothingInViewError
+        If no surface with a field is visible.
     """
-    check_bodies(bodies, camera, display)
-    keep_freed_memory()
+    check_instances(instances, camera, display)
+    raise_mmap_threshold()
     yield Progress(0.0, "finding what is seen")
-    seen = _seen(bodies, camera)
+    visible = _visible_pixels(instances, camera)
     yield Progress(0.3, "finding what is seen")
-    buffer = _empty_buffer(bodies, camera, seen)
-    count = len(buffer.pixel)
-    done = 0
-    for number in seen.numbers:
-        pixels = slice(0, count) if seen.alone else np.flatnonzero(seen.body == number)
-        own = seen.triangle[pixels]
-        start, middle, stop = (
-            0.4 + 0.6 * share / count for share in (done, done + 0.5 * len(own), done + len(own))
+    gbuffer = _allocate_gbuffer(instances, camera, visible)
+    count = len(gbuffer.pixel)
+    pixels_done = 0
+    for instance_id in visible.visible_ids:
+        pixels = (
+            slice(0, count)
+            if visible.is_single_instance
+            else np.flatnonzero(visible.instance_id == instance_id)
         )
-        carried = yield from part(_carried(bodies[number], display), start, middle)
-        carried = carried.turned(camera.view[:3, :3])
-        _make_room(buffer, carried)
-        for first in range(0, len(own), BLOCK):
-            yield Progress(
-                middle + (stop - middle) * first / len(own), "turning the field into the view"
+        triangle = visible.triangle[pixels]
+        instance = instances[instance_id]
+        start, middle, stop = (
+            0.4 + 0.6 * share / count
+            for share in (
+                pixels_done,
+                pixels_done + 0.5 * len(triangle),
+                pixels_done + len(triangle),
             )
-            block = slice(first, first + BLOCK)
-            where = block if seen.alone else pixels[block]
-            _fill(buffer, where, own[block], carried, bodies[number].field.degree)
-        done += len(own)
-    return buffer
+        )
+        corner_field = yield from subtask(
+            cached_corner_field_task(
+                instance.surface, instance.matrix, instance.field, display, cache
+            ),
+            start,
+            middle,
+        )
+        corner_field = corner_field.rotated(camera.view[:3, :3])
+        _allocate_channels(gbuffer, corner_field)
+        for block_start in range(0, len(triangle), BLOCK_PIXELS):
+            yield Progress(
+                middle + (stop - middle) * block_start / len(triangle),
+                "turning the field into the view",
+            )
+            block = slice(block_start, block_start + BLOCK_PIXELS)
+            target_pixels = block if visible.is_single_instance else pixels[block]
+            _fill_pixels(
+                gbuffer,
+                target_pixels,
+                triangle[block],
+                corner_field,
+                instance.field.degree,
+            )
+        pixels_done += len(triangle)
+    return gbuffer
 
 
-def check_bodies(bodies: Sequence[Body], camera: Camera, display: str) -> None:
-    """Refuse what cannot be drawn.
+def cached_project_task(
+    instances: Sequence[MeshInstance], camera: Camera, display: str, cache: Cache
+) -> Task[GBuffer]:
+    """Do the same as `project_task`, with the G-buffer stored in a cache.
+
+    It is found again for the same instances (by identity), the same camera (by value) and display.
+    """
+    camera_key = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
+    return (
+        yield from cache.get_or_create_task(
+            ("G-buffer", tuple(instances), camera_key, camera.name, display),
+            lambda: project_task(instances, camera, display, cache),
+        )
+    )
+
+
+def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: str) -> None:
+    """Check that mesh instances can be projected.
 
     Raises
     ------
     RosyError
-        If no body has a field, a field does not fit its surface, or a matrix is not finite.
+        If `display` is unknown, no instance has a field, a field does not fit its surface or is not
+        finite, or a matrix is not finite.
     """
     if display not in DISPLAYS:
         raise RosyError(f"display is {display!r}, not one of {', '.join(DISPLAYS)}")
-    if all(body.field is None for body in bodies):
+    if all(instance.field is None for instance in instances):
         raise RosyError(f"there is no RoSy object for camera '{camera.name}' to see")
-    for body in bodies:
-        name = body.surface.name
-        if np.shape(body.matrix) != (4, 4) or not np.isfinite(body.matrix).all():
+    for instance in instances:
+        name = instance.surface.name
+        if np.shape(instance.matrix) != (4, 4) or not np.isfinite(instance.matrix).all():
             raise RosyError(f"{name}: its matrix is not 4 x 4 finite numbers")
-        if body.field is None:
+        if instance.field is None:
             continue
-        found, wanted = len(body.field.vectors), body.surface.face_count
-        if found != wanted:
-            raise RosyError(f"{name}: its field has {found} vectors for {wanted} faces")
-        if not np.isfinite(body.field.vectors).all():
-            face = int(np.argmin(np.isfinite(body.field.vectors).all(axis=1)))
+        vector_count, face_count = len(instance.field.vectors), instance.surface.face_count
+        if vector_count != face_count:
+            raise RosyError(f"{name}: its field has {vector_count} vectors for {face_count} faces")
+        if not np.isfinite(instance.field.vectors).all():
+            face = int(np.argmin(np.isfinite(instance.field.vectors).all(axis=1)))
             raise RosyError(f"{name}: its field is not finite on face {face}")
-
-
-def _carried(body: Body, display: str) -> Work[Carried]:
-    """The field at the corners of a body's triangles, found once for all cameras."""
-    if display not in body.carried:
-        made = yield from carrying(body.surface, body.matrix, body.field, display)
-        body.carried[display] = made
-    return body.carried[display]
 
 
 # --- visibility --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """RoSy pixels, and for each its body and the body's own triangle; the numbers of the bodies."""
+class _VisiblePixels:
+    """The P visible pixels of instances with a field.
+
+    Attributes
+    ----------
+    fragments : Fragments
+        Its triangles are indices into the triangles of all instances together.
+    instance_id : (P,) int32 ndarray
+        Index of the visible instance.
+    triangle : (P,) int32 ndarray
+        Index of the visible triangle within its instance.
+    visible_ids : list of int
+        Instances that have at least one pixel, in ascending order.
+    """
 
     fragments: Fragments
-    body: np.ndarray
+    instance_id: np.ndarray
     triangle: np.ndarray
-    numbers: list[int]
+    visible_ids: list[int]
 
     @property
-    def alone(self) -> bool:
-        """Whether all pixels are of one body."""
-        return len(self.numbers) == 1
+    def is_single_instance(self) -> bool:
+        """Whether all pixels show the same instance."""
+        return len(self.visible_ids) == 1
 
 
-def _seen(bodies: Sequence[Body], camera: Camera) -> _Seen:
-    """The pixels at which a body with a field is nearest.
+def _visible_pixels(instances: Sequence[MeshInstance], camera: Camera) -> _VisiblePixels:
+    """Find the pixels where the nearest surface has a field.
 
     Raises
     ------
     NothingInViewError
-        If there are none.
+        If there is none.
     """
-    fragments, first = rasterised(bodies, camera)
-    if len(bodies) == 1:
+    fragments, first_triangle = rasterize_instances(instances, camera)
+    if len(instances) == 1:
         if not len(fragments.pixel):
-            raise_nothing_in_view(bodies, camera)
-        return _Seen(fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0])
-    with_field = np.array([body.field is not None for body in bodies])
-    body = (np.searchsorted(first, fragments.triangle, side="right") - 1).astype(np.int32)
-    rosy = with_field[body]
-    if not rosy.any():
-        raise_nothing_in_view(bodies, camera)
-    if not rosy.all():
-        kept = np.flatnonzero(rosy)
-        fragments, body = Fragments(*(values[kept] for values in fragments)), body[kept]
-    numbers = np.flatnonzero(np.bincount(body)).tolist()
-    return _Seen(fragments, body, fragments.triangle - first[body], numbers)
-
-
-def rasterised(bodies: Sequence[Body], camera: Camera) -> tuple[Fragments, np.ndarray]:
-    """All bodies at once, and (B,) int32 the first triangle of each in the fragments' count."""
-    clip = np.concatenate([_on_clip(body, camera) for body in bodies], axis=1)
-    triangles, offset = [], 0
-    for body in bodies:
-        triangles.append(body.surface.triangle_vertex + np.int32(offset))
-        offset += len(body.surface.vertices)
-    first = np.cumsum([0, *map(len, triangles[:-1])]).astype(np.int32)
-    return rasterise(clip.T, np.concatenate(triangles), camera.width, camera.height), first
-
-
-def _on_clip(body: Body, camera: Camera) -> np.ndarray:
-    """(4, V) vertices in clip space."""
-    matrix = camera.projection @ camera.view @ np.asarray(body.matrix, dtype=np.float64)
-    return transformed(np.ascontiguousarray(body.surface.vertices.T), matrix[:, :3], matrix[:, 3])
-
-
-def raise_nothing_in_view(bodies: Sequence[Body], camera: Camera) -> None:
-    """Say of bodies of which a camera sees no field why it does not.
-
-    Raises
-    ------
-    NothingInViewError
-    """
-    shown = [body for body in bodies if body.field is not None]
-    fragments, _ = rasterised(shown, camera)
-    names = ", ".join(body.surface.name for body in shown)
-    why = "hidden behind other objects" if len(fragments.pixel) else "outside the frame"
-    raise NothingInViewError(
-        f"no RoSy object is in view of camera '{camera.name}': {names} is {why}"
+            raise_nothing_in_view(instances, camera)
+        return _VisiblePixels(
+            fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
+        )
+    instance_has_field = np.array([instance.field is not None for instance in instances])
+    instance_id = (np.searchsorted(first_triangle, fragments.triangle, side="right") - 1).astype(
+        np.int32
+    )
+    has_field = instance_has_field[instance_id]
+    if not has_field.any():
+        raise_nothing_in_view(instances, camera)
+    if not has_field.all():
+        field_pixels = np.flatnonzero(has_field)
+        fragments, instance_id = (
+            Fragments(*(values[field_pixels] for values in fragments)),
+            instance_id[field_pixels],
+        )
+    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
+    return _VisiblePixels(
+        fragments, instance_id, fragments.triangle - first_triangle[instance_id], visible_ids
     )
 
 
-def _empty_buffer(bodies: Sequence[Body], camera: Camera, seen: _Seen) -> GBuffer:
-    """A G-buffer in which normals and the representation are yet to be filled in."""
-    count = len(seen.body)
-    fragments = seen.fragments
+def rasterize_instances(
+    instances: Sequence[MeshInstance], camera: Camera
+) -> tuple[Fragments, np.ndarray]:
+    """Rasterize all mesh instances together.
+
+    Returns
+    -------
+    fragments : Fragments
+        Triangles are counted over all instances, in their order.
+    first_triangle : (B,) int32 ndarray
+        Index of the first triangle of each of the B instances in this count.
+    """
+    clip = np.concatenate([_to_clip_space(instance, camera) for instance in instances], axis=1)
+    triangles, vertex_offset = [], 0
+    for instance in instances:
+        triangles.append(instance.surface.triangle_vertex + np.int32(vertex_offset))
+        vertex_offset += len(instance.surface.vertices)
+    first_triangle = np.cumsum([0, *map(len, triangles[:-1])]).astype(np.int32)
+    return rasterize(clip.T, np.concatenate(triangles), camera.width, camera.height), first_triangle
+
+
+def _to_clip_space(instance: MeshInstance, camera: Camera) -> np.ndarray:
+    """Return the (4, V) float64 vertices of an instance in clip space."""
+    matrix = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+    return transform_components(
+        np.ascontiguousarray(instance.surface.vertices.T), matrix[:, :3], matrix[:, 3]
+    )
+
+
+def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> None:
+    """Raise the error for a camera that sees no surface with a field.
+
+    Raises
+    ------
+    NothingInViewError
+        Always. The message says whether the surfaces are hidden or outside the frame.
+    """
+    field_instances = [instance for instance in instances if instance.field is not None]
+    fragments, _ = rasterize_instances(field_instances, camera)
+    names = ", ".join(instance.surface.name for instance in field_instances)
+    reason = "hidden behind other objects" if len(fragments.pixel) else "outside the frame"
+    raise NothingInViewError(
+        f"no RoSy object is in view of camera '{camera.name}': {names} is {reason}"
+    )
+
+
+def _allocate_gbuffer(
+    instances: Sequence[MeshInstance], camera: Camera, visible: _VisiblePixels
+) -> GBuffer:
+    """Return a G-buffer whose normals and representation are not yet initialized."""
+    count = len(visible.instance_id)
+    fragments = visible.fragments
     face = np.empty(count, dtype=np.int32)
-    for number in seen.numbers:
-        pixels = slice(None) if seen.alone else np.flatnonzero(seen.body == number)
-        face[pixels] = bodies[number].surface.triangle_face.take(seen.triangle[pixels])
-    position, toward_eye = _vectors(count), _vectors(count)
-    for start in range(0, count, BLOCK):
-        part = slice(start, start + BLOCK)
-        x, y = pixel_rays(camera, fragments.pixel[part])
-        position[part, 2] = _z_at_depth(camera, x, y, fragments.depth[part])
+    for instance_id in visible.visible_ids:
+        pixels = (
+            slice(None)
+            if visible.is_single_instance
+            else np.flatnonzero(visible.instance_id == instance_id)
+        )
+        face[pixels] = instances[instance_id].surface.triangle_face.take(visible.triangle[pixels])
+    position, view_direction = _empty_vectors(count), _empty_vectors(count)
+    for start in range(0, count, BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
+        x, y = pixel_rays(camera, fragments.pixel[block])
+        position[block, 2] = _z_at_depth(camera, x, y, fragments.depth[block])
         if camera.is_perspective:
-            inverse = 1 / np.sqrt(x * x + y * y + 1)
-            toward_eye[part, 0], toward_eye[part, 1] = -x * inverse, -y * inverse
-            toward_eye[part, 2] = inverse
-            x *= -position[part, 2]
-            y *= -position[part, 2]
-        position[part, 0], position[part, 1] = x, y
+            inverse_length = 1 / np.sqrt(x * x + y * y + 1)
+            view_direction[block, 0], view_direction[block, 1] = (
+                -x * inverse_length,
+                -y * inverse_length,
+            )
+            view_direction[block, 2] = inverse_length
+            x *= -position[block, 2]
+            y *= -position[block, 2]
+        position[block, 0], position[block, 1] = x, y
     if not camera.is_perspective:
-        toward_eye[:] = (0.0, 0.0, 1.0)
+        view_direction[:] = (0.0, 0.0, 1.0)
     return GBuffer(
         camera=camera,
-        names=tuple(body.surface.name for body in bodies),
-        degrees=tuple(body.field.degree if body.field else 0 for body in bodies),
+        instance_names=tuple(instance.surface.name for instance in instances),
+        instance_degrees=tuple(
+            instance.field.degree if instance.field else 0 for instance in instances
+        ),
         pixel=fragments.pixel,
-        body=seen.body,
+        instance_id=visible.instance_id,
         face=face,
-        triangle=seen.triangle,
+        triangle=visible.triangle,
         barycentric=fragments.barycentric,
         position=position,
-        normal=_vectors(count),
-        toward_eye=toward_eye,
+        normal=_empty_vectors(count),
+        view_direction=view_direction,
         representation=np.empty(count, dtype=np.complex64),
-        plane_normal=_vectors(count),
-        front=fragments.front,
-        bodies=tuple(bodies),
+        geometric_normal=_empty_vectors(count),
+        front_facing=fragments.front_facing,
+        instances=tuple(instances),
     )
 
 
 def _z_at_depth(camera: Camera, x: np.ndarray, y: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """z in camera space of points on `pixel_rays` at z / w in clip space."""
-    along_x, along_y, along_z, base = camera.projection[2]
+    """Return z in camera space of points on pixel rays, given their depth z / w in clip space.
+
+    `x` and `y` are the rays from `pixel_rays`.
+    """
+    m_x, m_y, m_z, m_w = camera.projection[2]
     if camera.is_perspective:
-        # (-along_x x - along_y y + along_z) z + base = -z depth
-        return -base / (depth + (along_z - along_x * x - along_y * y))
-    return (depth - base - along_x * x - along_y * y) / along_z
+        # Solves (-m_x x - m_y y + m_z) z + m_w = -z depth for z.
+        return -m_w / (depth + (m_z - m_x * x - m_y * y))
+    return (depth - m_w - m_x * x - m_y * y) / m_z
 
 
-def _vectors(count: int) -> np.ndarray:
-    """(P, 3) float32, each component of all pixels in a row: what is done here is done by them."""
+def _empty_vectors(count: int) -> np.ndarray:
+    """Return an uninitialized (P, 3) float32 array, with each component contiguous in memory."""
     return np.empty((3, count), dtype=np.float32).T
 
 
 # --- pixels --------------------------------------------------------------------------------------
 
 
-def _make_room(buffer: GBuffer, carried: Carried) -> None:
-    """Room for the traits of a body; elsewhere they are those of a RoSy."""
-    for trait in carried.traits:
-        if trait not in buffer.traits:
-            usual = 1 if trait == ("deviation", 0) else 0
-            buffer.traits[trait] = np.full(len(buffer.pixel), usual, dtype=np.complex64)
+def _allocate_channels(gbuffer: GBuffer, corner_field: CornerField) -> None:
+    """Add the channels of an instance to the G-buffer, with the values of a plain RoSy field."""
+    for channel in corner_field.channels:
+        if channel not in gbuffer.channels:
+            default = 1 if channel == ("deviation", 0) else 0
+            gbuffer.channels[channel] = np.full(len(gbuffer.pixel), default, dtype=np.complex64)
 
 
-def _fill(
-    buffer: GBuffer,
+def _fill_pixels(
+    gbuffer: GBuffer,
     pixels: slice | np.ndarray,
-    shown: np.ndarray,
-    values: Carried,
+    triangle: np.ndarray,
+    corner_field: CornerField,
     degree: int,
 ) -> None:
-    """Write normals and the representation at some pixels of one body.
+    """Write the normals, the representation and the channels at some pixels of one instance.
 
-    `shown` says for each which triangle it sees.
+    `triangle` holds the visible triangle of each of these pixels. `corner_field` must be in camera
+    space.
     """
-    shown = shown.astype(np.intp)
-    weights = buffer.barycentric[pixels].T
-    toward_eye = buffer.toward_eye[pixels].T
-    front = buffer.front[pixels]
-    plane_normal = values.plane_normal.take(shown, axis=1)
-    corners = [[component.take(shown) for component in corner] for corner in values.normal]
-    normal, size = _interpolated_normal(corners, weights)
-    if not size.all():
-        lost = size == 0
-        normal[:, lost] = plane_normal[:, lost]
-    more = [
-        (buffer.traits[trait], z, order_of(trait, degree)) for trait, z in values.traits.items()
+    triangle = triangle.astype(np.intp)
+    weights = gbuffer.barycentric[pixels].T
+    view_direction = gbuffer.view_direction[pixels].T
+    front_facing = gbuffer.front_facing[pixels]
+    geometric_normal = corner_field.geometric_normal.take(triangle, axis=1)
+    corners = [
+        [component.take(triangle) for component in corner] for corner in corner_field.corner_normals
     ]
-    axis = carry_components(values.axis.take(shown, axis=1), corners[0], normal)
-    if not front.all():
-        np.negative(normal, out=normal, where=~front)
-        np.negative(plane_normal, out=plane_normal, where=~front)
-    turn = _turn_into_view(axis, normal, toward_eye)
-    for out, given, order in [(buffer.representation, values.z, degree), *more]:
-        z = _interpolated_values(values, given, shown, weights, size, order)
-        if not front.all():
-            # The members stay where they are in space; seen from behind, angles run the other way.
-            np.conjugate(z, out=z, where=~front)
-        z *= signed_power(turn, order)
+    normal, length = _interpolated_normal(corners, weights)
+    if not length.all():
+        degenerate = length == 0
+        normal[:, degenerate] = geometric_normal[:, degenerate]
+    extra_outputs = [
+        (gbuffer.channels[channel], z, rotation_order(channel, degree))
+        for channel, z in corner_field.channels.items()
+    ]
+    tangent = transport_components(
+        corner_field.reference_tangent.take(triangle, axis=1), corners[0], normal
+    )
+    if not front_facing.all():
+        np.negative(normal, out=normal, where=~front_facing)
+        np.negative(geometric_normal, out=geometric_normal, where=~front_facing)
+    rotation = _view_plane_rotation(tangent, normal, view_direction)
+    for out, corner_values, order in [
+        (gbuffer.representation, corner_field.representation, degree),
+        *extra_outputs,
+    ]:
+        z = _interpolated_values(corner_field, corner_values, triangle, weights, length, order)
+        if not front_facing.all():
+            # Members keep their direction in space. Seen from behind, angles have the other sign.
+            np.conjugate(z, out=z, where=~front_facing)
+        z *= signed_power(rotation, order)
         out[pixels] = z
-    buffer.normal[pixels] = normal.T
-    buffer.plane_normal[pixels] = plane_normal.T
+    gbuffer.normal[pixels] = normal.T
+    gbuffer.geometric_normal[pixels] = geometric_normal.T
 
 
 def _interpolated_normal(
     corners: Sequence[Sequence[np.ndarray]], weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(3, P) unit n along m = sum b_i n_i, and (P,) the length of m; both 0 where lost."""
+    """Return (3, P) the unit vector along m = sum b_i n_i, and (P,) the length of m.
+
+    b_i are the barycentric `weights`, n_i the corner normals. Both results are 0 where the length
+    is below 1e-6.
+    """
     normal = np.empty_like(weights)
     for component, out in enumerate(normal):
         np.multiply(weights[0], corners[0][component], out=out)
         out += weights[1] * corners[1][component]
         out += weights[2] * corners[2][component]
-    size = np.sqrt(dot_components(normal, normal))
-    size[size < 1e-6] = np.inf
-    normal *= 1 / size
-    size[np.isinf(size)] = 0
-    return normal, size
+    length = np.sqrt(dot_components(normal, normal))
+    length[length < 1e-6] = np.inf
+    normal *= 1 / length
+    length[np.isinf(length)] = 0
+    return normal, length
 
 
 def _interpolated_values(
-    values: Carried,
-    corners: np.ndarray,
-    shown: np.ndarray,
+    corner_field: CornerField,
+    corner_values: np.ndarray,
+    triangle: np.ndarray,
     weights: np.ndarray,
-    size: np.ndarray,
+    length: np.ndarray,
     order: int,
 ) -> np.ndarray:
-    """(P,) z at the interpolated normal n, relative to `values.axis` carried from n_0 to n.
+    """Interpolate corner values at pixels, with transport along the arc from each corner normal.
 
-    Of the (3, T) values at corners, which turn with the frame to the power `order`.
+    Parameters
+    ----------
+    corner_field : CornerField
+    corner_values : (3, T) complex64 ndarray
+        Its representation, or one of its channels.
+    triangle : (P,) ndarray of int
+    weights : (3, P) float32 ndarray
+        Barycentric coordinates b_i.
+    length : (P,) float32 ndarray
+        Length of sum b_i n_i, from `_interpolated_normal`.
+    order : int
+        Power by which the values rotate with the frame (see `corner_field.rotation_order`).
 
-    Each corner's value is to come along the arc n_i -> n, so that pixels on an edge depend on its
-    two ends alone and values are continuous from triangle to triangle. It has come along
-    n_i -> n_0 -> n; the two ways differ by the rotation through the signed area A of the spherical
-    triangle (n_0, n_i, n), and
+    Returns
+    -------
+    (P,) complex64 ndarray
+        Relative to `corner_field.reference_tangent` after transport from n_0 to the interpolated
+        normal n.
+
+    Notes
+    -----
+    Each corner value has to be transported along the arc n_i -> n. Then values at an edge depend
+    only on its two ends, and are continuous across edges. The stored values were transported along
+    n_i -> n_0, and continue along n_0 -> n. The two paths differ by the rotation by the signed area
+    A of the spherical triangle (n_0, n_i, n), and
 
         exp(i A / 2) ~ 1 + n_0.n_i + n_i.n + n.n_0 + i n_0 . (n_i x n)
 
-    (Van Oosterom and Strackee 1983), in which all products follow from those of the corners, as
-    n is a combination of them. The triangle lies in that of the corners, whose area is about half
-    of their triple product.
+    up to a positive factor (Van Oosterom and Strackee, "The Solid Angle of a Plane Triangle",
+    1983). All products follow from those of the corner normals, because n is a combination of
+    these. The spherical triangle is part of the triangle of the corner normals, whose area is about
+    half of their triple product. If that area is small everywhere, the correction is skipped.
     """
     b0, b1, b2 = weights
-    z0, z1, z2 = (corner.take(shown) for corner in corners)
-    volume = values.volume.take(shown)
-    if np.abs(volume).max(initial=0) < 2 * FLAT:
+    z0, z1, z2 = (corner.take(triangle) for corner in corner_values)
+    triple_product = corner_field.normal_triple_product.take(triangle)
+    if np.abs(triple_product).max(initial=0) < 2 * HOLONOMY_EPS:
         return z0 * b0 + z1 * b1 + z2 * b2
-    d01, d02, d12 = (products.take(shown) for products in values.dots)
+    d01, d02, d12 = (products.take(triangle) for products in corner_field.normal_dots)
     n0 = b0 + b1 * d01 + b2 * d02
     half1, half2 = np.empty_like(z0), np.empty_like(z0)
-    half1.real = size * (1 + d01) + n0 + (b0 * d01 + b1 + b2 * d12)
-    half1.imag = b2 * volume
-    half2.real = size * (1 + d02) + n0 + (b0 * d02 + b1 * d12 + b2)
-    half2.imag = -b1 * volume
+    half1.real = length * (1 + d01) + n0 + (b0 * d01 + b1 + b2 * d12)
+    half1.imag = b2 * triple_product
+    half2.real = length * (1 + d02) + n0 + (b0 * d02 + b1 * d12 + b2)
+    half2.imag = -b1 * triple_product
     z1 *= signed_power(_squared_phase(half1), order)
     z2 *= signed_power(_squared_phase(half2), order)
     z0 *= b0
@@ -372,26 +510,32 @@ def _interpolated_values(
 
 
 def _squared_phase(half: np.ndarray) -> np.ndarray:
-    """half^2 / |half|^2, and 0 for 0."""
-    square = half.real * half.real
-    square += half.imag * half.imag
-    np.maximum(square, np.float32(1e-30), out=square)
+    """Return half^2 / |half|^2, the phase of the square; 0 for 0."""
+    squared_modulus = half.real * half.real
+    squared_modulus += half.imag * half.imag
+    np.maximum(squared_modulus, np.float32(1e-30), out=squared_modulus)
     half = half * half
-    half *= 1 / square
+    half *= 1 / squared_modulus
     return half
 
 
-def _turn_into_view(
-    axis: Sequence[np.ndarray], normal: np.ndarray, toward_eye: np.ndarray
+def _view_plane_rotation(
+    tangent: Sequence[np.ndarray], normal: np.ndarray, view_direction: np.ndarray
 ) -> np.ndarray:
-    """(P,) complex direction, in the view frame, of tangents rotated into the view plane."""
-    x, y, z = carry_components(axis, normal, toward_eye)
-    # In coordinates of `view_frame`: the minimal rotation back from `toward_eye` to (0, 0, 1).
-    z /= 1 + toward_eye[2]
-    turn = np.empty(len(z), dtype=np.complex64)
-    turn.real = x - z * toward_eye[0]
-    turn.imag = y - z * toward_eye[1]
-    size = np.sqrt(turn.real * turn.real + turn.imag * turn.imag)
-    size[size == 0] = np.inf
-    turn *= 1 / size
-    return turn
+    """Return the directions of tangents after transport to the view plane.
+
+    Returns
+    -------
+    (P,) complex64 ndarray
+        Unit numbers in the frame `field.frames.view_frame` of the view plane.
+    """
+    x, y, z = transport_components(tangent, normal, view_direction)
+    # Coordinates in `view_frame`: apply the minimal rotation from `view_direction` to (0, 0, 1).
+    z /= 1 + view_direction[2]
+    rotation = np.empty(len(z), dtype=np.complex64)
+    rotation.real = x - z * view_direction[0]
+    rotation.imag = y - z * view_direction[1]
+    modulus = np.sqrt(rotation.real * rotation.real + rotation.imag * rotation.imag)
+    modulus[modulus == 0] = np.inf
+    rotation *= 1 / modulus
+    return rotation

@@ -1,1 +1,1 @@
-"""The one room that reads and writes Blender's data."""
+"""Blender scenes as arrays and back: meshes, fields, cameras, lights, images and strokes."""

@@ -1,4 +1,4 @@
-"""Blender's cameras and views as two matrices."""
+"""Cameras of a Blender scene, and its 3D views, as `Camera`."""
 
 from __future__ import annotations
 
@@ -8,21 +8,24 @@ import numpy as np
 from ..errors import RosyError
 from ..projection.camera import Camera, check_size
 
-#: What a picture from a 3D view is named after.
+#: Camera name of pictures that are drawn from a 3D view.
 VIEW_NAME = "3D View"
+
+#: The camera of a picture: a camera object of the scene, or a `Camera`, for example of a 3D view.
+CameraSource = bpy.types.Object | Camera
 
 
 def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """All cameras of a scene by name, the one that renders it last.
+    """Return all cameras of a scene, sorted by name. The active camera comes last.
 
     Raises
     ------
     RosyError
-        If there are none.
+        If the scene has no camera.
     """
     cameras = sorted(
-        (thing for thing in scene.objects if thing.type == "CAMERA"),
-        key=lambda thing: (thing == scene.camera, thing.name),
+        (obj for obj in scene.objects if obj.type == "CAMERA"),
+        key=lambda obj: (obj == scene.camera, obj.name),
     )
     if not cameras:
         raise RosyError(f"scene '{scene.name}' has no camera")
@@ -30,12 +33,12 @@ def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
-    """The camera that renders a scene.
+    """Return the active camera of a scene.
 
     Raises
     ------
     RosyError
-        If there is none.
+        If the scene has no active camera.
     """
     if scene.camera is None:
         raise RosyError(f"scene '{scene.name}' has no active camera: add one, or choose one")
@@ -43,28 +46,39 @@ def render_camera(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
-    """The camera that renders a frame: that of the last marker bound to one, or the scene's.
+    """Return the camera that renders a frame.
+
+    This is the camera of the last timeline marker, up to the frame, that is bound to a camera. If
+    all such markers come later, it is the camera of the first one. Without such markers, it is the
+    active camera.
 
     Raises
     ------
     RosyError
-        If there is none.
+        If there is neither a marker with a camera nor an active camera.
     """
     bound = [marker for marker in scene.timeline_markers if marker.camera is not None]
     if not bound:
         return render_camera(scene)
-    # As Blender chooses: the last one up to here, or else the first.
-    passed = [marker for marker in bound if marker.frame <= frame]
-    if passed:
-        return max(passed, key=lambda marker: marker.frame).camera
+    # The same choice as Blender's.
+    earlier = [marker for marker in bound if marker.frame <= frame]
+    if earlier:
+        return max(earlier, key=lambda marker: marker.frame).camera
     return min(bound, key=lambda marker: marker.frame).camera
 
 
-def picture_size(scene: bpy.types.Scene, percentage: float | None = None) -> tuple[int, int]:
-    """(width, height) in pixels: that of renders, in percent if given."""
+def render_size(scene: bpy.types.Scene, percentage: float | None = None) -> tuple[int, int]:
+    """Return the (width, height) of renders in pixels.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    percentage : float, optional
+        Scale, in percent, on top of the scene's own resolution percentage.
+    """
     render = scene.render
     scale = render.resolution_percentage / 100 * (1 if percentage is None else percentage / 100)
-    # As Blender rounds it: down.
+    # Blender rounds down.
     width, height = int(render.resolution_x * scale), int(render.resolution_y * scale)
     return check_size(max(width, 1), max(height, 1))
 
@@ -76,33 +90,35 @@ def camera_of_object(
     width: int | None = None,
     height: int | None = None,
 ) -> Camera:
-    """What a camera of the scene sees.
+    """Return the view and projection of a camera object as a `Camera`.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its pixel aspect counts, too.
+        Gives the pixel aspect and the default size.
     depsgraph : bpy.types.Depsgraph
     camera_object : bpy.types.Object
+        Perspective or orthographic.
     width, height : int, optional
-        Pixels; the size of renders if not given.
+        Pixels. By default the size of renders.
 
     Raises
     ------
     RosyError
-        If it is not a camera, or a panoramic one, or the size is impossible.
+        If the object is not a camera, the camera is neither perspective nor orthographic, or the
+        size is out of range.
     """
     name = camera_object.name
     if camera_object.type != "CAMERA":
         raise RosyError(f"object '{name}' is a {camera_object.type.lower()}, not a camera")
     kind = camera_object.data.type
     if kind not in ("PERSP", "ORTHO"):
-        words = {"PANO": "panoramic", "CUSTOM": "custom"}.get(kind, kind.lower())
+        description = {"PANO": "panoramic", "CUSTOM": "custom"}.get(kind, kind.lower())
         raise RosyError(
-            f"camera '{name}' is {words}: only perspective and orthographic ones can be drawn from"
+            f"camera '{name}' is {description}: only perspective and orthographic ones can be drawn from"
         )
     if width is None or height is None:
-        width, height = picture_size(scene)
+        width, height = render_size(scene)
     width, height = check_size(width, height)
     evaluated = camera_object.evaluated_get(depsgraph)
     projection = evaluated.calc_matrix_camera(
@@ -116,20 +132,57 @@ def camera_of_object(
     return Camera(np.array(view), np.array(projection), width, height, name)
 
 
+def resolve_camera(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    source: CameraSource,
+    size: tuple[int, int] | None = None,
+) -> Camera:
+    """Return the camera of a picture.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+    source : bpy.types.Object or Camera
+        A `Camera` is returned as it is, with its own size.
+    size : (int, int), optional
+        Pixels; by default the size of renders times the scene's percentage for pictures.
+
+    Raises
+    ------
+    RosyError
+        See `camera_of_object`.
+    """
+    if isinstance(source, Camera):
+        return source
+    if size is None:
+        size = render_size(scene, scene.rosy.percentage)
+    return camera_of_object(scene, depsgraph, source, *check_size(*size))
+
+
+def find_camera_object(scene: bpy.types.Scene, source: CameraSource) -> bpy.types.Object | None:
+    """Return the camera object that a picture was drawn from, or None if it was a 3D view."""
+    if not isinstance(source, Camera):
+        return source
+    obj = scene.objects.get(source.name)
+    return obj if obj is not None and obj.type == "CAMERA" else None
+
+
 def camera_of_view(
     region: bpy.types.Region,
     region_3d: bpy.types.RegionView3D,
     width: int | None = None,
     height: int | None = None,
 ) -> Camera:
-    """What a 3D view sees.
+    """Return the view and projection of a 3D view as a `Camera` named `VIEW_NAME`.
 
     Parameters
     ----------
     region : bpy.types.Region
     region_3d : bpy.types.RegionView3D
     width, height : int, optional
-        Pixels; the region's own if not given.
+        Pixels. By default the size of the region.
     """
     return Camera(
         np.array(region_3d.view_matrix),

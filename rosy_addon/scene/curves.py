@@ -1,4 +1,4 @@
-"""Strokes as a Curves object, with all that is known of them as attributes for Geometry Nodes."""
+"""Strokes as Curves data, with attributes for Geometry Nodes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
-from ..compositor.colour import from_hex, to_linear
-from ..strokes.draw import Lines
-from .capabilities import can_show_nodes_by_default
+from ..color import from_hex, to_linear
+from ..strokes.pipeline import StrokeGeometry
+from .compat import has_nodes_by_default
 
-#: What is told of each datablock that is made, and the name that it is to have.
-Keep = Callable[[bpy.types.ID, str], None]
+#: Called with each datablock that is created and the name that it should have.
+RegisterDatablock = Callable[[bpy.types.ID, str], None]
 
-#: What a point and a stroke carry besides the radius: name, type, domain.
+#: Attributes of the points besides position and radius: name and data type.
 POINT_ATTRIBUTES = {
     "opacity": "FLOAT",
     "spacing": "FLOAT",
@@ -22,38 +22,42 @@ POINT_ATTRIBUTES = {
     "surface_normal": "FLOAT_VECTOR",
     "face_index": "INT",
 }
-INK = "ink"
 
-#: The number by which Blender knows polylines among types of curves.
-POLY = 1
+#: Attribute of the curves: the color of the family, RGBA, linear.
+INK_ATTRIBUTE = "ink"
+
+#: Value of Blender's ``curve_type`` attribute for polylines.
+POLY_CURVE_TYPE = 1
 
 
-def new_curves(name: str, lines: Lines, frame: int, keep: Keep) -> bpy.types.ID:
-    """Hair curves, polylines with a radius, and a material that shows each family's ink.
+def new_curves(
+    name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
+) -> bpy.types.ID:
+    """Create Curves data from strokes: polylines with a radius, and a material with the ink colors.
 
     Parameters
     ----------
     name : str
-    lines : Lines
+    geometry : StrokeGeometry
     frame : int
-        Curves have no frames: they are there at all.
-    keep : callable
-        Is given each datablock that is made, and its name.
+        Not used: curves have no frames. It is here for the same signature as `new_grease_pencil`.
+    register : callable
+        Called with each new datablock and its name.
     """
     data = bpy.data.hair_curves.new(name)
-    keep(data, name)
-    strokes = lines.strokes
+    register(data, name)
+    strokes = geometry.strokes
     data.add_curves(np.diff(strokes.start).tolist())
-    colours = np.array([[*to_linear(from_hex(colour)), 1.0] for colour in lines.colours])
-    _set(data, "position", "FLOAT_VECTOR", "POINT", lines.points)
-    _set(data, "radius", "FLOAT", "POINT", lines.radius)
-    _set(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY))
-    # Blender counts the types when curves are added, and writes past its arrays if the counts are
-    # of the types before.
+    colours = np.array([[*to_linear(from_hex(colour)), 1.0] for colour in geometry.colors])
+    _set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
+    _set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
+    _set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
+    # Blender caches the number of curves of each type when curves are added. If these counts are
+    # out of date, it writes past the end of its arrays. Adding no curves updates them.
     data.add_curves([])
-    _set(data, "family", "INT", "CURVE", strokes.family)
-    _set(data, "object", "INT", "CURVE", lines.body)
-    _set(data, INK, "FLOAT_COLOR", "CURVE", colours[strokes.family])
+    _set_attribute(data, "family", "INT", "CURVE", strokes.family)
+    _set_attribute(data, "object", "INT", "CURVE", geometry.body_index)
+    _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colours[strokes.family])
     values = {
         "opacity": strokes.opacity,
         "spacing": strokes.spacing,
@@ -61,33 +65,36 @@ def new_curves(name: str, lines: Lines, frame: int, keep: Keep) -> bpy.types.ID:
         "surface_normal": strokes.normal,
         "face_index": strokes.face,
     }
-    for key, kind in POINT_ATTRIBUTES.items():
-        _set(data, key, kind, "POINT", values[key])
+    for key, data_type in POINT_ATTRIBUTES.items():
+        _set_attribute(data, key, data_type, "POINT", values[key])
     material = _new_material(name)
-    keep(material, name)
+    register(material, name)
     data.materials.append(material)
     return data
 
 
-def _set(data: bpy.types.ID, name: str, kind: str, domain: str, values: np.ndarray) -> None:
-    attribute = data.attributes.get(name) or data.attributes.new(name, kind, domain)
-    key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(kind, "value")
-    dtype = {"INT": np.int32, "INT8": np.int8}.get(kind, np.float32)
+def _set_attribute(
+    data: bpy.types.ID, name: str, data_type: str, domain: str, values: np.ndarray
+) -> None:
+    """Write the values of an attribute, and create it if it is missing."""
+    attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
+    key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
+    dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
     attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
 
 
 def _new_material(name: str) -> bpy.types.Material:
-    """Ink that neither needs light nor gives any away."""
+    """Create an emissive material with the color of `INK_ATTRIBUTE`."""
     material = bpy.data.materials.new(name)
-    if not can_show_nodes_by_default(material):
+    if not has_nodes_by_default(material):
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    ink = nodes.new("ShaderNodeAttribute")
-    ink.attribute_name = INK
-    shine = nodes.new("ShaderNodeEmission")
+    ink_color = nodes.new("ShaderNodeAttribute")
+    ink_color.attribute_name = INK_ATTRIBUTE
+    emission = nodes.new("ShaderNodeEmission")
     output = nodes.new("ShaderNodeOutputMaterial")
-    links.new(ink.outputs["Color"], shine.inputs["Color"])
-    links.new(shine.outputs["Emission"], output.inputs["Surface"])
-    ink.location, shine.location, output.location = (-400, 0), (-200, 0), (0, 0)
+    links.new(ink_color.outputs["Color"], emission.inputs["Color"])
+    links.new(emission.outputs["Emission"], output.inputs["Surface"])
+    ink_color.location, emission.location, output.location = (-400, 0), (-200, 0), (0, 0)
     return material

@@ -1,4 +1,4 @@
-"""What an artist sets up beside a mesh for a field to follow: strokes, curves, empties, UV maps."""
+"""Reading guides that a field follows: strokes, curves, empties, UV maps, vector attributes."""
 
 from __future__ import annotations
 
@@ -9,145 +9,163 @@ import numpy as np
 from mathutils.geometry import interpolate_bezier
 
 from ..errors import RosyError
-from .attributes import read_vectors
-from .meshes import read_values
+from .field_attributes import read_face_vectors
+from .meshes import read_attribute
 
-#: Types of objects that guide: lines drawn, and axes.
-STROKES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
-GUIDES = (*STROKES, "EMPTY")
+#: Object types that can guide a field: those with strokes, and all.
+STROKE_TYPES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
+GUIDE_TYPES = (*STROKE_TYPES, "EMPTY")
 
-#: Points of a Bézier curve from one control point to the next.
-FINE = 12
+#: Points sampled on each segment of a Bézier curve, including both ends.
+BEZIER_SEGMENT_SAMPLES = 12
 
-Handle = tuple[np.ndarray, np.ndarray, float]
+#: Position, axis and radius of an empty.
+EmptyGuide = tuple[np.ndarray, np.ndarray, float]
 
 
 def guide_objects(objects: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Those of some objects that can guide a field."""
-    return [thing for thing in objects if thing.type in GUIDES]
+    """Return the objects that can guide a field."""
+    return [obj for obj in objects if obj.type in GUIDE_TYPES]
 
 
-def strokes_and_handles(
+def guide_strokes_and_empties(
     objects: Iterable[bpy.types.Object], owner: bpy.types.Object
-) -> tuple[list[np.ndarray], list[Handle]]:
-    """What objects guide along, in the space of another one.
+) -> tuple[list[np.ndarray], list[EmptyGuide]]:
+    """Read guide objects as strokes and empties, in the space of another object.
 
-    Grease Pencil strokes of the current frame and visible layers, curves and hair curves are
-    strokes. An empty guides along its z axis, as far as it is drawn.
+    Strokes come from Grease Pencil (the current frame of visible layers), curves and hair curves.
+    An empty guides the field along its z axis, within its display size.
 
     Parameters
     ----------
     objects : iterable of bpy.types.Object
     owner : bpy.types.Object
-        The object of the mesh that is guided.
+        The object of the mesh whose field is guided.
 
     Returns
     -------
     strokes : list of (n, 3) float64 ndarray
-    handles : list of (place, axis, radius)
+        Polylines with at least two points.
+    empties : list of (position, axis, radius)
+        The axis is not normalized.
 
     Raises
     ------
     RosyError
-        If there is nothing to follow on one of them.
+        If an object other than an empty has no stroke.
     """
-    into = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
+    world_to_owner = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
     strokes: list[np.ndarray] = []
-    handles: list[Handle] = []
-    for thing in objects:
-        matrix = into @ np.array(thing.matrix_world, dtype=np.float64)
-        if thing.type == "EMPTY":
-            radius = thing.empty_display_size * np.linalg.norm(matrix[:3, :3], axis=0).max()
-            handles.append((matrix[:3, 3], matrix[:3, 2], float(radius)))
+    empties: list[EmptyGuide] = []
+    for obj in objects:
+        matrix = world_to_owner @ np.array(obj.matrix_world, dtype=np.float64)
+        if obj.type == "EMPTY":
+            radius = obj.empty_display_size * np.linalg.norm(matrix[:3, :3], axis=0).max()
+            empties.append((matrix[:3, 3], matrix[:3, 2], float(radius)))
             continue
-        found = [stroke for stroke in _strokes_of(thing) if len(stroke) > 1]
-        if not found:
-            raise RosyError(f"object '{thing.name}': there is no stroke on it to follow")
-        strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in found]
-    return strokes, handles
+        polylines = [stroke for stroke in _object_strokes(obj) if len(stroke) > 1]
+        if not polylines:
+            raise RosyError(f"object '{obj.name}': there is no stroke on it to follow")
+        strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in polylines]
+    return strokes, empties
 
 
-def uv_of_corners(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
-    """(C, 2) float32: a UV map of a mesh, the active one if none is named.
+def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
+    """Read a UV map of a mesh. By default it is the active one.
+
+    Returns
+    -------
+    (C, 2) float32 ndarray
 
     Raises
     ------
     RosyError
-        If there is none.
+        If the UV map does not exist, or the mesh is in edit mode.
     """
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     if layer is None:
-        has = ", ".join(f"'{other.name}'" for other in mesh.uv_layers) or "none"
-        raise RosyError(f"{mesh.name}: has no UV map '{name}' to follow; there is {has}")
-    values = read_values(mesh, layer.name, np.float32, 2)
+        available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers) or "none"
+        raise RosyError(f"{mesh.name}: has no UV map '{name}' to follow; there is {available}")
+    values = read_attribute(mesh, layer.name, np.float32, 2)
     if values is None:
         raise RosyError(f"{mesh.name}: UV map '{layer.name}' cannot be read in edit mode")
     return values
 
 
-def guiding_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
-    """(F, 3) float64: a vector attribute of a mesh on its faces; see `attributes.read_vectors`.
+def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    """Read a vector attribute as one vector for each face; see `read_face_vectors`.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
 
     Raises
     ------
     RosyError
-        If there is none of this name, or it holds anything else.
+        If there is no attribute of this name, it is of another type, or a value is not finite.
     """
     if not name or name not in mesh.attributes:
         raise RosyError(f"{mesh.name}: has no attribute '{name}' to follow")
-    return read_vectors(mesh, name)
+    return read_face_vectors(mesh, name)
 
 
-def _strokes_of(thing: bpy.types.Object) -> list[np.ndarray]:
-    """In the object's own space."""
-    if thing.type == "CURVE":
-        return [_spline(spline) for spline in thing.data.splines]
-    if thing.type == "CURVES":
-        return _split(thing.data.attributes, thing.data.curve_offset_data)
+def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:
+    """Return the strokes of an object, each (n, 3), in its own space."""
+    if obj.type == "CURVE":
+        return [_spline_points(spline) for spline in obj.data.splines]
+    if obj.type == "CURVES":
+        return _split_strokes(obj.data.attributes, obj.data.curve_offset_data)
     strokes = []
-    for layer in thing.data.layers:
+    for layer in obj.data.layers:
         if layer.hide:
             continue
         if hasattr(layer, "active_frame"):  # before Blender 4.3
             frame = layer.active_frame
             strokes += (
-                [_coordinates(stroke.points, "co", 3) for stroke in frame.strokes] if frame else []
+                [_read_coordinates(stroke.points, "co", 3) for stroke in frame.strokes]
+                if frame
+                else []
             )
             continue
         frame = layer.current_frame()
         if frame is None:
             continue
-        place = np.array(layer.matrix_local, dtype=np.float64)
-        for stroke in _split(frame.drawing.attributes, frame.drawing.curve_offsets):
-            strokes.append(stroke @ place[:3, :3].T + place[:3, 3])
+        layer_matrix = np.array(layer.matrix_local, dtype=np.float64)
+        for stroke in _split_strokes(frame.drawing.attributes, frame.drawing.curve_offsets):
+            strokes.append(stroke @ layer_matrix[:3, :3].T + layer_matrix[:3, 3])
     return strokes
 
 
-def _split(attributes, offsets) -> list[np.ndarray]:
-    """Points that lie in a row, cut where each stroke begins."""
+def _split_strokes(attributes, offsets) -> list[np.ndarray]:
+    """Return the points of each curve, (n, 3), from the ``position`` attribute and the offsets."""
     if "position" not in attributes or not len(offsets):
         return []
-    points = _coordinates(attributes["position"].data, "vector", 3)
+    points = _read_coordinates(attributes["position"].data, "vector", 3)
     start = np.empty(len(offsets), dtype=np.int32)
     offsets.foreach_get("value", start)
     return np.split(points, start[1:-1])
 
 
-def _spline(spline: bpy.types.Spline) -> np.ndarray:
-    """(n, 3) points of a spline; of a NURBS its control points."""
+def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
+    """Return the points of a spline, (n, 3). For NURBS these are the control points."""
     if spline.type != "BEZIER":
-        points = _coordinates(spline.points, "co", 4)[:, :3]
+        points = _read_coordinates(spline.points, "co", 4)[:, :3]
         return np.concatenate([points, points[:1]]) if spline.use_cyclic_u else points
     knots = list(spline.bezier_points)
-    ahead = knots[1:] + (knots[:1] if spline.use_cyclic_u else [])
-    pieces = [
-        interpolate_bezier(one.co, one.handle_right, other.handle_left, other.co, FINE)
-        for one, other in zip(knots, ahead, strict=False)
+    next_knots = knots[1:] + (knots[:1] if spline.use_cyclic_u else [])
+    segments = [
+        interpolate_bezier(
+            knot.co, knot.handle_right, next_knot.handle_left, next_knot.co, BEZIER_SEGMENT_SAMPLES
+        )
+        for knot, next_knot in zip(knots, next_knots, strict=False)
     ]
-    return np.array([point for piece in pieces for point in piece], dtype=np.float64).reshape(-1, 3)
+    return np.array([point for segment in segments for point in segment], dtype=np.float64).reshape(
+        -1, 3
+    )
 
 
-def _coordinates(collection, key: str, columns: int) -> np.ndarray:
+def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
+    """Read coordinates from a collection: (n, columns) float64."""
     values = np.empty(columns * len(collection), dtype=np.float32)
     collection.foreach_get(key, values)
     return values.reshape(-1, columns).astype(np.float64)

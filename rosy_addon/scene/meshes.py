@@ -1,4 +1,4 @@
-"""Blender's meshes as surfaces."""
+"""Blender meshes as `Surface`, and their attributes and edges as arrays."""
 
 from __future__ import annotations
 
@@ -8,163 +8,198 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
+from ..cache import Cache, content_hash
 from ..errors import RosyError
 from ..field.surface import Surface, build_surface, smooth_fans
-from ..reuse import Kept, digest
 
-#: What edges may be marked as: the property, its name, and what it does.
-MARKS = {
+#: Marks of edges: RNA property, label, and description in the user interface.
+EDGE_MARKS = {
     "SELECTED": ("select", "Selected", "Those that are selected in edit mode"),
     "SHARP": ("use_edge_sharp", "Marked Sharp", "Those that are marked sharp"),
     "SEAM": ("use_seam", "Seams", "Those that are marked as seams of a UV map"),
 }
 
+#: Attribute in which Blender stores the selection of edges.
+EDGE_SELECTION_ATTRIBUTE = ".select_edge"
+
 #: Attribute that Blender writes for objects with `add_rest_position_attribute`.
-REST = "rest_position"
+REST_ATTRIBUTE = "rest_position"
 
 
 def mesh_surface(
     mesh: bpy.types.Mesh,
     name: str | None = None,
     *,
-    rest: bool = False,
-    plain: bool = False,
-    kept: Kept | None = None,
+    read_rest: bool = False,
+    occluder_only: bool = False,
+    cache: Cache | None = None,
 ) -> Surface:
-    """The surface of a mesh.
+    """Read the surface of a mesh.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
-        Original or evaluated. One in edit mode is read as it is there.
+        Original or evaluated. In edit mode, the current state of editing is read.
     name : str, optional
-        For messages; the mesh's own if not given.
-    rest : bool
-        Whether to read the undeformed positions from the attribute `REST`, where it is.
-    plain : bool
-        Whether no normals will be mixed on it: cheaper, for what only hides others.
-    kept : Kept, optional
-        Where the surface of a mesh that has not changed is found.
+        Name for messages. By default the name of the mesh.
+    read_rest : bool
+        Read the undeformed positions from the attribute `REST_ATTRIBUTE`, if it exists.
+    occluder_only : bool
+        Treat all faces as flat, which is cheaper. For meshes that only occlude others.
+    cache : Cache, optional
+        Keeps the surfaces of meshes that have not changed since an earlier call.
 
     Raises
     ------
     RosyError
-        If it has no faces (be it empty, or points and loose edges alone) or a coordinate that is
-        not finite.
+        If the mesh has no faces (it is empty, or has only points and loose edges), or a coordinate
+        is not finite.
     """
     name = mesh.name if name is None else name
     flush_edit_mode(mesh)
-    faces = len(mesh.polygons)
-    if not faces:
-        has = "only points and loose edges" if len(mesh.vertices) else "nothing in it"
-        raise RosyError(f"{name}: the mesh has no faces to draw on, {has}")
-    parts = {
-        "vertices": _quickly(mesh, "position", mesh.vertices, "co", np.float32, 3),
-        "corner_vertex": _quickly(mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32),
+    face_count = len(mesh.polygons)
+    if not face_count:
+        content = "only points and loose edges" if len(mesh.vertices) else "nothing in it"
+        raise RosyError(f"{name}: the mesh has no faces to draw on, {content}")
+    arguments = {
+        "vertices": _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3),
+        "corner_vertex": _attribute_or_collection(
+            mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
+        ),
         "face_start": _face_starts(mesh),
         "name": name,
-        "sharp_edges": None if plain else _sharp_edges(mesh),
+        "sharp_edges": None if occluder_only else _sharp_edges(mesh),
         "flat_faces": (
-            np.ones(faces, dtype=bool) if plain else read_values(mesh, "sharp_face", bool, 1)
+            np.ones(face_count, dtype=bool)
+            if occluder_only
+            else read_attribute(mesh, "sharp_face", bool, 1)
         ),
-        "corner_normal": _get(mesh.corner_normals, "vector", np.float32, 3),
-        "rest": read_values(mesh, REST, np.float32, 3) if rest else None,
+        "corner_normal": _read_collection(mesh.corner_normals, "vector", np.float32, 3),
+        "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
     }
 
     def build() -> Surface:
-        return build_surface(**parts, **_triangles(mesh))
+        return build_surface(**arguments, **_triangles(mesh))
 
-    if kept is None:
+    if cache is None:
         return build()
-    if not plain:
-        # Deformations leave fans as they are.
+    if not occluder_only:
+        # Smooth fans depend on the topology alone, so a deformation does not change them.
         names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
-        topology = {name: parts[name] for name in names}
-        parts["corner_fan"] = kept.find_or_make(
-            ("fans", digest(*topology.values())), lambda: smooth_fans(parts["vertices"], **topology)
+        topology = {name: arguments[name] for name in names}
+        arguments["corner_fan"] = cache.get_or_create(
+            ("fans", content_hash(*topology.values())),
+            lambda: smooth_fans(arguments["vertices"], **topology),
         )
-    # Triangles are slow to read, and follow from the rest.
-    return kept.find_or_make(("surface", digest(*parts.values())), build)
+    # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
+    return cache.get_or_create(("surface", content_hash(*arguments.values())), build)
 
 
 @contextmanager
-def evaluated_mesh(thing: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
-    """The mesh of an evaluated object for as long as it is read; None if it has no faces."""
-    mesh = thing.to_mesh()
+def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh | None]:
+    """Yield the temporary mesh of an evaluated object; None if it has no faces."""
+    mesh = obj.to_mesh()
     try:
         yield mesh if mesh is not None and len(mesh.polygons) else None
     finally:
-        thing.to_mesh_clear()
+        obj.to_mesh_clear()
 
 
 def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
-    """(E, 2) int32: the vertices of the edges that have one of `MARKS`.
+    """Return the vertices of the edges that have a mark.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    mark : str
+        A key of `EDGE_MARKS`.
+
+    Returns
+    -------
+    (K, 2) int32 ndarray
 
     Raises
     ------
     RosyError
-        If there are none.
+        If no edge has the mark.
     """
-    attribute, name, _ = MARKS[mark]
-    chosen = np.empty(len(mesh.edges), dtype=bool)
-    mesh.edges.foreach_get(attribute, chosen)
-    if not chosen.any():
-        raise RosyError(f"{mesh.name}: no edge is marked: {name}")
-    return _quickly(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[chosen]
+    property_name, label, _ = EDGE_MARKS[mark]
+    is_marked = _edge_flags(mesh, property_name)
+    if not is_marked.any():
+        raise RosyError(f"{mesh.name}: no edge is marked: {label}")
+    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[
+        is_marked
+    ]
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
-    """Bring a mesh up to date with what is being edited, if it is."""
+    """Update a mesh that is in edit mode from the edit data."""
     if not mesh.is_editmode:
         return
-    for thing in bpy.data.objects:
-        if thing.data == mesh and thing.mode == "EDIT":
-            thing.update_from_editmode()
+    for obj in bpy.data.objects:
+        if obj.data == mesh and obj.mode == "EDIT":
+            obj.update_from_editmode()
             return
 
 
-def read_values(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
-    """(n, columns), or (n,) for one column: the values of an attribute; None if there are none."""
+def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -> np.ndarray | None:
+    """Return an attribute: (n, columns), or (n,) for one column; None if missing or unreadable."""
     attribute = mesh.attributes.get(name)
-    if attribute is None or not len(attribute.data):  # none is readable in edit mode
+    if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
         return None
     key = "vector" if attribute.data_type in ("FLOAT_VECTOR", "FLOAT2") else "value"
-    return _get(attribute.data, key, dtype, columns)
+    return _read_collection(attribute.data, key, dtype, columns)
 
 
 def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(F + 1,) int32: the first corner of each face, and the end."""
-    faces, corners = len(mesh.polygons), len(mesh.loops)
-    if corners == 3 * faces:
-        return np.arange(0, corners + 1, 3, dtype=np.int32)
-    starts = np.empty(faces + 1, dtype=np.int32)
+    """Return the first corner of each face and the number of corners: (F + 1,) int32."""
+    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
+    if corner_count == 3 * face_count:
+        return np.arange(0, corner_count + 1, 3, dtype=np.int32)
+    starts = np.empty(face_count + 1, dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts[:-1])
-    starts[-1] = corners
+    starts[-1] = corner_count
     return starts
 
 
 def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
-    """Blender's own, so that RoSy draws what it draws; none if there are none yet."""
-    faces = len(mesh.polygons)
-    if len(mesh.loops) == 3 * faces:
-        face = np.arange(faces, dtype=np.int32)
-        return {"triangles": np.arange(3 * faces, dtype=np.int32), "triangle_face": face}
+    """Return Blender's own triangulation, for the same pictures; empty if there is none yet."""
+    face_count = len(mesh.polygons)
+    if len(mesh.loops) == 3 * face_count:
+        face = np.arange(face_count, dtype=np.int32)
+        return {"triangles": np.arange(3 * face_count, dtype=np.int32), "triangle_face": face}
     if not len(mesh.loop_triangles):
         return {}
     return {
-        "triangles": _get(mesh.loop_triangles, "loops", np.int32, 3),
-        "triangle_face": _get(mesh.loop_triangle_polygons, "value", np.int32),
+        "triangles": _read_collection(mesh.loop_triangles, "loops", np.int32, 3),
+        "triangle_face": _read_collection(mesh.loop_triangle_polygons, "value", np.int32),
     }
 
 
 def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    sharp = read_values(mesh, "sharp_edge", bool, 1)
+    """Return the vertices of the edges marked sharp, (K, 2) int32; None if there are none."""
+    sharp = read_attribute(mesh, "sharp_edge", bool, 1)
     if sharp is None or not sharp.any():
         return None
-    return _quickly(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[sharp]
+    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[sharp]
 
 
-def _quickly(
+def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:
+    """Return a flag of every edge, (E,) bool, by the name of its RNA property."""
+    flags = np.empty(len(mesh.edges), dtype=bool)
+    is_selection = property_name == "select"
+    attribute = mesh.attributes.get(EDGE_SELECTION_ATTRIBUTE) if is_selection else None
+    if attribute is not None and attribute.data_type == "INT32_2D" and len(attribute.data):
+        # Blender 5.0 creates the attribute with this type, but with one byte for each edge, when
+        # all or none of the edges are new (`Mesh.from_pydata`, `Mesh.update(calc_edges=True)`).
+        # `foreach_get` would read past the end of it. All edges have the same value.
+        flags[:] = attribute.data[0].value[0] & 0xFF
+    else:
+        mesh.edges.foreach_get(property_name, flags)
+    return flags
+
+
+def _attribute_or_collection(
     mesh: bpy.types.Mesh,
     attribute: str,
     collection: bpy.types.bpy_prop_collection,
@@ -172,17 +207,21 @@ def _quickly(
     dtype: type,
     columns: int = 1,
 ) -> np.ndarray:
-    """Values of a collection, from the attribute that holds them if it is readable.
+    """Return the values of a collection, from an attribute with the same values if it is readable.
 
-    Blender copies attributes whole; from collections it asks item by item, a thousand times slower.
+    Blender copies attributes as a whole. It reads collections item by item, which is a thousand
+    times slower.
     """
-    values = read_values(mesh, attribute, dtype, columns)
+    values = read_attribute(mesh, attribute, dtype, columns)
     if values is None or len(values) != len(collection):
-        return _get(collection, key, dtype, columns)
+        return _read_collection(collection, key, dtype, columns)
     return values
 
 
-def _get(collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1):
+def _read_collection(
+    collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1
+):
+    """Return a property of all items: (n, columns), or (n,) for one column."""
     values = np.empty(len(collection) * columns, dtype=dtype)
     collection.foreach_get(key, values)
     return values.reshape(-1, columns) if columns > 1 else values

@@ -1,4 +1,4 @@
-"""Ambient occlusion of the objects of a scene, as an attribute that tones can come from."""
+"""Ambient occlusion of the objects of a scene, stored as a mesh attribute for the tone."""
 
 from __future__ import annotations
 
@@ -9,78 +9,94 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Work, part
-from ..projection.gbuffer import Body
-from ..projection.occlusion import DIRECTIONS, occluding
-from .bodies import Reading, read_scene
-from .capabilities import is_editable
+from ..progress import Task, subtask
+from ..projection.ambient_occlusion import DIRECTION_COUNT, occlusion_task
+from ..projection.gbuffer import MeshInstance
+from .compat import is_editable
 from .meshes import mesh_surface
+from .scene_reader import SceneData, read_scene
 
-#: What the attribute is called, if nothing else is said.
-OCCLUSION = "Occlusion"
+#: Default name of the attribute.
+OCCLUSION_ATTRIBUTE = "Occlusion"
 
-_KIND = "CORNER", "FLOAT"
+_ATTRIBUTE_TYPE = "CORNER", "FLOAT"
 
 
-def storing_occlusion(
+def store_occlusion_task(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object],
-    name: str = OCCLUSION,
-    directions: int = DIRECTIONS,
-) -> Work[None]:
-    """Find how much of the sky the surfaces of objects see, and store it on their meshes.
+    name: str = OCCLUSION_ATTRIBUTE,
+    direction_count: int = DIRECTION_COUNT,
+) -> Task[None]:
+    """Compute the ambient occlusion of objects, and store it on their meshes.
 
-    All that renders of the view layer show is in the way. The surface is as it is after modifiers
-    if these keep its faces, and as it is without if they do not; modifiers carry the attribute on.
+    Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
+    the modifiers keep the faces, the original mesh otherwise. Modifiers then carry the attribute to
+    the evaluated mesh.
 
     Parameters
     ----------
     depsgraph : bpy.types.Depsgraph
     objects : sequence of bpy.types.Object
-        Original ones with a field.
+        Original objects with a field.
     name : str
-        Of the attribute, a number from 0 to 1 on the corners of faces.
-    directions : int
-        From how many sides it is looked at.
+        Name of the attribute: a float on corners, from 0 (no sky visible) to 1 (all of it).
+    direction_count : int
+        Number of light directions.
+
+    Yields
+    ------
+    Progress
 
     Raises
     ------
     RosyError
-        As `read_scene`; or if a mesh is linked, in edit mode, or has another attribute of that name.
-        Nothing is changed then.
+        If the scene cannot be read (see `read_scene`), or a mesh is linked, in edit mode, or has an
+        attribute of that name with another type or domain. Nothing is changed in this case.
     """
-    for thing in objects:
-        _check_writable(thing, name)
-    reading = read_scene(depsgraph, objects, "zero")
-    found: dict[bpy.types.Mesh, np.ndarray] = {}
-    for count, thing in enumerate(objects):
-        start, stop = count / len(objects), (count + 1) / len(objects)
-        bodies, number = _with_own_faces(reading, thing)
-        found[thing.data] = yield from part(occluding(bodies, number, directions), start, stop)
-    for mesh, values in found.items():
+    for obj in objects:
+        _check_writable(obj, name)
+    scene_data = read_scene(depsgraph, objects, "zero")
+    values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
+    for index, obj in enumerate(objects):
+        start, stop = index / len(objects), (index + 1) / len(objects)
+        instances, body_index = _with_original_faces(scene_data, obj)
+        values_by_mesh[obj.data] = yield from subtask(
+            occlusion_task(instances, body_index, direction_count), start, stop
+        )
+    for mesh, values in values_by_mesh.items():
         attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "CORNER")
         attribute.data.foreach_set("value", values)
         mesh.update()
 
 
-def _with_own_faces(reading: Reading, thing: bpy.types.Object) -> tuple[list[Body], int]:
-    """The bodies of a scene, with that of an object having the faces of its mesh; and its number."""
-    number = reading.owners.index(thing)
-    bodies = list(reading.bodies)
-    given, seen = mesh_surface(thing.data, f"object '{thing.name}'"), bodies[number].surface
-    same = np.array_equal(given.face_start, seen.face_start)
-    if not (same and np.array_equal(given.corner_vertex, seen.corner_vertex)):
-        bodies[number] = replace(bodies[number], surface=given, carried={})
-    return bodies, number
+def _with_original_faces(
+    scene_data: SceneData, obj: bpy.types.Object
+) -> tuple[list[MeshInstance], int]:
+    """Return the mesh instances of a scene, and the index of an object's instance.
+
+    The instance gets the object's original surface if its modifiers change the faces.
+    """
+    body_index = scene_data.objects.index(obj)
+    instances = list(scene_data.instances)
+    original, evaluated = (
+        mesh_surface(obj.data, f"object '{obj.name}'"),
+        instances[body_index].surface,
+    )
+    same_faces = np.array_equal(original.face_start, evaluated.face_start)
+    if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
+        instances[body_index] = replace(instances[body_index], surface=original)
+    return instances, body_index
 
 
-def _check_writable(thing: bpy.types.Object, name: str) -> None:
-    mesh, owner = thing.data, f"object '{thing.name}'"
+def _check_writable(obj: bpy.types.Object, name: str) -> None:
+    """Raise an error if the attribute cannot be written to the mesh of an object."""
+    mesh, label = obj.data, f"object '{obj.name}'"
     if not is_editable(mesh) or mesh.is_editmode:
-        raise RosyError(f"{owner}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}")
+        raise RosyError(f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}")
     attribute = mesh.attributes.get(name)
-    if attribute is not None and (attribute.domain, attribute.data_type) != _KIND:
+    if attribute is not None and (attribute.domain, attribute.data_type) != _ATTRIBUTE_TYPE:
         raise RosyError(
-            f"{owner}: has an attribute '{name}' already, {attribute.data_type} on "
-            f"{attribute.domain}; wanted is {_KIND[1]} on {_KIND[0]}"
+            f"{label}: has an attribute '{name}' already, {attribute.data_type} on "
+            f"{attribute.domain}; wanted is {_ATTRIBUTE_TYPE[1]} on {_ATTRIBUTE_TYPE[0]}"
         )

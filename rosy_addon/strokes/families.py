@@ -1,8 +1,9 @@
-"""Which of the lines through a point a stroke is on: a layer each, for pens and for eyes.
+"""Assign strokes to families: the M lines that the field has at each point.
 
-Where the field allows it a line keeps its number all over the surface: the lines of all triangles
-are matched across the edges, and if no way round a singularity or a handle takes one line into
-another, each is a family. Otherwise families are cut: by the angle to a guiding direction.
+Each family becomes a layer, which can have its own pen and color. Lines of neighboring triangles
+are matched across the edges. If no path around a singularity or a handle connects different lines,
+the families are consistent over the whole surface. Otherwise the family depends on the angle
+between the stroke and a guide direction.
 """
 
 from __future__ import annotations
@@ -11,124 +12,155 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..field.frames import dot, unit
-from ..field.surface import connected
-from .ground import Ground, nearest_member
-from .strokes import Strokes
+from ..field.frames import dot, normalize
+from ..field.surface import connected_components
+from .stroke_set import Strokes
+from .tangent_mesh import TangentMesh, nearest_member
 
-#: What guides families that run into each other, if no camera does.
-GUIDES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+#: Guide directions in world space, in order of preference, if no camera gives one.
+GUIDE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
-def label_families(strokes: Strokes, ground: Ground, right: np.ndarray | None = None) -> Strokes:
-    """Number the families of strokes that were traced on a ground.
+def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None = None) -> Strokes:
+    """Assign strokes to families by the line that they follow at their middle point.
 
     Parameters
     ----------
     strokes : Strokes
-    ground : Ground
+        As they were traced on `mesh`.
+    mesh : TangentMesh
     right : (3,) array_like, optional
-        A direction in world space, as a camera's x axis, that the first family is to be along
-        where families cannot be told apart all over.
+        Guide direction in world space, for example the x axis of a camera. It is used only if no
+        consistent labels exist.
 
     Returns
     -------
     Strokes
-        `ground.lines` families; family 1 is nearest to the guiding direction, the others follow
-        counter-clockwise.
+        With `mesh.family_count` families. Family 1 is the one nearest to the guide direction; the
+        others follow counter-clockwise.
     """
-    lines = ground.lines
-    names = tuple(f"family {number + 1}" for number in range(lines))
-    if lines == 1 or not len(strokes):
+    family_count = mesh.family_count
+    names = tuple(f"family {index + 1}" for index in range(family_count))
+    if family_count == 1 or not len(strokes):
         return replace(strokes, names=names)
-    labels = global_labels(ground)
-    reference = first_members(ground)
+    labels = global_labels(mesh)
+    reference = reference_members(mesh)
     if labels is None:
-        reference = _guided(ground, reference, right)
-        labels = np.broadcast_to(np.arange(lines), (len(reference), lines))
+        reference = _members_near_guide(mesh, reference, right)
+        labels = np.broadcast_to(np.arange(family_count), (len(reference), family_count))
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
-    member = dot(strokes.member[middle], ground.x[triangle]) + 1j * dot(
-        strokes.member[middle], ground.y[triangle]
+    member = dot(strokes.member[middle], mesh.x[triangle]) + 1j * dot(
+        strokes.member[middle], mesh.y[triangle]
     )
-    which = line_number(member, reference[triangle], ground.degree) % lines
-    family = labels[triangle, which].astype(np.int32)
+    family_slot = member_offset(member, reference[triangle], mesh.degree) % family_count
+    family = labels[triangle, family_slot].astype(np.int32)
     return replace(strokes, family=family, names=names)
 
 
-def first_members(ground: Ground) -> np.ndarray:
-    """(T,) complex: a member at the middle of each triangle, the one nearest to the frame's x."""
-    z = ground.z.sum(axis=1)
-    one = np.ones(len(z), dtype=np.complex128)
-    if ground.stored is not None and (ground.stored != 0).any():
-        # The stored member is on one line all over: begin with that one.
-        own = np.exp(1j * np.angle(ground.stored) * ground.lines / ground.degree)
-        return nearest_member(own, np.where(z != 0, z, 1), ground.degree)
-    return nearest_member(one, np.where(z != 0, z, 1), ground.degree)
+def reference_members(mesh: TangentMesh) -> np.ndarray:
+    """Return (T,) complex128: one unit member at the center of each triangle, in its frame.
 
-
-def line_number(member: np.ndarray, first: np.ndarray, degree: int) -> np.ndarray:
-    """(n,) int64: how many members it is counter-clockwise from the first one to another."""
-    turn = np.angle(member * first.conj())
-    return np.rint(turn * degree / (2 * np.pi)).astype(np.int64) % degree
-
-
-def global_labels(ground: Ground) -> np.ndarray | None:
-    """(T, M) int: the family of each line of each triangle, if there is one all over.
-
-    Lines are counted from that of `first_members`. None if some line runs into another.
+    It is the member nearest to the x axis of the frame. If the field labels one line consistently
+    (`TangentMesh.family_z`), it is a member on that line.
     """
-    lines, count = ground.lines, len(ground.z)
-    if ground.stored is not None and (ground.stored != 0).any():
-        return np.broadcast_to(np.arange(lines), (count, lines))
-    first = first_members(ground)
-    triangle, edge = np.nonzero(ground.across >= 0)
-    other = ground.across[triangle, edge]
-    once = triangle < other
-    triangle, edge, other = triangle[once], edge[once], other[once]
-    carried = first[triangle] * ground.unfold[triangle, edge]
-    shift = line_number(
-        nearest_member(carried, ground.z[other].sum(axis=1), ground.degree),
-        first[other],
-        ground.degree,
+    z = mesh.z.sum(axis=1)
+    x_axis = np.ones(len(z), dtype=np.complex128)
+    if mesh.family_z is not None and (mesh.family_z != 0).any():
+        # The stored member is on the same line everywhere. Count from that line.
+        labeled_member = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
+        return nearest_member(labeled_member, np.where(z != 0, z, 1), mesh.degree)
+    return nearest_member(x_axis, np.where(z != 0, z, 1), mesh.degree)
+
+
+def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.ndarray:
+    """Return (n,) int64: the number of members from `reference` counter-clockwise to `member`."""
+    angle = np.angle(member * reference.conj())
+    return np.rint(angle * degree / (2 * np.pi)).astype(np.int64) % degree
+
+
+def global_labels(mesh: TangentMesh) -> np.ndarray | None:
+    """Return (T, M) int: the family of each line in each triangle, if consistent labels exist.
+
+    Lines are counted counter-clockwise from `reference_members`. Returns None if different lines of
+    a triangle are connected by a path over the surface.
+    """
+    family_count, count = mesh.family_count, len(mesh.z)
+    if mesh.family_z is not None and (mesh.family_z != 0).any():
+        return np.broadcast_to(np.arange(family_count), (count, family_count))
+    reference = reference_members(mesh)
+    triangle, edge = np.nonzero(mesh.neighbor >= 0)
+    other = mesh.neighbor[triangle, edge]
+    is_first = triangle < other
+    triangle, edge, other = triangle[is_first], edge[is_first], other[is_first]
+    transported = reference[triangle] * mesh.edge_transport[triangle, edge]
+    shift = member_offset(
+        nearest_member(transported, mesh.z[other].sum(axis=1), mesh.degree),
+        reference[other],
+        mesh.degree,
     )
-    every = np.arange(lines)
-    here = triangle[:, None] * lines + every
-    there = other[:, None] * lines + (every + shift[:, None]) % lines
-    piece = connected(count * lines, np.stack([here.ravel(), there.ravel()], axis=1))
-    piece = piece.reshape(count, lines)
-    for one in range(lines):
-        for two in range(one):
-            if (piece[:, one] == piece[:, two]).any():
+    slots = np.arange(family_count)
+    node = triangle[:, None] * family_count + slots
+    other_node = other[:, None] * family_count + (slots + shift[:, None]) % family_count
+    component = connected_components(
+        count * family_count, np.stack([node.ravel(), other_node.ravel()], axis=1)
+    )
+    component = component.reshape(count, family_count)
+    for a in range(family_count):
+        for b in range(a):
+            if (component[:, a] == component[:, b]).any():
                 return None
-    return _in_order(ground, piece, first)
+    return _order_labels(mesh, component, reference)
 
 
-def _in_order(ground: Ground, piece: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Pieces of the covering as numbers from 0, by how they lie at the first triangle of each."""
-    lines = piece.shape[1]
-    family = np.full(int(piece.max()) + 1, -1, dtype=np.int64)
-    order = np.argsort(piece[:, 0], kind="stable")
-    _, begins = np.unique(piece[order].min(axis=1), return_index=True)
-    guided = _guided(ground, first, None)
-    shift = line_number(guided, first, ground.degree) % lines
-    for triangle in order[begins]:
-        own = piece[triangle]
-        if (family[own] >= 0).any():
+def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Number the components of the covering from 0 in each connected part of the surface.
+
+    The order is that of the lines in the first triangle of the part, counter-clockwise from the
+    line nearest to the guide direction.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    component : (T, M) ndarray of int
+        Connected component of each line in each triangle.
+    reference : (T,) complex128 ndarray
+        `reference_members` of the mesh.
+
+    Returns
+    -------
+    (T, M) int64 ndarray
+    """
+    family_count = component.shape[1]
+    family = np.full(int(component.max()) + 1, -1, dtype=np.int64)
+    order = np.argsort(component[:, 0], kind="stable")
+    _, first_triangle = np.unique(component[order].min(axis=1), return_index=True)
+    guided = _members_near_guide(mesh, reference, None)
+    shift = member_offset(guided, reference, mesh.degree) % family_count
+    for triangle in order[first_triangle]:
+        components = component[triangle]
+        if (family[components] >= 0).any():
             continue
-        family[np.roll(own, -shift[triangle])] = np.arange(lines)
-    return np.maximum(family, 0)[piece]
+        family[np.roll(components, -shift[triangle])] = np.arange(family_count)
+    return np.maximum(family, 0)[component]
 
 
-def _guided(ground: Ground, first: np.ndarray, right: np.ndarray | None) -> np.ndarray:
-    """(T,) complex: the members nearest to a direction projected to the triangles."""
-    guides = GUIDES if right is None else np.concatenate([[np.asarray(right, float)], GUIDES])
-    guide = np.zeros_like(ground.normal)
-    for axis in guides[::-1]:
-        flat = axis - dot(ground.normal, axis)[:, None] * ground.normal
-        steep = dot(flat, flat) > 0.1
-        guide[steep] = unit(flat[steep])
-    near = dot(guide, ground.x) + 1j * dot(guide, ground.y)
-    near = np.where(near != 0, near, 1)
-    z = ground.z.sum(axis=1)
-    return nearest_member(near / np.abs(near), np.where(z != 0, z, 1), ground.degree)
+def _members_near_guide(
+    mesh: TangentMesh, reference: np.ndarray, right: np.ndarray | None
+) -> np.ndarray:
+    """Return (T,) complex128: the members nearest to the guide direction in the triangle planes.
+
+    The guide is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle.
+    """
+    axes = GUIDE_AXES if right is None else np.concatenate([[np.asarray(right, float)], GUIDE_AXES])
+    guide = np.zeros_like(mesh.normal)
+    for axis in axes[::-1]:
+        projected = axis - dot(mesh.normal, axis)[:, None] * mesh.normal
+        is_usable = dot(projected, projected) > 0.1
+        guide[is_usable] = normalize(projected[is_usable])
+    guide_tangent = dot(guide, mesh.x) + 1j * dot(guide, mesh.y)
+    guide_tangent = np.where(guide_tangent != 0, guide_tangent, 1)
+    z = mesh.z.sum(axis=1)
+    return nearest_member(
+        guide_tangent / np.abs(guide_tangent), np.where(z != 0, z, 1), mesh.degree
+    )

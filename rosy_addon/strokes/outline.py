@@ -1,61 +1,66 @@
-"""Lines of the shape itself: silhouettes, creases and borders."""
+"""Outlines of meshes as strokes: silhouettes, creases and borders."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..field.frames import dot, unit
-from ..field.surface import surface_edges
+from ..field.frames import dot, normalize
+from ..field.surface import build_edges
 from ..projection.camera import Camera
-from ..projection.gbuffer import Body
-from .ground import CREASE_ANGLE, sharp_sides
-from .strokes import Strokes
+from ..projection.gbuffer import MeshInstance
+from .stroke_set import Strokes
+from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
 
-#: What `Strokes.names` of an outline are, by family.
-KINDS = ("silhouettes", "creases", "borders")
+#: `Strokes.names` of an outline: the kind of line of each family.
+OUTLINE_KINDS = ("silhouettes", "creases", "borders")
 
 
 def outline(
-    body: Body, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
+    instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
 ) -> Strokes:
-    """Silhouettes, creases and borders of a body.
+    """Extract the silhouettes, creases and borders of a mesh instance.
+
+    Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
+    the camera. They pass smoothly through the triangles (Hertzmann and Zorin, "Illustrating Smooth
+    Surfaces", SIGGRAPH 2000).
 
     Parameters
     ----------
-    body : Body
+    instance : MeshInstance
     camera : Camera, optional
-        For whose eye the silhouettes are; none without.
+        Camera of the silhouettes. Without a camera there are no silhouettes.
     crease_angle : float
-        Radians by which the surface bends at a sharp edge, at least.
+        Smallest angle in radians between the normals of the two triangles at a crease. Creases are
+        only at edges across which normals are not interpolated.
 
     Returns
     -------
     Strokes
-        Families as in `KINDS`; members and spacings are 0. Silhouettes are where interpolated
-        normals are across the direction to the eye: smooth lines through the triangles (Hertzmann
-        and Zorin, "Illustrating Smooth Surfaces", 2000).
+        World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
-    surface = body.surface
-    matrix = np.asarray(body.matrix, dtype=np.float64)
-    points = body.world_points()
+    surface = instance.surface
+    matrix = np.asarray(instance.matrix, dtype=np.float64)
+    points = instance.world_points()
     corner = points[surface.triangle_vertex]
     linear = matrix[:3, :3]
     cofactors = np.array([np.cross(linear[k - 2], linear[k - 1]) for k in range(3)])
-    normal = unit(surface.corner_normal @ cofactors.T)[surface.triangles]
-    creases, borders = _edges(surface, corner, crease_angle)
-    found = [
-        _silhouettes(surface, corner, normal, camera) if camera is not None else _none(),
-        _along_edges(corner, normal, creases),
-        _along_edges(corner, normal, borders),
+    normal = normalize(surface.corner_normal @ cofactors.T)[surface.triangles]
+    creases, borders = _crease_and_border_corners(surface, corner, crease_angle)
+    segments = [
+        _silhouettes(surface, corner, normal, camera) if camera is not None else _no_segments(),
+        _edge_segments(corner, normal, creases),
+        _edge_segments(corner, normal, borders),
     ]
-    return _as_strokes([_chained(*each) for each in found], surface.triangle_face)
+    return _to_strokes([_chain_segments(*family) for family in segments], surface.triangle_face)
 
 
-#: Ends of pieces: (k, 2) keys, (k, 2, 3) points, (k, 2, 3) normals, (k,) triangles.
-_Pieces = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+#: k segments: (k, 2) keys of the end points, (k, 2, 3) end points, (k, 2, 3) normals there and (k,)
+#: triangles. End points are the same if their keys are equal.
+_Segments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _none() -> _Pieces:
+def _no_segments() -> _Segments:
+    """Return empty arrays."""
     return (
         np.empty((0, 2), np.int64),
         np.empty((0, 2, 3)),
@@ -64,58 +69,70 @@ def _none() -> _Pieces:
     )
 
 
-def _silhouettes(surface, corner: np.ndarray, normal: np.ndarray, camera: Camera) -> _Pieces:
-    """Where n . w is 0, a straight piece in each triangle in which it changes its sign."""
-    facing = dot(normal, camera.toward(corner))
+def _silhouettes(surface, corner: np.ndarray, normal: np.ndarray, camera: Camera) -> _Segments:
+    """Return the zero set of n . w, where w is the direction to the camera.
+
+    It has a straight segment in each triangle in which n . w changes its sign.
+    """
+    facing = dot(normal, camera.view_directions(corner))
     front = facing > 0
     triangle = np.flatnonzero(front.any(axis=1) & ~front.all(axis=1))
     front, facing = front[triangle], facing[triangle]
-    alone = np.argmax(front == (front.sum(axis=1) == 1)[:, None], axis=1)
+    lone_corner = np.argmax(front == (front.sum(axis=1) == 1)[:, None], axis=1)
     row = np.arange(len(triangle))
     ends, normals, keys = [], [], []
     vertex = surface.triangle_vertex[triangle].astype(np.int64)
-    span = len(surface.vertices)
+    vertex_count = len(surface.vertices)
     for step in (1, 2):
-        other = (alone + step) % 3
-        share = facing[row, alone] / (facing[row, alone] - facing[row, other])
-        for out, values in ((ends, corner), (normals, normal)):
-            a, b = values[triangle, alone], values[triangle, other]
-            out.append(a + share[:, None] * (b - a))
-        low, high = np.sort(np.stack([vertex[row, alone], vertex[row, other]], axis=1), axis=1).T
-        keys.append(low * span + high)
-    return np.stack(keys, 1), np.stack(ends, 1), unit(np.stack(normals, 1)), triangle
+        other = (lone_corner + step) % 3
+        fraction = facing[row, lone_corner] / (facing[row, lone_corner] - facing[row, other])
+        for target, values in ((ends, corner), (normals, normal)):
+            a, b = values[triangle, lone_corner], values[triangle, other]
+            target.append(a + fraction[:, None] * (b - a))
+        low, high = np.sort(
+            np.stack([vertex[row, lone_corner], vertex[row, other]], axis=1), axis=1
+        ).T
+        keys.append(low * vertex_count + high)
+    return np.stack(keys, 1), np.stack(ends, 1), normalize(np.stack(normals, 1)), triangle
 
 
-def _edges(surface, corner: np.ndarray, crease_angle: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3 t + k) that creases and borders start from."""
+def _crease_and_border_corners(
+    surface, corner: np.ndarray, crease_angle: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (3 t + k) at which the edges of creases and of borders start."""
     vertex = surface.triangle_vertex.ravel()
-    edges = surface_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
-    a, b = edges.sides[:, 0], edges.sides[:, 1]
-    normal = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-    bent = dot(normal[a // 3], normal[b // 3]) < np.cos(crease_angle)
-    open_ends = np.ones(len(edges.uses), dtype=bool)
-    open_ends[edges.inner] = False
-    borders = np.flatnonzero(open_ends[edges.corner_edge])
-    return a[bent & sharp_sides(surface, a, b)], borders
+    edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    normal = normalize(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
+    is_bent = dot(normal[a // 3], normal[b // 3]) < np.cos(crease_angle)
+    is_border_edge = np.ones(len(edges.face_count), dtype=bool)
+    is_border_edge[edges.interior] = False
+    borders = np.flatnonzero(is_border_edge[edges.corner_edge])
+    return a[is_bent & is_sharp_edge(surface, a, b)], borders
 
 
-def _along_edges(corner: np.ndarray, normal: np.ndarray, starts: np.ndarray) -> _Pieces:
-    """Whole edges; points are told apart by their places."""
+def _edge_segments(corner: np.ndarray, normal: np.ndarray, starts: np.ndarray) -> _Segments:
+    """Return the edges that start at the given corners; equal positions get equal keys."""
     triangle, k = starts // 3, starts % 3
     ends = np.stack([corner[triangle, k], corner[triangle, (k + 1) % 3]], axis=1)
     normals = np.stack([normal[triangle, k], normal[triangle, (k + 1) % 3]], axis=1)
     if not len(starts):
-        return _none()
+        return _no_segments()
     _, keys = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
     return keys.reshape(-1, 2).astype(np.int64), ends, normals, triangle
 
 
-def _chained(
+def _chain_segments(
     keys: np.ndarray, ends: np.ndarray, normals: np.ndarray, triangle: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]:
-    """Pieces that share their ends, joined: points, normals, triangles, and if it is closed.
+    """Join segments that share end points into polylines.
 
-    Lines end where they meet in other numbers than two.
+    A polyline ends at each point that does not have exactly two segments.
+
+    Returns
+    -------
+    list of (points, normals, triangles, closed)
+        (p, 3) points and normals, (p,) triangles, and whether the last point is the first.
     """
     count = len(keys)
     flat = keys.ravel()
@@ -124,19 +141,19 @@ def _chained(
     mate = np.full(2 * count, -1, dtype=np.int64)
     pairs = first[uses == 2]
     mate[order[pairs]], mate[order[pairs + 1]] = order[pairs + 1], order[pairs]
-    mate, left = mate.tolist(), np.ones(count, dtype=bool).tolist()
-    heads = [end for end in range(2 * count) if mate[end] < 0] + list(range(0, 2 * count, 2))
+    mate, unused = mate.tolist(), np.ones(count, dtype=bool).tolist()
+    chain_starts = [end for end in range(2 * count) if mate[end] < 0] + list(range(0, 2 * count, 2))
     chains = []
-    for head in heads:
-        if not left[head // 2]:
+    for chain_start in chain_starts:
+        if not unused[chain_start // 2]:
             continue
-        chain, end = [head], head
+        chain, end = [chain_start], chain_start
         while True:
-            left[end // 2] = False
+            unused[end // 2] = False
             end ^= 1
             chain.append(end)
             end = mate[end]
-            if end < 0 or not left[end // 2]:
+            if end < 0 or not unused[end // 2]:
                 break
         points = np.array(chain)
         chains.append(
@@ -150,13 +167,17 @@ def _chained(
     return chains
 
 
-def _as_strokes(
+def _to_strokes(
     families: list[list[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]], face: np.ndarray
 ) -> Strokes:
+    """Return the polylines of `_chain_segments` as strokes, one list for each family.
+
+    `face` is the (T,) face of each triangle.
+    """
     chains = [chain for family in families for chain in family]
-    number = np.repeat(np.arange(len(families)), [len(family) for family in families])
-    size = [len(points) for points, _, _, _ in chains]
-    start = np.concatenate([[0], np.cumsum(size, dtype=np.int64)])
+    family_index = np.repeat(np.arange(len(families)), [len(family) for family in families])
+    counts = [len(points) for points, _, _, _ in chains]
+    start = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
     columns = [np.concatenate(column) for column in list(zip(*chains, strict=True))[:3]] or [
         np.empty((0, 3)),
         np.empty((0, 3)),
@@ -167,8 +188,8 @@ def _as_strokes(
     return Strokes(
         points=points,
         start=start,
-        family=number.astype(np.int32),
-        names=KINDS,
+        family=family_index.astype(np.int32),
+        names=OUTLINE_KINDS,
         face=face[triangle],
         triangle=triangle.astype(np.int32),
         weights=np.full((total, 3), np.nan),

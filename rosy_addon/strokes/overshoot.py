@@ -1,4 +1,7 @@
-"""Strokes that run on past where something ends them, as lines do that are drawn with a swing."""
+"""Overshoot: extend strokes beyond occluding edges, borders and the end of the shade.
+
+This imitates lines drawn by hand with a swing.
+"""
 
 from __future__ import annotations
 
@@ -8,214 +11,301 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.frames import unit
+from ..field.frames import normalize
 from ..projection.camera import Camera
-from ..projection.gbuffer import Body
-from .ground import Ground
-from .seen import LOOK, STEEPEST, densified, on_screen, pixel_size, sight
-from .strokes import COLUMNS, Strokes, arcs
+from ..projection.gbuffer import MeshInstance
+from .stroke_set import POINT_COLUMNS, Strokes, arc_lengths
+from .tangent_mesh import TangentMesh
+from .visibility import (
+    MAX_STEEPNESS,
+    SAMPLE_STEP_PX,
+    pixel_size,
+    project_to_pixels,
+    rasterize_depth,
+    subdivide_to_pixels,
+)
 
-#: Share of what is asked for by which each end runs on at least.
-LEAST = 0.3
+#: Shortest extension of an end, as a fraction of the longest.
+MIN_EXTENSION_RATIO = 0.3
 
-#: Pixels before an end at which a stroke goes straight on, and for how many its direction is
-#: taken before; at most so large a share of it each.
-BACK, BACK_SHARE = 6.0, 0.25
+#: Distance in pixels before an end at which the extension leaves the stroke. The direction of the
+#: extension is measured over the same length. Both are at most the second constant as a fraction
+#: of the length of the stroke.
+BACKTRACK_PX, MAX_BACKTRACK_RATIO = 6.0, 0.25
 
-#: Strokes run on at either end by at most so large a share of what they are long.
-LONGEST = 0.5
+#: Longest extension of an end, as a fraction of the length of the stroke.
+MAX_EXTENSION_RATIO = 0.5
 
-#: Barycentric coordinates below this are 0: the point is on an edge.
-ON_EDGE = 1e-9
+#: A point is on an edge if a barycentric coordinate is below this.
+EDGE_EPS = 1e-9
 
 
-def loose_at_edges(strokes: Strokes, ground: Ground) -> Strokes:
-    """Strokes as they were traced, loose where their surface ends and nowhere else.
+def mark_free_boundary_ends(strokes: Strokes, mesh: TangentMesh) -> Strokes:
+    """Set `Strokes.free_ends` to the ends that are on a boundary of the mesh.
 
     Parameters
     ----------
     strokes : Strokes
-        With weights at their ends.
-    ground : Ground
-        That they were traced on: borders end it, and creases that strokes do not cross.
+        As they were traced, with barycentric weights at their ends.
+    mesh : TangentMesh
+        The mesh on which they were traced. Its boundaries are the borders of the surface and the
+        creases that strokes do not cross.
     """
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
-    on_edge = strokes.weights[ends] < ON_EDGE
-    ended = (on_edge & (ground.across[strokes.triangle[ends]] < 0)).any(axis=2)
-    return replace(strokes, loose=ended & ~strokes.closed[:, None])
+    on_edge = strokes.weights[ends] < EDGE_EPS
+    at_boundary = (on_edge & (mesh.neighbor[strokes.triangle[ends]] < 0)).any(axis=2)
+    return replace(strokes, free_ends=at_boundary & ~strokes.closed[:, None])
 
 
-def overshot(
-    strokes: Strokes, camera: Camera, pixels: float, bodies: Sequence[Body] | None = None
+def extend_free_ends(
+    strokes: Strokes,
+    camera: Camera,
+    max_pixels: float,
+    instances: Sequence[MeshInstance] | None = None,
 ) -> Strokes:
-    """Let loose ends run on, straight ahead, some farther than others.
+    """Extend free ends in a straight line, by pseudorandom lengths.
 
-    Lines that follow no member stay as they are.
+    Lines that follow no member of the field, such as outlines, are not extended.
 
     Parameters
     ----------
     strokes : Strokes
-        As `seen` leaves them.
+        As `clip_to_visible` returns them.
     camera : Camera
-    pixels : float
-        By which ends run on at most, at least by `LEAST` of it.
-    bodies : sequence of Body, optional
-        Straight ahead is so in the picture: at the depth of the end, or on what the camera sees
-        there of these if the surface goes on or something else is in front. If not given it is
-        straight ahead in space.
+    max_pixels : float
+        Longest extension in pixels. The shortest is `MIN_EXTENSION_RATIO` of it.
+    instances : sequence of MeshInstance, optional
+        If given, extensions are straight in the picture. They are at the depth of the end, or on
+        the visible surface of these instances where it is nearer or continues at about that depth.
+        If not given, extensions are straight in world space.
 
     Returns
     -------
     Strokes
-        With points at most `LOOK` pixels apart where they run on, also outside the frame.
+        Points of extensions are at most `SAMPLE_STEP_PX` pixels apart. Extensions are not clipped
+        to the frame.
+
+    See Also
+    --------
+    mark_free_boundary_ends : Marks the ends at borders.
+    Strokes.runs_where : Marks the ends at removed points.
     """
-    if bodies is None:
-        strokes = densified(strokes, camera)
-    flat = np.nan_to_num(on_screen(strokes.points, camera)[0])
-    arc = arcs(np.column_stack([flat, np.zeros(len(flat))]), strokes.start)
+    if instances is None:
+        strokes = subdivide_to_pixels(strokes, camera)
+    screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
+    arc = arc_lengths(np.column_stack([screen, np.zeros(len(screen))]), strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
-    loose = strokes.is_loose & strokes.member[ends].any(axis=2)
-    stroke, side = np.nonzero(loose & (arc[ends[:, 1]] > 0)[:, None])
+    is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
+    stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    ahead = _in_space if bodies is None else _in_picture
-    leave, origin, way = ahead(strokes, arc, end, np.minimum(BACK, BACK_SHARE * total), camera)
-    length = np.minimum(pixels * _shares(len(strokes))[stroke, side], LONGEST * total)
-    length = length + np.abs(arc[end] - arc[leave])
-    goes = way.any(axis=1) & np.isfinite(way).all(axis=1)
-    tails = _Tails(*(column[goes] for column in (leave, side, origin, way, length)))
-    longer, along = _with_tails(strokes, tails)
-    return longer if bodies is None else _on_what_is_there(longer, along, bodies, camera)
+    extend = _extension_in_space if instances is None else _extension_in_picture
+    start_point, origin, step = extend(
+        strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
+    )
+    length = np.minimum(
+        max_pixels * _extension_ratios(len(strokes))[stroke, side], MAX_EXTENSION_RATIO * total
+    )
+    length = length + np.abs(arc[end] - arc[start_point])
+    is_valid = step.any(axis=1) & np.isfinite(step).all(axis=1)
+    extensions = _Extensions(
+        *(column[is_valid] for column in (start_point, side, origin, step, length))
+    )
+    extended, distance = _append_extensions(strokes, extensions)
+    return (
+        extended
+        if instances is None
+        else _drop_onto_surfaces(extended, distance, instances, camera)
+    )
 
 
-def _in_space(
-    strokes: Strokes, arc: np.ndarray, end: np.ndarray, back: np.ndarray, camera: Camera
+def _extension_in_space(
+    strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of (k,) ends the points that they are left at, where that is, and which way for a pixel.
+    """Return the lines along which (k,) ends are extended in world space.
 
-    The direction is that over the last (k,) pixels before.
+    Parameters
+    ----------
+    strokes : Strokes
+    arc : (n,) float64 ndarray
+        Arc lengths of points, in pixels.
+    end : (k,) int64 ndarray
+        Numbers of the end points.
+    backtrack : (k,) float64 ndarray
+        Length in pixels before the end over which the direction is measured.
+    camera : Camera
+
+    Returns
+    -------
+    start_point : (k,) int64 ndarray
+        Points at which the extensions leave the strokes.
+    origin : (k, 3) float64 ndarray
+        Origins of the extensions, in world space.
+    step : (k, 3) float64 ndarray
+        Steps of one pixel, in world space.
     """
-    before, origin = _before_end(arc, strokes, end, back), strokes.points[end]
-    way = pixel_size(origin, camera)[:, None] * unit(origin - strokes.points[before])
-    return end, origin, way
+    before, origin = _point_before_end(arc, strokes, end, backtrack), strokes.points[end]
+    step = pixel_size(origin, camera)[:, None] * normalize(origin - strokes.points[before])
+    return end, origin, step
 
 
-def _in_picture(
-    strokes: Strokes, arc: np.ndarray, end: np.ndarray, back: np.ndarray, camera: Camera
+def _extension_in_picture(
+    strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same in the plane of the ends that is parallel to the picture.
+    """Return the same for extensions that are straight in the picture.
 
-    They are left so many pixels early: right at a silhouette all lines turn along it.
+    They lie in the plane through the end that is parallel to the image plane. They leave the stroke
+    `backtrack` pixels before its end, because lines bend along the silhouette close to it.
     """
-    leave = _before_end(arc, strokes, end, back)
-    before = _before_end(arc, strokes, end, back + np.abs(arc[end] - arc[leave]))
-    here, depth = on_screen(strokes.points[leave], camera)
-    there, _ = on_screen(strokes.points[before], camera)
-    _, far = on_screen(strokes.points[end], camera)
-    origin = _at_depth(strokes.points[leave], depth, far, camera)
-    return leave, origin, _across(unit(here - there), far, camera)
+    start_point = _point_before_end(arc, strokes, end, backtrack)
+    before = _point_before_end(arc, strokes, end, backtrack + np.abs(arc[end] - arc[start_point]))
+    start_pixel, depth = project_to_pixels(strokes.points[start_point], camera)
+    before_pixel, _ = project_to_pixels(strokes.points[before], camera)
+    _, end_depth = project_to_pixels(strokes.points[end], camera)
+    origin = _move_to_depth(strokes.points[start_point], depth, end_depth, camera)
+    return (
+        start_point,
+        origin,
+        _pixel_steps_to_world(normalize(start_pixel - before_pixel), end_depth, camera),
+    )
 
 
-def _before_end(arc: np.ndarray, strokes: Strokes, end: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """(k,) points of strokes that are so far along them from first or last ones, or farther."""
+def _point_before_end(
+    arc: np.ndarray, strokes: Strokes, end: np.ndarray, distance: np.ndarray
+) -> np.ndarray:
+    """Return (k,) numbers of the points nearest to ends that are at least `distance` from them.
+
+    The distance is in the unit of `arc`, along the stroke.
+    """
     stroke = strokes.stroke[end]
     first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
-    span = 2 * arc.max(initial=0) + 1
-    key = arc + strokes.stroke * span
-    after = np.searchsorted(key, far + stroke * span, side="left")
-    before = np.searchsorted(key, arc[last] - far + stroke * span, side="right") - 1
+    stride = 2 * arc.max(initial=0) + 1
+    key = arc + strokes.stroke * stride
+    after = np.searchsorted(key, distance + stroke * stride, side="left")
+    before = np.searchsorted(key, arc[last] - distance + stroke * stride, side="right") - 1
     return np.clip(np.where(end == first, after, before), first, last)
 
 
-def _at_depth(
-    points: np.ndarray, depth: np.ndarray, wanted: np.ndarray, camera: Camera
+def _move_to_depth(
+    points: np.ndarray, depth: np.ndarray, target_depth: np.ndarray, camera: Camera
 ) -> np.ndarray:
-    """(k, 3) points moved along their rays from one depth to another."""
-    toward = camera.toward(points)
-    return points + ((depth - wanted) / (toward @ camera.view[2, :3]))[:, None] * toward
+    """Return (k, 3) points moved along their view rays from `depth` to `target_depth`."""
+    to_camera = camera.view_directions(points)
+    return points + ((depth - target_depth) / (to_camera @ camera.view[2, :3]))[:, None] * to_camera
 
 
-def _across(ways: np.ndarray, depth: np.ndarray, camera: Camera) -> np.ndarray:
-    """(k, 3) world space: steps in the picture, in pixels, at depths along the camera's axis."""
-    steps = (ways * 2 / (camera.width, camera.height)) @ camera.across_axis.T
+def _pixel_steps_to_world(pixel_steps: np.ndarray, depth: np.ndarray, camera: Camera) -> np.ndarray:
+    """Convert (k, 2) steps in pixels to (k, 3) steps in world space, parallel to the image plane.
+
+    `depth` is the (k,) depth along the axis of the camera.
+    """
+    view_steps = (pixel_steps * 2 / (camera.width, camera.height)) @ camera.clip_to_camera_xy.T
     if camera.is_perspective:
-        steps *= depth[:, None]
-    return steps @ camera.view[:2, :3]
+        view_steps *= depth[:, None]
+    return view_steps @ camera.view[:2, :3]
 
 
-def _shares(count: int) -> np.ndarray:
-    """(count, 2) float64 from `LEAST` to 1, scattered: a hash of the number of each end."""
+def _extension_ratios(count: int) -> np.ndarray:
+    """Return (count, 2) float64 pseudorandom ratios from `MIN_EXTENSION_RATIO` to 1.
+
+    Each ratio is a hash of the number of the end.
+    """
     bits = np.arange(1, 2 * count + 1, dtype=np.uint64)
     for shift, factor in ((32, 0x9E3779B97F4A7C15), (29, 0xBF58476D1CE4E5B9), (32, 1)):
         bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)
-    share = (bits >> np.uint64(11)).astype(np.float64) / 2.0**53
-    return (LEAST + (1 - LEAST) * share).reshape(count, 2)
+    ratio = (bits >> np.uint64(11)).astype(np.float64) / 2.0**53
+    return (MIN_EXTENSION_RATIO + (1 - MIN_EXTENSION_RATIO) * ratio).reshape(count, 2)
 
 
-class _Tails(NamedTuple):
-    """Straight lines in place of the ends of strokes.
+class _Extensions(NamedTuple):
+    """k straight lines that replace ends of strokes.
 
     Attributes
     ----------
-    leave : (k,) int64 ndarray
-        Points that they start from.
+    start_point : (k,) int64 ndarray
+        Numbers of the points at which they leave the strokes.
     side : (k,) int64 ndarray
-        0 for the first points of strokes, 1 for the last ones.
+        0 for the first point of a stroke, 1 for the last one.
     origin : (k, 3) float64 ndarray
-        World space: that point, or one that is at the same place in the picture.
-    way : (k, 3) float64 ndarray
-        World space, for each pixel.
+        Origin in world space: the start point, or a point at the same position in the picture.
+    step : (k, 3) float64 ndarray
+        Step of one pixel, in world space.
     length : (k,) float64 ndarray
-        In pixels.
+        Length in pixels.
     """
 
-    leave: np.ndarray
+    start_point: np.ndarray
     side: np.ndarray
     origin: np.ndarray
-    way: np.ndarray
+    step: np.ndarray
     length: np.ndarray
 
 
-def _with_tails(strokes: Strokes, tails: _Tails) -> tuple[Strokes, np.ndarray]:
-    """Strokes, and for each point by how many pixels it is along a tail; 0 for those that stay."""
+def _append_extensions(strokes: Strokes, extensions: _Extensions) -> tuple[Strokes, np.ndarray]:
+    """Replace the ends of strokes by extensions.
+
+    Returns
+    -------
+    extended : Strokes
+    distance : (n,) float64 ndarray
+        Distance in pixels of each point from the origin of its extension; 0 for original points.
+    """
     low, high = strokes.start[:-1].copy(), strokes.start[1:] - 1
-    whose, first = strokes.stroke[tails.leave], tails.side == 0
-    low[whose[first]], high[whose[~first]] = tails.leave[first], tails.leave[~first]
-    own = np.arange(len(strokes.points))
-    own = own[(own >= low[strokes.stroke]) & (own <= high[strokes.stroke])]
-    count = np.ceil(tails.length / LOOK).astype(np.int64)
-    tail = np.repeat(np.arange(len(count)), count)
-    step = np.arange(len(tail)) - np.repeat(np.cumsum(count) - count, count) + 1
-    place = np.concatenate([own, tails.leave[tail] + np.where(first[tail], -step, step)])
-    point = np.concatenate([own, tails.leave[tail]])
-    ahead = (tails.length / count)[tail] * step
-    along = np.concatenate([np.zeros(len(own)), ahead])
-    points = np.concatenate(
-        [strokes.points[own], tails.origin[tail] + ahead[:, None] * tails.way[tail]]
+    owner, at_start = strokes.stroke[extensions.start_point], extensions.side == 0
+    low[owner[at_start]], high[owner[~at_start]] = (
+        extensions.start_point[at_start],
+        extensions.start_point[~at_start],
     )
-    order = np.lexsort((place, strokes.stroke[point]))
-    point, along = point[order], along[order]
-    columns = {name: getattr(strokes, name)[point] for name in COLUMNS}
+    kept_points = np.arange(len(strokes.points))
+    kept_points = kept_points[
+        (kept_points >= low[strokes.stroke]) & (kept_points <= high[strokes.stroke])
+    ]
+    count = np.ceil(extensions.length / SAMPLE_STEP_PX).astype(np.int64)
+    extension = np.repeat(np.arange(len(count)), count)
+    step = np.arange(len(extension)) - np.repeat(np.cumsum(count) - count, count) + 1
+    sort_key = np.concatenate(
+        [
+            kept_points,
+            extensions.start_point[extension] + np.where(at_start[extension], -step, step),
+        ]
+    )
+    point = np.concatenate([kept_points, extensions.start_point[extension]])
+    extension_distance = (extensions.length / count)[extension] * step
+    distance = np.concatenate([np.zeros(len(kept_points)), extension_distance])
+    points = np.concatenate(
+        [
+            strokes.points[kept_points],
+            extensions.origin[extension] + extension_distance[:, None] * extensions.step[extension],
+        ]
+    )
+    order = np.lexsort((sort_key, strokes.stroke[point]))
+    point, distance = point[order], distance[order]
+    columns = {name: getattr(strokes, name)[point] for name in POINT_COLUMNS}
     columns["points"] = points[order]
-    columns["weights"] = np.where(along[:, None] > 0, np.nan, columns["weights"])
-    size = np.bincount(strokes.stroke[point], minlength=len(strokes))
-    return replace(strokes, **columns, start=np.concatenate([[0], np.cumsum(size)])), along
+    columns["weights"] = np.where(distance[:, None] > 0, np.nan, columns["weights"])
+    counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
+    return replace(strokes, **columns, start=np.concatenate([[0], np.cumsum(counts)])), distance
 
 
-def _on_what_is_there(
-    strokes: Strokes, along: np.ndarray, bodies: Sequence[Body], camera: Camera
+def _drop_onto_surfaces(
+    strokes: Strokes, distance: np.ndarray, instances: Sequence[MeshInstance], camera: Camera
 ) -> Strokes:
-    """Points past ends moved along their rays onto what is in front, or a little behind, there."""
-    tail = np.flatnonzero(along > 0)
-    points = strokes.points[tail]
-    pixels, depth = on_screen(points, camera)
-    size = np.array([camera.width, camera.height])
-    column, row = np.clip(np.nan_to_num(pixels), 0, size - 1).astype(np.int64).T
-    there = sight(bodies, camera)
-    wanted = there.depth[row, column]
-    slope = STEEPEST * (along[tail] + BACK) * pixel_size(points, camera)
-    goes = wanted < depth + slope
-    tail = tail[goes]
+    """Move points of extensions along their view rays onto the visible surface.
+
+    Points are moved if the surface is in front of them, or behind them by less than a tolerance.
+    """
+    extended = np.flatnonzero(distance > 0)
+    points = strokes.points[extended]
+    pixels, depth = project_to_pixels(points, camera)
+    frame_size = np.array([camera.width, camera.height])
+    column, row = np.clip(np.nan_to_num(pixels), 0, frame_size - 1).astype(np.int64).T
+    depth_buffer = rasterize_depth(instances, camera)
+    target_depth = depth_buffer.depth[row, column]
+    tolerance = MAX_STEEPNESS * (distance[extended] + BACKTRACK_PX) * pixel_size(points, camera)
+    moves = target_depth < depth + tolerance
+    extended = extended[moves]
     moved, normal = strokes.points.copy(), strokes.normal.copy()
-    moved[tail] = _at_depth(points[goes], depth[goes], wanted[goes], camera)
-    normal[tail] = there.normal[there.triangle[row, column][goes]] @ camera.view[:3, :3]
+    moved[extended] = _move_to_depth(points[moves], depth[moves], target_depth[moves], camera)
+    normal[extended] = (
+        depth_buffer.normal[depth_buffer.triangle[row, column][moves]] @ camera.view[:3, :3]
+    )
     return replace(strokes, points=moved, normal=normal)

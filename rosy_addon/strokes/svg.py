@@ -1,4 +1,4 @@
-"""Strokes as an .svg file: for browsers, for Inkscape with a layer a family, and for plotters."""
+"""Write strokes to an .svg file for browsers, plotters, and Inkscape with one layer per family."""
 
 from __future__ import annotations
 
@@ -10,43 +10,48 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..errors import RosyError
-from ..files import write_bytes
+from ..file_io import write_bytes
 from ..projection.camera import Camera
-from .outline import KINDS
-from .seen import on_screen
-from .strokes import Strokes
+from .outline import OUTLINE_KINDS
+from .stroke_set import Strokes
+from .visibility import project_to_pixels
 
-#: Steps of opacity in which strokes are drawn.
-SHADES = 16
+#: Number of steps to which opacities are rounded.
+OPACITY_LEVELS = 16
 
-#: Widths, as shares of the full one, that differ by less are the same.
-SAME_WIDTH = 0.02
+#: Widths that differ by less than this fraction of the full width are drawn as constant.
+WIDTH_TOLERANCE = 0.02
 
-#: How much farther out than half the width the outline of a stroke goes where it turns, at most.
-MITRE = 1.25
+#: Largest distance of the outline of a stroke from its center line at a bend, in half widths.
+MAX_MITER = 1.25
 
-#: Pixels by which a polyline may miss the points that are left out of it.
-TOLERANCE = 0.06
+#: Largest distance in pixels between a removed point and the simplified polyline.
+SIMPLIFY_TOLERANCE_PX = 0.06
 
 
 @dataclass(frozen=True)
 class Pen:
-    """How strokes are drawn.
+    """How strokes are drawn: width, colors and page.
 
     Attributes
     ----------
     width : float
-        Of a full stroke, in pixels of the camera.
+        Full width of a stroke, in pixels of the camera.
     colours : sequence of str
-        Of the families in turn, as SVG names them.
+        Colors of the families in turn, as SVG color values. They repeat if there are more families.
     paper : str or None
-        Behind them.
+        Color of the background; None for no background.
     millimetres : float or None
-        What the width of the frame is on paper; pixels if not given.
+        Width of the page in millimeters. If None, the size of the page is in pixels.
     plotter : bool
-        Lines of constant width, in an order in which a pen travels little.
+        Draw lines of constant width, in an order that keeps the travel of the pen short.
     outline : str or None
-        Colour of silhouettes, creases and borders; the next of the others if not given.
+        Color of silhouettes, creases and borders. If None, they take colors from `colours`.
+
+    Raises
+    ------
+    RosyError
+        If a width is not above 0, or there is no color.
     """
 
     width: float = 1.0
@@ -62,47 +67,49 @@ class Pen:
         if self.millimetres is not None and not self.millimetres > 0:
             raise RosyError("a page has a width above 0")
 
-    def inks(self, names: Sequence[str]) -> list[str]:
-        """A colour for each of the families of strokes, by `Strokes.names`."""
+    def family_colors(self, names: Sequence[str]) -> list[str]:
+        """Return the color of each family, given `Strokes.names`."""
         return [
-            self.colours[place % len(self.colours)]
-            if self.outline is None or name not in KINDS
+            self.colours[index % len(self.colours)]
+            if self.outline is None or name not in OUTLINE_KINDS
             else self.outline
-            for place, name in enumerate(names)
+            for index, name in enumerate(names)
         ]
 
 
 def write_svg(
     path: str | os.PathLike[str], strokes: Strokes, camera: Camera, pen: Pen | None = None
 ) -> None:
-    """Write what `svg_text` makes.
+    """Write strokes to an SVG file; see `svg_text`.
 
     Raises
     ------
     RosyError
-        If it may not be written.
+        If the file cannot be written.
     """
     write_bytes(path, svg_text(strokes, camera, pen).encode())
 
 
 def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
-    """Strokes as a camera sees them; hidden ones are left out by `seen`, not here.
+    """Return strokes as an SVG document, projected by a camera.
+
+    Hidden parts are not removed here; see `clip_to_visible`.
 
     Parameters
     ----------
     strokes : Strokes
-        All in front of the camera.
+        All points in front of the camera.
     camera : Camera
     pen : Pen, optional
 
     Returns
     -------
     str
-        SVG 1.1. Each family is a group that Inkscape takes for a layer, and so is the paper. Each
-        stroke is one path.
+        SVG 1.1. Each family is a group that is a layer in Inkscape, and so is the paper. A stroke
+        is one path, or several if its opacity changes.
     """
     pen = pen or Pen()
-    pixels, _ = on_screen(strokes.points, camera)
+    pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
     if pen.millimetres is not None:
@@ -116,158 +123,188 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
         f'{size} viewBox="0 0 {camera.width} {camera.height}">',
     ]
     if pen.paper is not None:
-        # A layer of its own, and locked: a drag over the drawing takes strokes alone.
+        # The paper is a locked layer, so that a selection by dragging contains only strokes.
         lines += [
             '<g id="paper" inkscape:groupmode="layer" inkscape:label="paper" '
             'sodipodi:insensitive="true">',
             f'<rect width="100%" height="100%" fill={quoteattr(pen.paper)}/>',
             "</g>",
         ]
-    for family, (name, colour) in enumerate(
-        zip(strokes.names, pen.inks(strokes.names), strict=True)
+    for family, (name, color) in enumerate(
+        zip(strokes.names, pen.family_colors(strokes.names), strict=True)
     ):
-        own = strokes.chosen(strokes.family == family)
-        if not len(own):
+        family_strokes = strokes.select(strokes.family == family)
+        if not len(family_strokes):
             continue
-        flat = pixels[np.repeat(strokes.family == family, np.diff(strokes.start))]
+        family_pixels = pixels[np.repeat(strokes.family == family, np.diff(strokes.start))]
         lines.append(
             f'<g id="layer{family + 1}" inkscape:groupmode="layer" inkscape:label={quoteattr(name)} '
-            f'fill="none" stroke={quoteattr(colour)} stroke-width="{pen.width:.3g}" '
+            f'fill="none" stroke={quoteattr(color)} stroke-width="{pen.width:.3g}" '
             'stroke-linecap="round" stroke-linejoin="round">'
         )
-        lines += _plotted(flat, own) if pen.plotter else _drawn(flat, own, pen.width, colour)
+        lines += (
+            _plotter_paths(family_pixels, family_strokes)
+            if pen.plotter
+            else _stroke_paths(family_pixels, family_strokes, pen.width, color)
+        )
         lines.append("</g>")
     lines.append("</svg>")
     return "\n".join(lines) + "\n"
 
 
-def _plotted(pixels: np.ndarray, strokes: Strokes) -> list[str]:
-    """A path a stroke, in the order of `pen_order`."""
-    order, turned = pen_order(pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1])
-    kept = simplified(pixels, strokes.start, TOLERANCE)
+def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
+    """Return one path per stroke, in the order of `plotter_order`."""
+    order, is_reversed = plotter_order(pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1])
+    kept = simplify_mask(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX)
     paths = []
-    for stroke, back in zip(order.tolist(), turned.tolist(), strict=True):
-        part = slice(strokes.start[stroke], strokes.start[stroke + 1])
-        points = pixels[part][kept[part]]
-        points = points[::-1] if back else points
-        paths.append(f'<path d="{_path(points, strokes.closed[stroke])}"/>')
+    for stroke, backward in zip(order.tolist(), is_reversed.tolist(), strict=True):
+        span = slice(strokes.start[stroke], strokes.start[stroke + 1])
+        points = pixels[span][kept[span]]
+        points = points[::-1] if backward else points
+        paths.append(f'<path d="{_line_path(points, strokes.closed[stroke])}"/>')
     return paths
 
 
-def _drawn(pixels: np.ndarray, strokes: Strokes, width: float, colour: str) -> list[str]:
-    """A path a stroke: a line where it is as wide all along, else its outline, filled.
+def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
+    """Return the paths of strokes: a line if the width is constant, otherwise a filled outline.
 
-    Where the opacity changes a stroke is cut, into pieces that end square so as not to overlap.
+    A stroke is split where its opacity changes. The parts have square ends, so that they do not
+    overlap.
     """
-    shade = np.rint(np.clip(strokes.opacity, 0, 1) * SHADES).astype(np.int64)
-    point, start, first = _pieces(shade, strokes)
+    opacity_level = np.rint(np.clip(strokes.opacity, 0, 1) * OPACITY_LEVELS).astype(np.int64)
+    point, start, first = _split_by_opacity(opacity_level, strokes)
     radius = np.clip(strokes.width[point], 0, 1) * width / 2
-    kept = simplified(np.column_stack([pixels[point], radius]), start, TOLERANCE)
+    kept = simplify_mask(np.column_stack([pixels[point], radius]), start, SIMPLIFY_TOLERANCE_PX)
     start = np.concatenate([[0], np.cumsum(kept)])[start]
-    flat, radius = pixels[point][kept], radius[kept]
-    least, most = (side.reduceat(radius, start[:-1]) for side in (np.minimum, np.maximum))
-    left, right = _sides(flat, radius, start)
-    whole = np.bincount(strokes.stroke[first], minlength=len(strokes))[strokes.stroke[first]] == 1
+    points, radius = pixels[point][kept], radius[kept]
+    min_radius, max_radius = (
+        extremum.reduceat(radius, start[:-1]) for extremum in (np.minimum, np.maximum)
+    )
+    left, right = _offset_sides(points, radius, start)
+    is_whole = (
+        np.bincount(strokes.stroke[first], minlength=len(strokes))[strokes.stroke[first]] == 1
+    )
     paths = []
-    for piece, opaque in enumerate(shade[first].tolist()):
-        part = slice(start[piece], start[piece + 1])
-        if not opaque or not most[piece]:
+    for segment, level in enumerate(opacity_level[first].tolist()):
+        span = slice(start[segment], start[segment + 1])
+        if not level or not max_radius[segment]:
             continue
-        more = "" if opaque == SHADES else f' opacity="{opaque / SHADES:.3g}"'
-        if whole[piece] and most[piece] - least[piece] <= SAME_WIDTH * width / 2:
-            wide = 2 * most[piece]
-            more += "" if wide > (1 - SAME_WIDTH) * width else f' stroke-width="{wide:.3g}"'
-            closed = strokes.closed[strokes.stroke[first[piece]]]
-            paths.append(f'<path{more} d="{_path(flat[part], closed)}"/>')
+        attributes = "" if level == OPACITY_LEVELS else f' opacity="{level / OPACITY_LEVELS:.3g}"'
+        if (
+            is_whole[segment]
+            and max_radius[segment] - min_radius[segment] <= WIDTH_TOLERANCE * width / 2
+        ):
+            width_px = 2 * max_radius[segment]
+            attributes += (
+                ""
+                if width_px > (1 - WIDTH_TOLERANCE) * width
+                else f' stroke-width="{width_px:.3g}"'
+            )
+            closed = strokes.closed[strokes.stroke[first[segment]]]
+            paths.append(f'<path{attributes} d="{_line_path(points[span], closed)}"/>')
         else:
-            more += f' fill={quoteattr(colour)} stroke="none"'
-            ends = radius[part][[0, -1]] * whole[piece]
-            paths.append(f'<path{more} d="{_outline(left[part], right[part], ends)}"/>')
+            attributes += f' fill={quoteattr(color)} stroke="none"'
+            ends = radius[span][[0, -1]] * is_whole[segment]
+            paths.append(f'<path{attributes} d="{_outline_path(left[span], right[span], ends)}"/>')
     return paths
 
 
-def _pieces(shade: np.ndarray, strokes: Strokes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stretches of strokes of one shade; the point where the next begins belongs to both.
+def _split_by_opacity(
+    opacity_level: np.ndarray, strokes: Strokes
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Split strokes into pieces of constant opacity. The point between two pieces belongs to both.
 
     Returns
     -------
     point : (m,) int64 ndarray
-        Of the strokes, for the points of all pieces in turn.
+        Numbers of the points of all pieces, one piece after another.
     start : (pieces + 1,) int64 ndarray
+        Start of each piece in `point`, then m.
     first : (pieces,) int64 ndarray
-        Their first points.
+        Number of the first point of each piece.
     """
-    last_of_stroke = np.zeros(len(shade), dtype=bool)
+    last_of_stroke = np.zeros(len(opacity_level), dtype=bool)
     last_of_stroke[strokes.start[1:] - 1] = True
-    begins = np.ones(len(shade), dtype=bool)
-    begins[1:] = (shade[1:] != shade[:-1]) | last_of_stroke[:-1]
-    # A last point alone is the end of the piece before.
-    begins &= ~last_of_stroke
-    first = np.flatnonzero(begins)
-    end = np.append(first[1:], len(shade))
-    # Where a stroke ends the piece does, elsewhere it reaches the next one.
-    last = np.where(last_of_stroke[end - 1], end - 1, np.minimum(end, len(shade) - 1))
+    starts_segment = np.ones(len(opacity_level), dtype=bool)
+    starts_segment[1:] = (opacity_level[1:] != opacity_level[:-1]) | last_of_stroke[:-1]
+    # The last point of a stroke is no piece of its own: it ends the previous piece.
+    starts_segment &= ~last_of_stroke
+    first = np.flatnonzero(starts_segment)
+    end = np.append(first[1:], len(opacity_level))
+    # A piece ends at the end of its stroke, or at the first point of the next piece.
+    last = np.where(last_of_stroke[end - 1], end - 1, np.minimum(end, len(opacity_level) - 1))
     start = np.concatenate([[0], np.cumsum(last - first + 1)])
     point = np.arange(start[-1]) + np.repeat(first - start[:-1], last - first + 1)
     return point, start, first
 
 
-def _sides(
+def _offset_sides(
     points: np.ndarray, radius: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2) points half a width to either side of polylines."""
-    ahead = np.zeros_like(points)
-    ahead[:-1] = points[1:] - points[:-1]
-    length = np.hypot(*ahead.T)
-    ahead /= np.where(length > 0, length, 1)[:, None]
-    behind = np.roll(ahead, 1, axis=0)
-    ahead[start[1:] - 1] = behind[start[1:] - 1]
-    behind[start[:-1]] = ahead[start[:-1]]
-    middle = ahead + behind
-    size = np.hypot(*middle.T)
-    back = size < 1e-6
-    middle = np.where(back[:, None], ahead, middle / np.where(back, 1, size)[:, None])
-    # Half the width of each straight piece, so more where two meet at an angle.
-    farther = np.minimum(2 / np.maximum(size, 1e-6), MITRE)
-    off = (radius * farther)[:, None] * middle[:, ::-1] * (1, -1)
-    return points + off, points - off
+    """Return (n, 2) points to the left and the right of polylines, at a distance of `radius`."""
+    forward = np.zeros_like(points)
+    forward[:-1] = points[1:] - points[:-1]
+    length = np.hypot(*forward.T)
+    forward /= np.where(length > 0, length, 1)[:, None]
+    backward = np.roll(forward, 1, axis=0)
+    forward[start[1:] - 1] = backward[start[1:] - 1]
+    backward[start[:-1]] = forward[start[:-1]]
+    mean_direction = forward + backward
+    norm = np.hypot(*mean_direction.T)
+    is_reversal = norm < 1e-6
+    mean_direction = np.where(
+        is_reversal[:, None], forward, mean_direction / np.where(is_reversal, 1, norm)[:, None]
+    )
+    # The distance is measured from the segments, so it is larger where two meet at an angle.
+    miter = np.minimum(2 / np.maximum(norm, 1e-6), MAX_MITER)
+    offset = (radius * miter)[:, None] * mean_direction[:, ::-1] * (1, -1)
+    return points + offset, points - offset
 
 
-def _outline(left: np.ndarray, right: np.ndarray, ends: np.ndarray) -> str:
-    """Down one side, around the end, back on the other, and around the beginning.
+def _outline_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
+    """Return the path data of a closed outline with round caps.
 
-    `ends` are the radii there, of the beginning and of the end; 0 is square.
+    `end_radii` are the radii of the caps at the start and at the end; 0 is a square end.
     """
-    back = right[::-1]
+    reversed_right = right[::-1]
     return (
-        f"M{_listed(left)} {_turn(ends[1])}{_listed(back[:1])} L{_listed(back[1:])} "
-        f"{_turn(ends[0])}{_listed(left[:1])}Z"
+        f"M{_format_points(left)} {_end_cap(end_radii[1])}{_format_points(reversed_right[:1])} L{_format_points(reversed_right[1:])} "
+        f"{_end_cap(end_radii[0])}{_format_points(left[:1])}Z"
     )
 
 
-def _turn(radius: float) -> str:
-    """Half a circle clockwise, or straight where it would not be seen."""
+def _end_cap(radius: float) -> str:
+    """Return the path command of a clockwise half circle, or of a line if the radius is tiny."""
     return f"A{radius:.2f},{radius:.2f} 0 0 1 " if radius >= 0.05 else "L"
 
 
-def _path(points: np.ndarray, closed: bool) -> str:
-    """A line; of a closed one the last point is the first and is not said again."""
-    return f"M{_listed(points[:-1])}Z" if closed else f"M{_listed(points)}"
+def _line_path(points: np.ndarray, closed: bool) -> str:
+    """Return the path data of a polyline. The repeated last point of a closed one is left out."""
+    return f"M{_format_points(points[:-1])}Z" if closed else f"M{_format_points(points)}"
 
 
-def _listed(points: np.ndarray) -> str:
+def _format_points(points: np.ndarray) -> str:
+    """Return (n, 2) coordinates as SVG text, with two decimals."""
     return " ".join(f"{x:.2f},{y:.2f}" for x, y in points.tolist())
 
 
-def simplified(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
-    """(n,) bool: which points of polylines are enough (Ramer, Douglas and Peucker, all at once).
+def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    """Choose the points of simplified polylines.
+
+    The method is that of Ramer, Douglas and Peucker, for all polylines at once.
 
     Parameters
     ----------
     points : (n, k) ndarray
     start : (S + 1,) ndarray of int
+        As in `Strokes`.
     tolerance : float
-        How far points that are left out may be from what is left.
+        Largest distance of a removed point from the simplified polyline.
+
+    Returns
+    -------
+    (n,) bool ndarray
+        Which points to keep.
     """
     kept = np.zeros(len(points), dtype=bool)
     first, last = start[:-1].astype(np.int64), start[1:].astype(np.int64) - 1
@@ -276,21 +313,23 @@ def simplified(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.nd
     while len(first):
         count = last - first - 1
         begin = np.concatenate([[0], np.cumsum(count)[:-1]])
-        piece = np.repeat(np.arange(len(first)), count)
+        segment = np.repeat(np.arange(len(first)), count)
         point = np.arange(count.sum()) + np.repeat(first + 1 - begin, count)
-        base = points[first][piece]
-        along = points[last][piece] - base
-        off = points[point] - base
-        square = np.einsum("ni,ni->n", along, along)
-        share = np.einsum("ni,ni->n", off, along) / np.where(square > 0, square, 1)
-        off = off - np.clip(share, 0, 1)[:, None] * along
-        distance = np.einsum("ni,ni->n", off, off)
-        most = np.maximum.reduceat(distance, begin)
-        split = most > tolerance**2
-        at = np.flatnonzero(distance == most[piece])
-        where, index = np.unique(piece[at], return_index=True)
+        origin = points[first][segment]
+        chord = points[last][segment] - origin
+        delta = points[point] - origin
+        chord_squared = np.einsum("ni,ni->n", chord, chord)
+        fraction = np.einsum("ni,ni->n", delta, chord) / np.where(
+            chord_squared > 0, chord_squared, 1
+        )
+        delta = delta - np.clip(fraction, 0, 1)[:, None] * chord
+        distance = np.einsum("ni,ni->n", delta, delta)
+        max_distance = np.maximum.reduceat(distance, begin)
+        split = max_distance > tolerance**2
+        farthest = np.flatnonzero(distance == max_distance[segment])
+        split_segment, index = np.unique(segment[farthest], return_index=True)
         middle = np.zeros(len(first), dtype=np.int64)
-        middle[where] = point[at[index]]
+        middle[split_segment] = point[farthest[index]]
         first, middle, last = first[split], middle[split], last[split]
         kept[middle] = True
         first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
@@ -298,75 +337,79 @@ def simplified(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.nd
     return kept
 
 
-def pen_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """An order of strokes, and which of them backward, in which a pen travels little between them.
+def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Order and reverse strokes so that the pen travels little between them.
 
-    Greedy: always the nearest end that is left, found ring by ring in a grid.
+    The next stroke is always the one with the nearest end (greedy). A grid speeds up the search.
 
     Parameters
     ----------
     first, last : (S, 2) ndarray
-        Their ends.
+        Ends of the strokes.
 
     Returns
     -------
     order : (S,) int64 ndarray
-    turned : (S,) bool ndarray
-        In that order.
+    is_reversed : (S,) bool ndarray
+        Whether each stroke is drawn backward, in the new order.
     """
     count = len(first)
     ends = np.concatenate([first, last])
     if not count:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
     low, extent = ends.min(axis=0), np.maximum(np.ptp(ends, axis=0), 1e-9)
-    cells = max(int(np.sqrt(count)), 1)
-    cell = np.minimum(((ends - low) / extent.max() * cells).astype(np.int64), cells - 1)
+    cell_count = max(int(np.sqrt(count)), 1)
+    cell = np.minimum(((ends - low) / extent.max() * cell_count).astype(np.int64), cell_count - 1)
     grid: dict[tuple[int, int], set[int]] = {}
     keys = [tuple(key) for key in cell.tolist()]
-    for number, key in enumerate(keys):
-        grid.setdefault(key, set()).add(number)
-    places = ends.tolist()
-    here, order, turned = low.tolist(), [], []
-    at = (0, 0)
+    for end_index, key in enumerate(keys):
+        grid.setdefault(key, set()).add(end_index)
+    positions = ends.tolist()
+    current, order, is_reversed = low.tolist(), [], []
+    current_cell = (0, 0)
     for _ in range(count):
-        best = _nearest_end(grid, places, here, at, cells, extent.max() / cells)
-        stroke = best % count
+        nearest = _nearest_end(
+            grid, positions, current, current_cell, cell_count, extent.max() / cell_count
+        )
+        stroke = nearest % count
         order.append(stroke)
-        turned.append(best >= count)
-        for number in (stroke, stroke + count):
-            grid[keys[number]].discard(number)
-        other = stroke if best >= count else stroke + count
-        here, at = places[other], keys[other]
-    return np.array(order), np.array(turned)
+        is_reversed.append(nearest >= count)
+        for end_index in (stroke, stroke + count):
+            grid[keys[end_index]].discard(end_index)
+        far_end = stroke if nearest >= count else stroke + count
+        current, current_cell = positions[far_end], keys[far_end]
+    return np.array(order), np.array(is_reversed)
 
 
 def _nearest_end(
     grid: dict[tuple[int, int], set[int]],
-    places: list[list[float]],
-    here: list[float],
-    at: tuple[int, int],
-    cells: int,
-    side: float,
+    positions: list[list[float]],
+    current: list[float],
+    current_cell: tuple[int, int],
+    cell_count: int,
+    cell_size: float,
 ) -> int:
-    best, least = -1, np.inf
-    for ring in range(cells + 1):
-        if best >= 0 and least <= (max(ring - 1, 0) * side) ** 2:
+    """Return the end in the grid that is nearest to the current position, ring by ring."""
+    best, least_distance = -1, np.inf
+    for ring in range(cell_count + 1):
+        if best >= 0 and least_distance <= (max(ring - 1, 0) * cell_size) ** 2:
             break
-        for key in _ring(at, ring):
-            for number in sorted(grid.get(key, ())):
-                x, y = places[number]
-                distance = (x - here[0]) ** 2 + (y - here[1]) ** 2
-                if distance < least:
-                    best, least = number, distance
+        for key in _ring_cells(current_cell, ring):
+            for end_index in sorted(grid.get(key, ())):
+                x, y = positions[end_index]
+                distance = (x - current[0]) ** 2 + (y - current[1]) ** 2
+                if distance < least_distance:
+                    best, least_distance = end_index, distance
     return best
 
 
-def _ring(at: tuple[int, int], ring: int) -> list[tuple[int, int]]:
-    x, y = at
-    if not ring:
-        return [at]
-    row = range(-ring, ring + 1)
-    column = range(-ring + 1, ring)
-    return [(x + i, y + j) for i in row for j in (-ring, ring)] + [
-        (x + i, y + j) for i in (-ring, ring) for j in column
+def _ring_cells(center: tuple[int, int], radius: int) -> list[tuple[int, int]]:
+    """Return the cells on the square ring of the given radius around a cell."""
+    x, y = center
+    if not radius:
+        return [center]
+    row = range(-radius, radius + 1)
+    column = range(-radius + 1, radius)
+    return [(x + i, y + j) for i in row for j in (-radius, radius)] + [
+        (x + i, y + j) for i in (-radius, radius) for j in column
     ]

@@ -1,29 +1,41 @@
-"""What the user sees: properties, the sidebar, preferences."""
+"""The user interface: properties, the panels of the sidebar, preferences and the overlay."""
 
 from __future__ import annotations
 
 import bpy
 
-from . import panels, preferences, properties, shelf
+from . import (
+    job_status,
+    look_panels,
+    main_panel,
+    overlay,
+    preferences,
+    preset_library,
+    properties,
+    strokes_panel,
+)
 
-MODULES = (preferences, panels)
+#: Modules with classes to register. Panels are shown in this order.
+MODULES = (preferences, main_panel, look_panels, strokes_panel)
 
 
 def register() -> None:
     """Add properties, panels and preferences to Blender."""
-    shelf.register()
+    preset_library.register()
     properties.register()
     for module in MODULES:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
-    bpy.types.VIEW3D_PT_overlay.append(panels.draw_in_overlays)
+    bpy.types.VIEW3D_PT_overlay.append(main_panel.draw_overlay_popover)
 
 
 def unregister() -> None:
-    """Take them away again."""
-    bpy.types.VIEW3D_PT_overlay.remove(panels.draw_in_overlays)
+    """Remove them, and clear the state of this room."""
+    bpy.types.VIEW3D_PT_overlay.remove(main_panel.draw_overlay_popover)
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)
     properties.unregister()
-    shelf.unregister()
+    preset_library.unregister()
+    overlay.hide()
+    job_status.current = None

@@ -1,7 +1,7 @@
-"""Singularities in the 3D view: dots coloured by sign, with their indices beside them.
+"""The overlay of singularities in the 3D view: dots colored by sign, labeled with their indices.
 
-Drawing hangs on handlers that are there only while something is shown, so that it costs nothing
-when off. What is shown was found once and follows its object, not changes of the mesh.
+Draw handlers exist only while something is shown. Singularities are computed once: the dots move
+with the object, but do not follow changes of the mesh.
 """
 
 from __future__ import annotations
@@ -16,76 +16,106 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..live import redraw
-from ..scene.singular import Singular
+from ..scene.singularity_points import Singularities
+from ..viewport.view3d import redraw
 
-#: By the sign of the index: orange turns with the way around, blue against it. Linear light.
-COLOURS = {1: (1.0, 0.32, 0.05, 1.0), -1: (0.05, 0.35, 1.0, 1.0)}
-RIM = (0.02, 0.02, 0.02, 1.0)
+#: Linear colors by the sign of the index: orange for positive, blue for negative.
+COLOR_BY_SIGN = {1: (1.0, 0.32, 0.05, 1.0), -1: (0.05, 0.35, 1.0, 1.0)}
+OUTLINE_COLOR = (0.02, 0.02, 0.02, 1.0)
 
-#: Diameter of a dot in pixels, without its rim of two.
-DOT = 9.0
+#: Diameter of a dot in pixels, without its outline of 2 pixels.
+DOT_DIAMETER = 9.0
 
-#: Sides of the polygon that passes for a disc.
-SIDES = 20
+#: Number of sides of the polygon that approximates a disc.
+DISC_SEGMENTS = 20
 
-#: How far dots are lifted off the surface, as a share of the object's size, not to sink into it.
-LIFT = 0.004
+#: Offset of dots from the surface, as a fraction of the size of the object. It avoids z-fighting.
+SURFACE_OFFSET = 0.004
 
-#: More labels than these would hide what they are about.
-MOST_LABELS = 250
-
-_shown: dict[str, Singular] = {}
-_handlers: list[Any] = []
+#: Maximum number of labels of an object. More would hide the dots.
+MAX_LABELS = 250
 
 
-def show(name: str, found: Singular) -> None:
-    """Show the singularities of the object of a name, in place of what was shown of it."""
-    _shown[name] = found
-    if _forget not in bpy.app.handlers.load_pre:
-        bpy.app.handlers.load_pre.append(_forget)
-    if not _handlers and not bpy.app.background:
-        add = bpy.types.SpaceView3D.draw_handler_add
-        _handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
-        _handlers.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
+class _Overlay:
+    """The singularities that are shown, by the names of their objects, and the draw handlers."""
+
+    def __init__(self) -> None:
+        self.singularities: dict[str, Singularities] = {}
+        self.handlers: list[Any] = []
+
+    def add_handlers(self) -> None:
+        """Start drawing."""
+        if _clear_on_load not in bpy.app.handlers.load_pre:
+            bpy.app.handlers.load_pre.append(_clear_on_load)
+        if not self.handlers and not bpy.app.background:
+            add = bpy.types.SpaceView3D.draw_handler_add
+            self.handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
+            self.handlers.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
+
+    def remove_handlers(self) -> None:
+        """Stop drawing."""
+        if _clear_on_load in bpy.app.handlers.load_pre:
+            bpy.app.handlers.load_pre.remove(_clear_on_load)
+        while self.handlers:
+            bpy.types.SpaceView3D.draw_handler_remove(self.handlers.pop(), "WINDOW")
+
+
+#: Emptied by `hide`, which `unregister` calls.
+_OVERLAY = _Overlay()
+
+
+def show(object_name: str, singularities: Singularities) -> None:
+    """Show the singularities of an object, in place of those shown before."""
+    _OVERLAY.singularities[object_name] = singularities
+    _OVERLAY.add_handlers()
     redraw()
 
 
-def hide(name: str | None = None) -> None:
-    """Hide those of an object, or all."""
-    if name is None:
-        _shown.clear()
-    _shown.pop(name, None)
-    if not _shown:
-        if _forget in bpy.app.handlers.load_pre:
-            bpy.app.handlers.load_pre.remove(_forget)
-        while _handlers:
-            bpy.types.SpaceView3D.draw_handler_remove(_handlers.pop(), "WINDOW")
+def hide(object_name: str | None = None) -> None:
+    """Hide the singularities of an object, or of all objects if no name is given."""
+    if object_name is None:
+        _OVERLAY.singularities.clear()
+    else:
+        _OVERLAY.singularities.pop(object_name, None)
+    if not _OVERLAY.singularities:
+        _OVERLAY.remove_handlers()
     redraw()
 
 
-def _forget(*_: Any) -> None:
-    """Another file has other objects, which may have the same names."""
+def _clear_on_load(*_: Any) -> None:
+    """Hide everything before a file is loaded, as its objects may have the same names."""
     hide()
 
 
-def is_shown(name: str) -> bool:
-    """Whether those of an object are shown."""
-    return name in _shown
+def is_shown(object_name: str) -> bool:
+    """Return whether the singularities of an object are shown."""
+    return object_name in _OVERLAY.singularities
 
 
-def index_text(index: int, degree: int) -> str:
-    """An index in units of 1 / N as users read it: +1/4, -1, +3/2."""
-    over = int(np.gcd(index, degree))
-    top, bottom = index // over, degree // over
-    return f"{top:+d}" if bottom == 1 else f"{top:+d}/{bottom}"
+def has_handlers() -> bool:
+    """Return whether there are draw handlers."""
+    return bool(_OVERLAY.handlers)
 
 
-def _visible() -> list[tuple[bpy.types.Object, Singular]]:
-    """What this view shows. Objects that are gone, or were renamed, are passed over."""
-    layer = bpy.context.view_layer
-    things = ((layer.objects.get(name), found) for name, found in _shown.items())
-    return [(thing, found) for thing, found in things if thing is not None and thing.visible_get()]
+def format_index(index: int, degree: int) -> str:
+    """Return an index, given in units of 1 / N, as a fraction: +1/4, -1, +3/2."""
+    divisor = int(np.gcd(index, degree))
+    numerator, denominator = index // divisor, degree // divisor
+    return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"
+
+
+def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
+    """Return the visible objects and their singularities, without objects that were removed or renamed."""
+    view_layer = bpy.context.view_layer
+    candidates = (
+        (view_layer.objects.get(name), singularities)
+        for name, singularities in _OVERLAY.singularities.items()
+    )
+    return [
+        (obj, singularities)
+        for obj, singularities in candidates
+        if obj is not None and obj.visible_get()
+    ]
 
 
 def _draw_dots() -> None:
@@ -95,37 +125,42 @@ def _draw_dots() -> None:
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.depth_test_set("LESS_EQUAL")
     scale = context.preferences.system.ui_scale
-    for thing, found in _visible():
-        lifted = _lifted(thing, found)
-        for sign, colour in COLOURS.items():
-            points = lifted[np.sign(found.index) == sign]
-            # The rim first, and a little behind.
-            for radius, nearer, ink in ((DOT / 2 + 2, DOT / 2, RIM), (DOT / 2, DOT, colour)):
-                corners = _discs(context, points, radius * scale, nearer)
-                shader.uniform_float("color", ink)
-                batch_for_shader(shader, "TRIS", {"pos": corners}).draw(shader)
+    for obj, singularities in _visible_singularities():
+        positions = _offset_points(obj, singularities)
+        for sign, fill_color in COLOR_BY_SIGN.items():
+            points = positions[np.sign(singularities.index) == sign]
+            # The outline first, slightly behind the dot.
+            for radius, depth_offset, color in (
+                (DOT_DIAMETER / 2 + 2, DOT_DIAMETER / 2, OUTLINE_COLOR),
+                (DOT_DIAMETER / 2, DOT_DIAMETER, fill_color),
+            ):
+                vertices = _disc_triangles(context, points, radius * scale, depth_offset)
+                shader.uniform_float("color", color)
+                batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
     gpu.state.depth_test_set("NONE")
 
 
-def _discs(
-    context: bpy.types.Context, points: np.ndarray, radius: float, nearer: float
+def _disc_triangles(
+    context: bpy.types.Context, points: np.ndarray, radius: float, depth_offset: float
 ) -> np.ndarray:
-    """(n, 3) corners of triangles that make up a disc at each point, facing the eye.
+    """Return the (n, 3) corners of the triangles of a disc at each point, facing the camera.
 
-    `radius` and `nearer`, by how much they come nearer to the eye, are in pixels.
+    The radius is in pixels, and so is the offset toward the camera.
     """
     view, window = context.region_data, context.region
-    eye = np.array(view.view_matrix.inverted())
-    right, up, back = eye[:3, 0], eye[:3, 1], eye[:3, 2]
+    view_to_world = np.array(view.view_matrix.inverted())
+    right, up, back = view_to_world[:3, 0], view_to_world[:3, 1], view_to_world[:3, 2]
     depth = np.ones(len(points))
     if view.is_perspective:
-        depth = (eye[:3, 3] - points) @ back
+        depth = (view_to_world[:3, 3] - points) @ back
     pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None, None]
-    turn = np.linspace(0, 2 * np.pi, SIDES + 1)
-    rim = np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up
-    fan = np.stack([np.zeros((SIDES, 3)), rim[:-1], rim[1:]], axis=1).reshape(-1, 3)
-    corners = points[:, None] + pixel * (radius * fan + nearer * back)
-    return corners.reshape(-1, 3).astype(np.float32)
+    angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
+    circle = np.cos(angles)[:, None] * right + np.sin(angles)[:, None] * up
+    triangles = np.stack([np.zeros((DISC_SEGMENTS, 3)), circle[:-1], circle[1:]], axis=1).reshape(
+        -1, 3
+    )
+    vertices = points[:, None] + pixel * (radius * triangles + depth_offset * back)
+    return vertices.reshape(-1, 3).astype(np.float32)
 
 
 def _draw_labels() -> None:
@@ -133,33 +168,45 @@ def _draw_labels() -> None:
     if not context.space_data.overlay.show_overlays or not context.space_data.overlay.show_text:
         return
     scale = context.preferences.system.ui_scale
-    font = 0
-    blf.size(font, 12 * scale)
-    blf.color(font, 1.0, 1.0, 1.0, 1.0)
-    blf.enable(font, blf.SHADOW)
-    blf.shadow(font, 5, 0.0, 0.0, 0.0, 1.0)
-    for thing, found in _visible():
-        if len(found) > MOST_LABELS:
+    font_id = 0
+    blf.size(font_id, 12 * scale)
+    blf.color(font_id, 1.0, 1.0, 1.0, 1.0)
+    blf.enable(font_id, blf.SHADOW)
+    blf.shadow(font_id, 5, 0.0, 0.0, 0.0, 1.0)
+    for obj, singularities in _visible_singularities():
+        if len(singularities) > MAX_LABELS:
             continue
-        for point, index in zip(_lifted(thing, found), found.index.tolist(), strict=True):
-            place = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
-            if place is not None and not _is_hidden(context, Vector(point)):
-                blf.position(font, place.x + 8 * scale, place.y + 5 * scale, 0)
-                blf.draw(font, index_text(index, found.degree))
-    blf.disable(font, blf.SHADOW)
+        for point, index in zip(
+            _offset_points(obj, singularities), singularities.index.tolist(), strict=True
+        ):
+            screen_position = location_3d_to_region_2d(
+                context.region, context.region_data, Vector(point)
+            )
+            if screen_position is not None and not _is_occluded(context, Vector(point)):
+                blf.position(
+                    font_id, screen_position.x + 8 * scale, screen_position.y + 5 * scale, 0
+                )
+                blf.draw(font_id, format_index(index, singularities.degree))
+    blf.disable(font_id, blf.SHADOW)
 
 
-def _is_hidden(context: bpy.types.Context, point: Vector) -> bool:
-    """Whether something is between a point and the eye."""
-    eye = context.region_data.view_matrix.inverted()
-    toward = eye.translation - point if context.region_data.is_perspective else eye.col[2].xyz
-    return context.scene.ray_cast(context.view_layer.depsgraph, point, toward.normalized())[0]
+def _is_occluded(context: bpy.types.Context, point: Vector) -> bool:
+    """Return whether something is between a point and the camera."""
+    view_to_world = context.region_data.view_matrix.inverted()
+    view_direction = (
+        view_to_world.translation - point
+        if context.region_data.is_perspective
+        else view_to_world.col[2].xyz
+    )
+    return context.scene.ray_cast(context.view_layer.depsgraph, point, view_direction.normalized())[
+        0
+    ]
 
 
-def _lifted(thing: bpy.types.Object, found: Singular) -> np.ndarray:
-    """(K, 3) places in the world, a little off the surface."""
-    matrix = np.array(thing.matrix_world)
-    lift = LIFT * max(thing.dimensions)
-    size = np.cbrt(abs(np.linalg.det(matrix[:3, :3]))) or 1.0
-    raised = found.points + found.normals * (lift / size)
-    return raised @ matrix[:3, :3].T + matrix[:3, 3]
+def _offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
+    """Return the (K, 3) positions in world space, slightly off the surface."""
+    matrix = np.array(obj.matrix_world)
+    offset = SURFACE_OFFSET * max(obj.dimensions)
+    scale = np.cbrt(abs(np.linalg.det(matrix[:3, :3]))) or 1.0
+    points = singularities.points + singularities.normals * (offset / scale)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]

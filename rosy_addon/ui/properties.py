@@ -1,139 +1,157 @@
-"""RoSy's properties: `Scene.rosy`, `Mesh.rosy` and `Object.rosy`."""
+"""The properties of RoSy: `Scene.rosy`, `Mesh.rosy` and `Object.rosy`."""
 
 from __future__ import annotations
 
 import atexit
-from dataclasses import fields
 from typing import Any
 
 import bpy
 
-from ..compositor.colour import from_hex
+from ..color import from_hex
 from ..compositor.look import Look
-from ..compositor.presets import DEFAULT
 from ..field.rosy_field import MAX_DEGREE
-from ..gpu.painter import DEVICES
-from ..scene.attributes import DEFAULT_DEGREE, DEFAULT_NAME
-from ..scene.capabilities import folder_options, has_properties
-from ..scene.looks import apply_look, look_of
-from ..strokes.draw import Manner
-from . import shelf
+from ..gpu.select import RENDER_DEVICES
+from ..presets.store import DEFAULT_KEY
+from ..scene.compat import has_rosy_properties, path_property_options
+from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
+from ..scene.look_properties import apply_look, read_look
+from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
+from ..strokes.style import StrokeStyle
+from . import preset_library
 
-__all__ = ["apply_look", "ensure_registered", "look_of", "register", "unregister"]
+__all__ = ["apply_look", "ensure_registered", "read_look", "register", "unregister"]
 
-CAMERAS = [
-    ("SCENE", "Scene Camera", "From the camera that renders the scene"),
-    ("ALL", "All Cameras", "From every camera in the scene, one picture each"),
-    ("VIEW", "Current View", "From where this 3D view looks now"),
+CAMERA_ITEMS = [
+    ("SCENE", "Scene Camera", "Active camera of the scene"),
+    ("ALL", "All Cameras", "Every camera in the scene, one picture each"),
+    ("VIEW", "Current View", "Current viewpoint of this 3D view"),
 ]
-PLACEMENTS = [
+PLACEMENT_ITEMS = [
     (
         "PROJECTION",
         "Baked",
-        "The picture stays where it was drawn on the surface, from wherever it is looked at",
+        "The picture is fixed to the surface, from whichever viewpoint it is seen",
     ),
-    ("WINDOW", "Window", "The picture fills the frame of whatever camera looks"),
+    ("WINDOW", "Window", "The picture fills the frame of the camera that is used"),
 ]
-DEVICE_ITEMS = [(name.upper(), *words) for name, words in DEVICES.items()]
-STORES = [
-    ("PACKED", "In the Blend File", "Packed into the .blend file"),
-    ("SAVED", "In a Folder", "Saved to a folder as .png or .exr"),
+DEVICE_ITEMS = [(name.upper(), *labels) for name, labels in RENDER_DEVICES.items()]
+STORE_ITEMS = [
+    ("PACKED", "In the Blend File", "Pack pictures into the .blend file"),
+    ("SAVED", "In a Folder", "Save pictures to a folder as .png or .exr files"),
 ]
-STROKE_KINDS = [
-    ("PENCIL", "Grease Pencil", "An object with a layer for each family of strokes"),
-    ("CURVES", "Curves", "An object of curves, with attributes for Geometry Nodes"),
-    ("SVG", "SVG File", "A file with a layer for each family, for other programs and plotters"),
+STROKE_KIND_ITEMS = [
+    ("PENCIL", "Grease Pencil", "Grease Pencil object with a layer for each family of strokes"),
+    ("CURVES", "Curves", "Curves object with attributes for Geometry Nodes"),
+    ("SVG", "SVG File", "SVG file with a layer for each family, for other programs and plotters"),
 ]
-INKS = [
-    ("ONE", "One", "All strokes in one ink"),
-    ("FAMILIES", "By Family", "An ink of its own for each family of strokes"),
+INK_ITEMS = [
+    ("ONE", "One", "One ink for all strokes"),
+    ("FAMILIES", "By Family", "One ink for each family of strokes"),
 ]
-#: Where strokes can be drawn from: one place at a time.
-STROKE_CAMERAS = [item for item in CAMERAS if item[0] != "ALL"]
-#: What numbers of settings are, in Blender's words.
-SUBTYPES = {"angle": "ANGLE", "length": "DISTANCE", "pixels": "PIXEL"}
-COLOUR = {"subtype": "COLOR_GAMMA", "size": 3, "min": 0, "max": 1, "default": (0.0, 0.0, 0.0)}
-FORMATS = [
-    ("BYTE", "8 Bit sRGB", "As on the screen, a .png file: small, and what most programs read"),
-    ("FLOAT", "Float", "Linear values, an .exr file"),
+#: Viewpoints of strokes. There is one drawing at a time.
+STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
+#: Subtypes of number properties by the unit of the setting.
+SUBTYPE_BY_UNIT = {"angle": "ANGLE", "length": "DISTANCE", "pixels": "PIXEL"}
+COLOR_ARGUMENTS = {
+    "subtype": "COLOR_GAMMA",
+    "size": 3,
+    "min": 0,
+    "max": 1,
+    "default": (0.0, 0.0, 0.0),
+}
+IMAGE_FORMAT_ITEMS = [
+    ("BYTE", "8 Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
+    ("FLOAT", "Float", "Linear values in an .exr file"),
 ]
 
 
-def _setting_property(entry: Any) -> Any:
-    """A property for a setting of a look or of strokes, by what its metadata says."""
-    rules = entry.metadata
-    what = {
-        "name": entry.name.replace("_", " ").title(),
-        "description": rules["text"],
-        "default": entry.default,
+def _setting_property(setting: Setting) -> Any:
+    """Return Blender's property for a setting."""
+    arguments: dict[str, Any] = {
+        "name": setting.label,
+        "description": setting.text,
+        "default": setting.default,
     }
-    if "options" in rules:
-        items = [
-            (option, option.replace("_", " ").title(), text)
-            for option, text in rules["options"].items()
-        ]
-        return bpy.props.EnumProperty(items=items, **what)
-    if "colour" in rules:
-        what["default"] = from_hex(entry.default).tolist()
-        return bpy.props.FloatVectorProperty(subtype="COLOR_GAMMA", size=3, min=0, max=1, **what)
-    if isinstance(entry.default, bool):
-        return bpy.props.BoolProperty(**what)
-    what |= {"min": rules["low"], "max": rules["high"]}
-    if isinstance(entry.default, int):
-        return bpy.props.IntProperty(**what)
-    return bpy.props.FloatProperty(subtype=SUBTYPES.get(rules.get("unit"), "NONE"), **what)
+    match setting:
+        case Choice(options=options):
+            items = [(option, title(option), text) for option, text in options.items()]
+            return bpy.props.EnumProperty(items=items, **arguments)
+        case Color():
+            arguments["default"] = from_hex(setting.default).tolist()
+            return bpy.props.FloatVectorProperty(
+                subtype="COLOR_GAMMA", size=3, min=0, max=1, **arguments
+            )
+        case Switch():
+            return bpy.props.BoolProperty(**arguments)
+        case Number(low=low, high=high, is_integer=True):
+            return bpy.props.IntProperty(min=low, max=high, **arguments)
+        case Number(low=low, high=high, unit=unit):
+            subtype = SUBTYPE_BY_UNIT.get(unit, "NONE")
+            return bpy.props.FloatProperty(min=low, max=high, subtype=subtype, **arguments)
+    raise TypeError(f"setting '{setting.name}' has no property")
+
+
+def _setting_properties(cls: type) -> dict[str, Any]:
+    """Return Blender's properties for a settings class, by name."""
+    return {name: _setting_property(setting) for name, setting in settings_of(cls).items()}
 
 
 class RosyLook(bpy.types.PropertyGroup):
     """How fields are drawn; one property for each setting of a `Look`."""
 
-    __annotations__ = {entry.name: _setting_property(entry) for entry in fields(Look)}
+    __annotations__ = _setting_properties(Look)
 
 
 class RosyBakedObject(bpy.types.PropertyGroup):
-    """One object under a picture, as it was when the picture was drawn. Its name is the object's."""
+    """The state of an object when a picture of it was drawn. Its name is that of the object."""
 
     matrix: bpy.props.FloatVectorProperty(size=16, description="Object to clip space, by rows")
-    state: bpy.props.StringProperty(description="Digest of place, mesh and field")
+    state: bpy.props.StringProperty(description="Digest of transform, mesh and field")
 
 
 class RosyBake(bpy.types.PropertyGroup):
-    """One picture and what it was drawn from. Its name is the camera's."""
+    """A baked picture and what it was drawn from. Its name is that of the camera."""
 
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
     width: bpy.props.IntProperty()
     height: bpy.props.IntProperty()
-    frames: bpy.props.StringProperty(description="Of a sequence; empty for one picture")
-    look: bpy.props.StringProperty(description="The scene's look at the time, as JSON")
-    camera_state: bpy.props.StringProperty(description="Digest of the camera; empty for a view")
+    frames: bpy.props.StringProperty(
+        description="Frame range of a sequence, empty for a single picture"
+    )
+    look: bpy.props.StringProperty(
+        description="Look of the scene when the picture was drawn, as JSON"
+    )
+    camera_state: bpy.props.StringProperty(description="Digest of the camera, empty for a 3D view")
     objects: bpy.props.CollectionProperty(type=RosyBakedObject)
 
 
-class RosyMadeStrokes(bpy.types.PropertyGroup):
-    """An object of strokes that RoSy has made. Its name is the camera's."""
+class RosyStrokeObject(bpy.types.PropertyGroup):
+    """An object of strokes made by RoSy. Its name is that of the camera."""
 
     kind: bpy.props.StringProperty()
     thing: bpy.props.PointerProperty(type=bpy.types.Object)
 
 
 class RosyStrokes(bpy.types.PropertyGroup):
-    """How strokes are drawn: a property for each setting of a `Manner`, and the ink."""
+    """How strokes are drawn: the settings of a `StrokeStyle`, the pen and the output."""
 
-    __annotations__ = {entry.name: _setting_property(entry) for entry in fields(Manner)} | {
+    __annotations__ = _setting_properties(StrokeStyle) | {
         "kind": bpy.props.EnumProperty(
-            name="Make", description="What the strokes are made into", items=STROKE_KINDS
+            name="Make",
+            description="Type of object or file made from the strokes",
+            items=STROKE_KIND_ITEMS,
         ),
         "camera": bpy.props.EnumProperty(
-            name="Camera", description="From where strokes are seen", items=STROKE_CAMERAS
+            name="Camera", description="Viewpoint of the strokes", items=STROKE_CAMERA_ITEMS
         ),
         "selected": bpy.props.BoolProperty(
             name="Selected Only",
-            description="Draw on the selected objects alone; the others hide what is behind them",
+            description="Draw only on selected objects. Others still hide what is behind them",
         ),
         "width": bpy.props.FloatProperty(
             name="Width",
-            description="Of a stroke where it is widest, in pixels of the picture",
+            description="Maximum width of a stroke in pixels of the picture",
             subtype="PIXEL",
             min=0.01,
             max=1000,
@@ -141,114 +159,120 @@ class RosyStrokes(bpy.types.PropertyGroup):
             default=1.2,
         ),
         "inks": bpy.props.EnumProperty(
-            name="Inks", description="What families are drawn with", items=INKS
+            name="Inks", description="Inks of the families", items=INK_ITEMS
         ),
         "ink_colour": bpy.props.FloatVectorProperty(
-            name="Ink", description="Colour of the ink", **COLOUR
+            name="Ink", description="Color of the ink", **COLOR_ARGUMENTS
         ),
         "outline_colour": bpy.props.FloatVectorProperty(
-            name="Outline Ink", description="Colour of silhouettes, creases and borders", **COLOUR
+            name="Outline Ink",
+            description="Color of silhouettes, creases and borders",
+            **COLOR_ARGUMENTS,
         ),
         "filepath": bpy.props.StringProperty(
             name="File",
-            description="The .svg file that is written",
+            description="Path of the .svg file",
             subtype="FILE_PATH",
             default="//strokes.svg",
-            options=folder_options(),
+            options=path_property_options(),
         ),
         "paper": bpy.props.BoolProperty(
-            name="White Paper", description="Lay the strokes on white paper", default=True
+            name="White Paper", description="Draw the strokes on white paper", default=True
         ),
         "plotter": bpy.props.BoolProperty(
             name="For a Plotter",
-            description="Lines of one width, in an order in which a pen travels little, no paper",
+            description="Lines of one width without paper, in an order with short pen travel",
         ),
         "page": bpy.props.FloatProperty(
             name="Page Width",
-            description="Of the whole picture, in millimetres; 0 counts in pixels",
+            description="Width of the page in millimeters. 0: the size is in pixels",
             min=0,
             max=1e5,
         ),
-        "made": bpy.props.CollectionProperty(type=RosyMadeStrokes),
+        "made": bpy.props.CollectionProperty(type=RosyStrokeObject),
     }
 
 
 class RosyScene(bpy.types.PropertyGroup):
-    """How the fields of a scene are drawn, and what was baked."""
+    """How the fields of a scene are drawn, and the baked pictures."""
 
     look: bpy.props.PointerProperty(type=RosyLook)
     preset: bpy.props.EnumProperty(
         name="Preset",
-        description="Look to start from",
-        items=shelf.items,
-        get=shelf.get_chosen,
-        set=shelf.set_chosen,
+        description="Preset of the look",
+        items=preset_library.enum_items,
+        get=preset_library.get_enum_index,
+        set=preset_library.set_enum_index,
         options={"SKIP_SAVE"},
     )
     preset_name: bpy.props.StringProperty(
-        description="What the preset is called by that the look was taken from",
-        default=DEFAULT,
+        description="Key of the preset that the look was taken from",
+        default=DEFAULT_KEY,
         options={"HIDDEN"},
     )
     camera: bpy.props.EnumProperty(
-        name="Camera", description="From where the fields are drawn", items=CAMERAS
+        name="Camera", description="Viewpoint of the picture", items=CAMERA_ITEMS
     )
     percentage: bpy.props.IntProperty(
         name="Size",
-        description="Size of the picture, in percent of the size of renders",
+        description="Size of the picture as a percentage of the render resolution",
         subtype="PERCENTAGE",
         min=1,
         max=400,
         default=100,
     )
     placement: bpy.props.EnumProperty(
-        name="Placement", description="How the picture lies on the meshes", items=PLACEMENTS
+        name="Placement",
+        description="How the picture is placed on the meshes",
+        items=PLACEMENT_ITEMS,
     )
     emission: bpy.props.FloatProperty(
         name="Emission",
-        description="How much the picture glows by itself: 1 shows it as it was drawn",
+        description="Emission strength of the picture. 1: as it was drawn",
         min=0,
         soft_max=2,
         default=1,
     )
     diffuse: bpy.props.FloatProperty(
         name="Diffuse",
-        description="How much of the scene's light the picture reflects",
+        description="Amount of light of the scene that the picture reflects",
         min=0,
         max=1,
         default=0,
     )
     store: bpy.props.EnumProperty(
-        name="Store", description="Where the picture is kept", items=STORES
+        name="Store", description="Where the picture is stored", items=STORE_ITEMS
     )
     directory: bpy.props.StringProperty(
         name="Folder",
-        description="Folder that pictures are saved to",
+        description="Folder for saved pictures",
         subtype="DIR_PATH",
         default="//rosy/",
-        options=folder_options(),
+        options=path_property_options(),
     )
     image_format: bpy.props.EnumProperty(
-        name="Format", description="Depth of the picture's values", items=FORMATS
+        name="Format",
+        description="Bit depth and file format of the picture",
+        items=IMAGE_FORMAT_ITEMS,
     )
     device: bpy.props.EnumProperty(
-        name="Device", description="What draws the picture", items=DEVICE_ITEMS
+        name="Device", description="Device that draws the picture", items=DEVICE_ITEMS
     )
     undefined: bpy.props.BoolProperty(
         name="Leave Out Bad Vectors",
-        description="Take vectors that are not finite for undefined, instead of refusing the field",
+        description="Treat vectors that are not finite as undefined, instead of reporting an error",
     )
     tone_attribute: bpy.props.StringProperty(
         name="Attribute",
-        description="On points, faces or corners of the meshes; their active colour if empty. Objects "
-        "without it have the light",
+        description="Attribute on points, faces or corners of the meshes. Empty: the active color "
+        "attribute. Objects without it use the light",
     )
     tone_picture: bpy.props.StringProperty(
         name="Picture",
-        description="File of a picture through the scene's camera, such as a render; # stand for the "
-        "number of the frame",
+        description="Picture of the scene through its camera, such as a render. # characters are "
+        "replaced by the frame number",
         subtype="FILE_PATH",
-        options=folder_options(),
+        options=path_property_options(),
     )
     bakes: bpy.props.CollectionProperty(type=RosyBake)
     strokes: bpy.props.PointerProperty(type=RosyStrokes)
@@ -259,7 +283,7 @@ class RosyMesh(bpy.types.PropertyGroup):
 
     degree: bpy.props.IntProperty(
         name="Degree",
-        description="In how many directions the field looks the same",
+        description="Number of directions of the field at each point",
         min=1,
         max=MAX_DEGREE,
         default=DEFAULT_DEGREE,
@@ -267,7 +291,7 @@ class RosyMesh(bpy.types.PropertyGroup):
     attribute: bpy.props.StringProperty(
         name="Attribute",
         description="Name of the mesh attribute that holds the field",
-        default=DEFAULT_NAME,
+        default=DEFAULT_FIELD_NAME,
     )
 
 
@@ -276,16 +300,16 @@ class RosyObject(bpy.types.PropertyGroup):
 
     include: bpy.props.BoolProperty(
         name="Draw the Field",
-        description="Whether the field of this object is drawn; if not, it only hides others",
+        description="Draw the field of this object. Otherwise the object only hides others",
         default=True,
     )
     tone_image: bpy.props.PointerProperty(
         name="Image",
-        description="On this object, how light it is to be; objects without one have the light",
+        description="Image of the tone of this object. Objects without one use the light",
         type=bpy.types.Image,
     )
     tone_uv_map: bpy.props.StringProperty(
-        name="UV Map", description="How the image lies on this object; its active one if empty"
+        name="UV Map", description="UV map of the image. Empty: the active UV map"
     )
 
 
@@ -293,42 +317,45 @@ CLASSES = (
     RosyLook,
     RosyBakedObject,
     RosyBake,
-    RosyMadeStrokes,
+    RosyStrokeObject,
     RosyStrokes,
     RosyScene,
     RosyMesh,
     RosyObject,
 )
-PLACES = ((bpy.types.Scene, RosyScene), (bpy.types.Mesh, RosyMesh), (bpy.types.Object, RosyObject))
+POINTER_PROPERTIES = (
+    (bpy.types.Scene, RosyScene),
+    (bpy.types.Mesh, RosyMesh),
+    (bpy.types.Object, RosyObject),
+)
 
 
 def register() -> None:
     """Add the properties to Blender."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    for owner, group in PLACES:
-        owner.rosy = bpy.props.PointerProperty(type=group, name="RoSy")
+    for id_type, group in POINTER_PROPERTIES:
+        id_type.rosy = bpy.props.PointerProperty(type=group, name="RoSy")
 
 
 def unregister() -> None:
-    """Take them away again."""
-    for owner, _ in PLACES:
-        del owner.rosy
+    """Remove the properties."""
+    for id_type, _ in POINTER_PROPERTIES:
+        del id_type.rosy
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
 
 
 def ensure_registered() -> None:
-    """Add the properties unless they are there, as they are while the extension is on.
+    """Add the properties if the extension is not enabled, for scripts and the command line.
 
-    For the command line and scripts that run without the extension. As Python ends they go again:
-    Blender's Python module cannot let go of them after that.
+    They are removed when Python exits, because Blender's Python module cannot free them later.
     """
-    if not has_properties():
+    if not has_rosy_properties():
         register()
-        atexit.register(_unregister_if_there)
+        atexit.register(_unregister_if_registered)
 
 
-def _unregister_if_there() -> None:
-    if has_properties():
+def _unregister_if_registered() -> None:
+    if has_rosy_properties():
         unregister()

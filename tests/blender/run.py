@@ -80,7 +80,7 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
     backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
 
-    def blender(verb: str, *command: str, timeout: float = 240.0, **more) -> Any:
+    def blender(verb: str, *command: str, timeout: float = 480.0, **more) -> Any:
         words = [str(options.real_blender), verb, options.which, *command]
         return subprocess.run(
             words, cwd=REPOSITORY, env=environment, timeout=timeout, check=False, **more

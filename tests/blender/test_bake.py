@@ -201,3 +201,28 @@ def test_turntable(with_field, tmp_path):
     clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
     assert clip.frame_duration == 4
     assert len(bpy.data.scenes) == 1
+
+
+def test_a_turntable_is_lit_by_the_scene(with_field, scene, tmp_path):
+    scene.rosy.look.shading, scene.rosy.look.light = 1.0, "scene"
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.rotation_euler = (1.2, 0.0, 0.5)
+    scene.collection.objects.link(sun)
+    films = []
+    for energy in (0.0, 3.0):
+        sun.data.energy = energy
+        path = tmp_path / f"{energy}.gif"
+        settings = {"filepath": str(path), "film": ".gif", "width": 48, "height": 48}
+        assert bpy.ops.rosy.turntable(pictures=2, **settings) == {"FINISHED"}
+        films.append(path.read_bytes())
+    assert films[0] != films[1]
+
+
+def test_a_turntable_takes_the_device_of_the_scene(with_field, scene, tmp_path):
+    """The graphics card refuses the method "members", the processor draws it."""
+    scene.rosy.look.method = "members"
+    settings = {"filepath": str(tmp_path / "film.gif"), "film": ".gif", "pictures": 2}
+    scene.rosy.device = "GPU"
+    assert "graphics" in error_of(bpy.ops.rosy.turntable, width=32, height=32, **settings).lower()
+    scene.rosy.device = "CPU"
+    assert bpy.ops.rosy.turntable(width=32, height=32, **settings) == {"FINISHED"}

@@ -22,6 +22,7 @@ from bench.parity import (
     DEGREES,
     VIEWS,
     camera_for,
+    drawn_on_card,
     drawn_twice,
     likeness,
     module_of,
@@ -46,7 +47,7 @@ def card(rosy):
         device = module_of(PACKAGE, "gpu.device").BlenderDevice()
     except errors.RosyError as error:
         pytest.skip(str(error))
-    return rosy.Card(device)
+    return rosy.GpuRenderer(device)
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +68,8 @@ def test_parity(rosy, card, surface_of, name, degree):
     if surface is None:
         pytest.skip(f"no {name} in ../shared/data")
     camera = camera_for(rosy, name, surface, SIZE)
-    body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
-    pair = drawn_twice(rosy, card, [body], camera, rosy.Look(shading=0.0, length=LENGTH))
+    instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
+    pair = drawn_twice(rosy, card, [instance], camera, rosy.Look(shading=0.0, length=LENGTH))
     assert len(pair.gbuffer.pixel) > 0.25 * SIZE * SIZE
     assert pair.agreement >= 0.999
     # Around a sink of one direction brute force goes round in circles where the card passes through;
@@ -82,7 +83,7 @@ def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
     """All that makes lines uneven, and an ink for each family."""
     surface = surface_of("torus")
     camera = camera_for(rosy, "torus", surface, 2 * SIZE)
-    body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
+    instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
     look = rosy.Look(
         ink="hatch",
         hue="families",
@@ -95,7 +96,7 @@ def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
         wobble=0.6,
         paper_grain=0.4,
     )
-    pair = drawn_twice(rosy, card, [body], camera, look)
+    pair = drawn_twice(rosy, card, [instance], camera, look)
     assert pair.likeness >= 0.98
 
 
@@ -113,12 +114,12 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     for thing in (mirrored, hiding):
         scene.collection.objects.link(thing)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    bodies = module_of(PACKAGE, "scene.bodies").read_bodies(depsgraph)
-    assert [body.field is None for body in bodies] == [False, False, True]
+    instances = module_of(PACKAGE, "scene.scene_reader").read_bodies(depsgraph)
+    assert [instance.field is None for instance in instances] == [False, False, True]
     seen = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
     look = rosy.Look(shading=0.0)
-    pair = drawn_twice(rosy, card, bodies, seen, look)
-    assert set(np.unique(pair.gbuffer.body)) == {0, 1}
+    pair = drawn_twice(rosy, card, instances, seen, look)
+    assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
     assert pair.agreement >= 0.999
     assert pair.likeness >= 0.98
     # The fast way of numpy shares averages between neighbours, and is off from all others alike.
@@ -135,9 +136,9 @@ def test_what_blender_draws_with_is_as_it_was(rosy, card, surface_of):
     state.blend_set("ADDITIVE")
     try:
         surface = surface_of("sphere")
-        body = rosy.Body(surface, np.eye(4), rosy.generate(surface, "axis", 2))
+        instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 2))
         camera = camera_for(rosy, "sphere", surface, 64)
-        card.draw(card.place([body], "smooth"), camera, rosy.Look())
+        drawn_on_card(rosy, card, [instance], camera, rosy.Look())
         found = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         assert found == ("GREATER", False, "ADDITIVE")
     finally:
@@ -149,7 +150,7 @@ def test_a_shader_that_the_driver_does_not_take_is_an_error_of_one_line(rosy, ca
     passes = module_of(PACKAGE, "gpu.passes")
     errors = module_of(PACKAGE, "errors")
 
-    class Broken(passes.Compute):
+    class Broken(passes.ComputePass):
         source = "void main() { nonsense }"
 
     broken = Broken("broken", (), (("picture", "RGBA32F"),), (("side", "int"),))

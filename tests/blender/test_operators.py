@@ -119,9 +119,9 @@ def test_why_buttons_are_disabled(scene):
 
 
 def test_presets(scene):
-    from bl_ext.user_default.rosy.rosy_addon.compositor.presets import preset_names
+    from bl_ext.user_default.rosy.rosy_addon.presets.store import preset_keys
 
-    for name in preset_names():
+    for name in preset_keys():
         assert bpy.ops.rosy.preset_apply(preset=name) == {"FINISHED"}
     assert "nonsense" in error_of(bpy.ops.rosy.preset_apply, preset="nonsense")
 
@@ -130,9 +130,10 @@ def test_every_setting_of_a_look_is_shown_once():
     from dataclasses import fields
 
     from bl_ext.user_default.rosy.rosy_addon.compositor.look import Look
-    from bl_ext.user_default.rosy.rosy_addon.ui.panels import GROUPS, OTHERS
+    from bl_ext.user_default.rosy.rosy_addon.settings import panel_settings
+    from bl_ext.user_default.rosy.rosy_addon.ui.look_panels import LOOK_PANELS
 
-    shown = [name for group in GROUPS.values() for name in group] + list(OTHERS)
+    shown = [name for panel in (*LOOK_PANELS, "") for name in panel_settings(Look, panel)]
     assert sorted(shown) == sorted(entry.name for entry in fields(Look))
 
 

@@ -59,11 +59,11 @@ def make_field():
 
 
 def status():
-    return rosy("rosy_addon.ui.status")
+    return rosy("rosy_addon.ui.job_status")
 
 
-def panels():
-    return rosy("rosy_addon.ui.panels")
+def pictures():
+    return rosy("rosy_addon.scene.pictures")
 
 
 def pixels(image):
@@ -76,13 +76,13 @@ def start_bake(**settings):
     """Start a bake as its button does, and wait until it is on its way."""
     with in_view():
         assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
-    yield from until(lambda: status().now is None or status().now.fraction > 0.1)
-    assert status().now is not None, "the bake was over before it could be broken off"
+    yield from until(lambda: status().current is None or status().current.fraction > 0.1)
+    assert status().current is not None, "the bake was over before it could be broken off"
 
 
 def all_is_quiet():
     """No bake runs, and none of what one needs is left."""
-    assert status().now is None
+    assert status().current is None
     for name in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, name)
         for handler in handlers if isinstance(handlers, list) else ():
@@ -98,9 +98,9 @@ def broken_off(interrupt, *, unchanged=True, photographed=None):
     yield from start_bake()
     if photographed is not None:
         yield from photograph(photographed, 360)
-        assert status().now is not None, "the bake was over before its picture was taken"
+        assert status().current is not None, "the bake was over before its picture was taken"
     interrupt()
-    yield from until(lambda: status().now is None)
+    yield from until(lambda: status().current is None)
     yield 0.5
     all_is_quiet()
     if unchanged:
@@ -146,7 +146,7 @@ def singularities_as_dots():
     with in_view():
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
         bpy.ops.view3d.view_selected()
-    assert not overlay._handlers
+    assert not overlay.has_handlers()
     yield from photograph("panel-5-no-singularities")
     without = dots_in("panel-5-no-singularities")
     with in_view():
@@ -156,7 +156,7 @@ def singularities_as_dots():
     assert orange > 200 and blue > 200, (orange, blue)
     with in_view():
         bpy.ops.rosy.singularities(show="NONE")
-    assert not overlay._handlers
+    assert not overlay.has_handlers()
     yield from photograph("panel-7-hidden")
     assert np.abs(dots_in("panel-7-hidden") - without).max() < 100
 
@@ -184,8 +184,8 @@ def bake_with_progress():
     yield from start_bake()
     seen, longest, start = [], 0.0, time.monotonic()
     last = start
-    while status().now is not None:
-        seen.append(status().now.fraction)
+    while status().current is not None:
+        seen.append(status().current.fraction)
         yield
         longest, last = max(longest, time.monotonic() - last), time.monotonic()
     assert len(set(seen)) >= 3, seen
@@ -208,7 +208,9 @@ def panel_out_of_date():
     scene.camera.location.x += 0.5
     other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
     yield 1.0
-    assert [bake.stale for bake in panels().bakes(scene)] == ["camera 'Camera' was changed"]
+    assert [bake.stale_reason for bake in pictures().list_bakes(scene)] == [
+        "camera 'Camera' was changed"
+    ]
     scene.camera = other
     with in_view():
         bpy.ops.rosy.bake("EXEC_DEFAULT", True)
@@ -248,7 +250,7 @@ def undo_after_bake():
     before = contents()
     with in_view():
         bpy.ops.rosy.bake("INVOKE_DEFAULT", True)
-    yield from until(lambda: status().now is None)
+    yield from until(lambda: status().current is None)
     yield 0.3
     after = contents()
     assert after != before
@@ -262,14 +264,82 @@ def undo_after_bake():
     assert contents() == after
 
 
-def stop_with_escape():
-    def press():
-        window, _, region, _ = view()
-        x, y = region.x + region.width // 2, region.y + region.height // 2
-        window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
-        window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
+def press_escape():
+    window, _, region, _ = view()
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
+    window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
 
-    yield from broken_off(press, photographed="baking")
+
+def stop_with_escape():
+    yield from broken_off(press_escape, photographed="baking")
+
+
+def turntable(path, pictures):
+    """Start a turntable, as its file browser does once a file is chosen."""
+    with in_view():
+        started = bpy.ops.rosy.turntable(
+            "INVOKE_DEFAULT", True, skip_browser=True, filepath=str(path), film=".gif",
+            pictures=pictures, width=160, height=120,
+        )  # fmt: skip
+    assert started == {"RUNNING_MODAL"}
+    yield from until(lambda: status().current is None or status().current.fraction > 0.01)
+    assert status().current is not None, "it was over before it could be watched"
+
+
+def turntable_with_progress():
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / "turntable.gif"
+    path.unlink(missing_ok=True)
+    yield from turntable(path, 8)
+    seen = []
+    while status().current is not None:
+        seen.append(status().current.fraction)
+        yield
+    assert len(set(seen)) >= 3 and seen == sorted(seen), seen
+    all_is_quiet()
+    assert path.stat().st_size > 500
+
+
+def turntable_stopped_with_escape():
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / "stopped.gif"
+    yield from turntable(path, 60)
+    press_escape()
+    yield from until(lambda: status().current is None)
+    yield 0.5
+    all_is_quiet()
+    assert not path.exists()
+
+
+def turntable_from_its_file_browser():
+    """The file browser is opened, and once it is confirmed the work goes on as a modal job."""
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / "browser.gif"
+    path.unlink(missing_ok=True)
+    with in_view():
+        settings = {
+            "filepath": str(path),
+            "film": ".gif",
+            "pictures": 8,
+            "width": 160,
+            "height": 120,
+        }
+        started = bpy.ops.rosy.turntable("INVOKE_DEFAULT", True, **settings)
+    assert started == {"RUNNING_MODAL"} and status().current is None
+    yield 1.0
+    browser = bpy.context.window_manager.windows[-1]
+    x, y = browser.width // 2, browser.height // 2
+    browser.event_simulate(type="RET", value="PRESS", x=x, y=y)
+    browser.event_simulate(type="RET", value="RELEASE", x=x, y=y)
+    yield from until(lambda: status().current is not None)
+    yield from until(lambda: status().current is None)
+    yield 0.5
+    all_is_quiet()
+    assert path.stat().st_size > 500
 
 
 def stop_when_an_object_is_deleted():
@@ -334,6 +404,9 @@ watch(
     eevee_shows_the_picture,
     undo_after_bake,
     stop_with_escape,
+    turntable_with_progress,
+    turntable_stopped_with_escape,
+    turntable_from_its_file_browser,
     stop_when_an_object_is_deleted,
     stop_on_undo,
     stop_on_a_change_of_scene,

@@ -29,7 +29,7 @@ VIEWS, FRAMES = (24, 24) if MANY else (8, 6)
 
 
 def live():
-    return rosy("rosy_addon.live")
+    return rosy("rosy_addon.viewport.session")
 
 
 def switch(show, **more):
@@ -85,11 +85,13 @@ def at_rest():
         view()[1].tag_redraw()
         if len(redraws) < 3:
             return False
-        running = live()._live
-        fine = running.maker.coarseness[1]
-        views = running._views.values()
+        running = live()._session
+        fine = running.progressive.renderer.downscale_factors[1]
+        views = running.progressive.views.values()
         return views and all(
-            each.shows == each.wanted and each.coarseness == fine and each.wanted is not None
+            each.texture_key == each.requested_key
+            and each.downscale == fine
+            and each.requested_key is not None
             for each in views
         )
 
@@ -108,16 +110,18 @@ def by_hand(space=None, region=None, method="brute"):
     region = region or view()[2]
     camera = rosy("rosy_addon.scene.cameras").camera_of_view(region, space.region_3d)
     scene = bpy.context.scene
-    look = replace(rosy("rosy_addon.scene.looks").look_of(scene.rosy), method=method)
-    depsgraph, tones = bpy.context.evaluated_depsgraph_get(), rosy("rosy_addon.scene.tones")
-    wish = tones.tone_wish(scene, look)
-    bodies = rosy("rosy_addon.scene.bodies").read_scene(depsgraph, wish=wish).bodies
+    look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
+    depsgraph, tones = bpy.context.evaluated_depsgraph_get(), rosy("rosy_addon.scene.tone_inputs")
+    wish = tones.make_tone_request(scene, look)
+    instances = (
+        rosy("rosy_addon.scene.scene_reader").read_scene(depsgraph, tone_request=wish).instances
+    )
     lights = rosy("rosy_addon.scene.lights").read_lights(depsgraph, camera.view)
-    rendered = tones.read_rendered(scene, depsgraph, scene.camera, look)
-    gbuffer = rosy("rosy_addon.projection.project").project(bodies, camera, look.display)
+    rendered = tones.load_reference(scene, depsgraph, scene.camera, look)
+    gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)
     compose = rosy("rosy_addon.compositor.compose").compose
     picture = compose(gbuffer, look, lights, rendered).rgba.copy()
-    picture[..., :3] = rosy("rosy_addon.compositor.colour").to_display(picture[..., :3])
+    picture[..., :3] = rosy("rosy_addon.color").to_display(picture[..., :3])
     return picture
 
 
@@ -180,11 +184,11 @@ def off_is_as_before():
 
 
 def nothing_is_left():
-    assert live()._live is None
+    assert live()._session is None
     for name in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, name)
         for handler in handlers if isinstance(handlers, list) else ():
-            assert "live" not in getattr(handler, "__module__", ""), name
+            assert "viewport" not in getattr(handler, "__module__", ""), name
 
 
 def as_a_user_sees_it():
@@ -274,11 +278,14 @@ def views_choose_what_they_show():
 
 def shown():
     """What the live view draws now."""
-    running = live()._live
-    (layer,) = running._layers.values()
+    running = live()._session
+    (layer,) = running.layers._layers.values()
     space = view()[1].spaces.active
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    return [entry for entry in layer.found if live()._is_visible(entry.shown_by, depsgraph, space)]
+    is_visible = rosy("rosy_addon.viewport.view3d").is_visible
+    return [
+        entry for entry in layer.instances if is_visible(entry.visibility_object, depsgraph, space)
+    ]
 
 
 def clipped_region():
@@ -321,8 +328,8 @@ def tones_are_those_of_a_bake():
     yield from is_the_bake("live-tone-attribute", 0.97, most)
     scene.rosy.tone_attribute = "Pencil"
     view()[1].tag_redraw()
-    yield from until(lambda: live()._live.why_not)
-    assert "'Pencil'" in live()._live.why_not and "'Ink'" in live()._live.why_not
+    yield from until(lambda: live()._session.error)
+    assert "'Pencil'" in live()._session.error and "'Ink'" in live()._session.error
     look.tone, look.shadows = "light", True
     with in_view():
         bpy.ops.object.light_add(type="SUN", location=(0, 0, 5), rotation=(0.9, 0.3, 0.0))
@@ -361,7 +368,7 @@ def quad_view():
     area = view()[1]
     regions = [region for region in area.regions if region.type == "WINDOW"]
     assert len(regions) == 4
-    assert len(live()._live._views) >= 4
+    assert len(live()._session.progressive.views) >= 4
     space = area.spaces.active
     views = [*space.region_quadviews]
     by_size = rosy("rosy_addon.scene.cameras").camera_of_view
@@ -456,7 +463,7 @@ def animation_is_in_step():
     yield 0.5
     switch("ON")
     yield from at_rest()
-    assert sum(len(e.body.surface.triangles) for e in shown()) == 50_000
+    assert sum(len(e.instance.surface.triangles) for e in shown()) == 50_000
     found = []
     for frame in range(1, frames + 1):
         bpy.context.scene.frame_set(frame)
@@ -468,12 +475,15 @@ def animation_is_in_step():
     steps = []
 
     def note(*_):
-        running = live()._live
-        now = {each.wanted for each in running._views.values()}
+        running = live()._session
+        now = {each.requested_key for each in running.progressive.views.values()}
         steps.append(
             (
                 bpy.context.scene.frame_current,
-                all(each.shows == each.wanted for each in running._views.values()),
+                all(
+                    each.texture_key == each.requested_key
+                    for each in running.progressive.views.values()
+                ),
                 now,
             )
         )
@@ -558,16 +568,16 @@ def _bend(thing, frames):
 def without_the_card():
     """A driver that refuses a shader: the processor draws, says so once, and the view is usable."""
     yield from fresh_scene()
-    sources = rosy("rosy_addon.gpu.passes").Compute
+    sources = rosy("rosy_addon.gpu.passes").ComputePass
     before = sources.source
     rosy("rosy_addon.gpu.device").release()
     sources.source = property(lambda self: "void main() { this is not GLSL; }")
     try:
         switch("ON")
-        yield 1.0
-        running = live()._live
-        assert type(running.maker).__name__ == "Processor"
-        assert "does not take the shader" in running.why_slow
+        running = live()._session
+        yield from until(lambda: running.fallback_reason)
+        assert type(running.progressive.renderer).__name__ == "CpuViewportRenderer"
+        assert "does not take the shader" in running.fallback_reason
         yield from at_rest()
         seen, drawn = captured("live-processor", view()[2]), by_hand(method="sheets")
         # Of another size, its noise is another.
@@ -595,12 +605,12 @@ def bad_fields_are_named():
     cube.select_set(False)
     switch("ON")
     yield from at_rest()
-    (layer,) = live()._live._layers.values()
-    assert "Cube" in layer.follower.errors and "FLOAT_COLOR" in layer.follower.errors["Cube"]
+    (layer,) = live()._session.layers._layers.values()
+    assert "Cube" in layer.scene_cache.errors and "FLOAT_COLOR" in layer.scene_cache.errors["Cube"]
     captured("live-error", view()[2])
     bpy.data.objects.remove(cube)
     yield from is_the_bake("live-no-error")
-    assert not layer.follower.errors
+    assert not layer.scene_cache.errors
     switch("OFF")
     yield 0.5
 
@@ -614,13 +624,13 @@ def nothing_leaks():
 
     def count():
         gc.collect()
-        return sum(card.textures for card in cards), resident()
+        return sum(card.resources.texture_count for card in cards), resident()
 
     def toggle():
         switch("ON")
-        cards[:] = [*cards[-9:], live()._live.maker]
+        cards[:] = [*cards[-9:], live()._session.progressive.renderer]
         view()[1].tag_redraw()
-        yield from until(lambda: cards[-1].textures > 8)
+        yield from until(lambda: cards[-1].resources.texture_count > 8)
         switch("OFF")
         yield 0.02
 
@@ -640,7 +650,7 @@ def nothing_leaks():
             bpy.ops.ed.undo_push(message="move")
             bpy.ops.ed.undo()
         yield 0.1
-        assert live()._live is not None, f"switched off by undo {number}"
+        assert live()._session is not None, f"switched off by undo {number}"
     switch("OFF")
     yield 0.5
     undone = count()
@@ -652,7 +662,7 @@ def nothing_leaks():
         yield 0.1
         bpy.ops.wm.open_mainfile(filepath=path)
         yield 0.1
-        assert live()._live is None
+        assert live()._session is None
         if number == 3:
             opened_first = count()
     opened = count()
@@ -685,7 +695,7 @@ def time_of_a_toggle():
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rosy")
     yield 0.5
     assert time.monotonic() - start < 20
-    assert live()._live is None
+    assert live()._session is None
 
 
 ONLY = os.environ.get("ROSY_LIVE_ONLY", "").split()

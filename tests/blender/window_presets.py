@@ -16,8 +16,8 @@ from watching import captured, in_view, rosy, view, watch
 EXTENSION = "bl_ext.user_default.rosy"
 
 
-def shelf():
-    return rosy("rosy_addon.ui.shelf")
+def library():
+    return rosy("rosy_addon.ui.preset_library")
 
 
 def picture_in_panel():
@@ -61,7 +61,7 @@ def seen_picture(sidebar):
 
 def panel_with_pictures():
     bpy.ops.preferences.addon_disable(module=EXTENSION)
-    rosy("rosy_addon.ui.panels").VIEW3D_PT_rosy_look.bl_options = set()
+    rosy("rosy_addon.ui.look_panels").VIEW3D_PT_rosy_look.bl_options = set()
     bpy.ops.preferences.addon_enable(module=EXTENSION)
     yield from open_look()
     seen = seen_picture((yield from photograph("presets-1-panel")))
@@ -122,9 +122,9 @@ def saved_by_a_dialog():
     yield 1.0
     yield from photograph("presets-4-save")
     yield from press("RET")
-    assert settings.preset == "mine" and shelf().own_names() == ["mine"]
+    assert settings.preset == "mine" and library().user_preset_keys() == ["mine"]
     yield from photograph("presets-5-saved")
-    assert not shelf().is_changed(settings)
+    assert not library().is_changed(settings)
 
 
 def replaced_only_if_asked():
@@ -138,7 +138,9 @@ def replaced_only_if_asked():
     yield from photograph("presets-6-replace")
     yield from press("RET")
     yield from press("ESC")  # what is said about it
-    assert shelf().chosen(settings).preset.look.ink == "soft" and shelf().is_changed(settings)
+    assert library().active_entry(settings).preset.look.ink == "soft" and library().is_changed(
+        settings
+    )
     yield 1.0  # Blender tells pictures of files apart by the second
     with in_view():
         bpy.ops.rosy.preset_save(name="Mine", sentence="Ink", replace=True)
@@ -164,15 +166,15 @@ def deleted_only_if_confirmed():
         yield 1.0
         yield from photograph(f"presets-9-delete-{key.lower()}")
         yield from press(key)
-        assert shelf().own_names() == left, key
+        assert library().user_preset_keys() == left, key
     yield from photograph("presets-10-deleted")
 
 
 def pictures_go_with_the_extension():
     for _ in range(3):
         yield from settled()
-        pictures = shelf()._SHELF.pictures
-        assert len(pictures) == len(shelf().entries())
+        pictures = library()._LIBRARY.previews
+        assert len(pictures) == len(library().entries())
         bpy.ops.preferences.addon_disable(module=EXTENSION)
         assert not len(pictures)
         yield 0.2

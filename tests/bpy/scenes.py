@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from mathutils import Vector
-from rosy.rosy_addon.field.generate import Recipe, generate
-from rosy.rosy_addon.scene.attributes import write_mesh_field
+from rosy.rosy_addon.field.generate import GeneratorSettings, generate
+from rosy.rosy_addon.scene.field_attributes import write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
 
 
@@ -56,7 +56,7 @@ def add_plane(name="Plane", size=1.0, cuts=1):
 
 
 def add_field(thing, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
-    field = generate(mesh_surface(thing.data), Recipe(kind, axis), degree)
+    field = generate(mesh_surface(thing.data), GeneratorSettings(kind, axis), degree)
     write_mesh_field(thing.data, field)
     return thing
 

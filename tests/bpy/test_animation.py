@@ -13,12 +13,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from rosy.rosy_addon import animation
 from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.jobs import frame_range, frames_text, own_command, run_here
-from rosy.rosy_addon.scene.apply import Settings, bakes, remove
+from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local, worker_command
+from rosy.rosy_addon.gpu.select import select_renderer
 from rosy.rosy_addon.scene.cameras import frame_camera
+from rosy.rosy_addon.scene.pictures import OutputSettings, list_bakes, remove_bakes
 from scenes import contents, link, pixels, render
 
 ROOT = Path(__file__).parents[2]
@@ -51,19 +53,19 @@ def frames_of(folder):
 
 
 def test_ranges():
-    assert frame_range("7") == range(7, 8)
-    assert frame_range("1-5") == range(1, 6)
-    assert list(frame_range("-2-4:3")) == [-2, 1, 4]
+    assert parse_frames("7") == range(7, 8)
+    assert parse_frames("1-5") == range(1, 6)
+    assert list(parse_frames("-2-4:3")) == [-2, 1, 4]
     for text in ("5-1", "a", "1-5:0", "", "1-"):
         with pytest.raises(RosyError, match="is wanted"):
-            frame_range(text)
+            parse_frames(text)
     for frames in (range(3, 4), range(1, 9), range(-4, 9, 3)):
-        assert frame_range(frames_text(frames)) == range(frames[0], frames[-1] + 1, frames.step)
+        assert parse_frames(format_frames(frames)) == range(frames[0], frames[-1] + 1, frames.step)
 
 
 def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
-    (made,) = bake_animation(moving, [5, 9], settings=Settings(folder=tmp_path))
-    assert made.drawn == (5, 9) and made.kept == () and moving.frame_current == 3
+    (made,) = bake_animation(moving, [5, 9], settings=OutputSettings(folder=tmp_path))
+    assert made.rendered == (5, 9) and made.skipped == () and moving.frame_current == 3
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0009.png")))
     moving.frame_set(9)
     (single,) = bake(moving)
@@ -71,26 +73,26 @@ def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
 
 
 def test_frames_that_are_up_to_date_stay(moving, tmp_path):
-    settings = Settings(folder=tmp_path)
+    settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)
     before = frames_of(tmp_path)
     assert len(before) == 4
     (again,) = bake_animation(moving, range(1, 6), settings=settings)
-    assert again.drawn == (5,) and again.kept == (1, 2, 3, 4)
+    assert again.rendered == (5,) and again.skipped == (1, 2, 3, 4)
     # A change draws again what it touches, and a picture that is gone.
     (tmp_path / "RoSy_Scene_0002.png").unlink()
     (again,) = bake_animation(moving, range(1, 6), settings=settings)
-    assert again.drawn == (2,)
+    assert again.rendered == (2,)
     moving.rosy.look.gain = 1.0
     (again,) = bake_animation(moving, range(1, 6), settings=settings)
-    assert again.drawn == (1, 2, 3, 4, 5)
+    assert again.rendered == (1, 2, 3, 4, 5)
     moving.rosy.look.gain = 2.5
     bake_animation(moving, range(1, 6), settings=settings)
     assert {**frames_of(tmp_path), **before} == frames_of(tmp_path)
 
 
 def test_only_what_a_change_touches_is_drawn_again(moving, tmp_path):
-    settings = Settings(folder=tmp_path)
+    settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)
     monkey = bpy.data.objects["Suzanne"]
     for curve in _curves(monkey):
@@ -102,7 +104,7 @@ def test_only_what_a_change_touches_is_drawn_again(moving, tmp_path):
             for each in curve.keyframe_points:
                 each.interpolation = "CONSTANT"
     (again,) = bake_animation(moving, range(1, 5), settings=settings)
-    assert 1 in again.kept and 4 in again.drawn
+    assert 1 in again.skipped and 4 in again.rendered
 
 
 def _curves(thing):
@@ -122,21 +124,24 @@ def test_markers_choose_the_camera(moving, tmp_path):
     assert [frame_camera(moving, frame) == other for frame in (0, 1, 3, 4, 9)] == [
         False, False, False, True, True,
     ]  # fmt: skip
-    (made,) = bake_animation(moving, range(3, 5), settings=Settings(folder=tmp_path))
+    (made,) = bake_animation(moving, range(3, 5), settings=OutputSettings(folder=tmp_path))
     moving.timeline_markers.clear()
     moving.camera = other
     moving.frame_set(4)
     (single,) = bake(moving)
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
-    assert made.drawn == (3, 4)
+    assert made.rendered == (3, 4)
 
 
 def test_all_cameras_have_a_sequence_each(moving, tmp_path):
     other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
     other.matrix_world = moving.camera.matrix_world.copy()
     made = bake_animation(
-        moving, range(1, 3), cameras=[moving.camera, other], settings=Settings(folder=tmp_path)
+        moving,
+        range(1, 3),
+        cameras=[moving.camera, other],
+        settings=OutputSettings(folder=tmp_path),
     )
     assert [each.camera for each in made] == [moving.camera.name, "Other"]
     assert len(frames_of(tmp_path)) == 4
@@ -144,9 +149,9 @@ def test_all_cameras_have_a_sequence_each(moving, tmp_path):
 
 def test_materials_play_the_frames(moving, tmp_path):
     before = contents()
-    bake_animation(moving, range(4, 8), settings=Settings(folder=tmp_path / "frames"))
-    (bake_,) = bakes(moving)
-    assert bake_.frames == "4 to 7" and not bake_.stale
+    bake_animation(moving, range(4, 8), settings=OutputSettings(folder=tmp_path / "frames"))
+    (bake_,) = list_bakes(moving)
+    assert bake_.frame_range == "4 to 7" and not bake_.stale_reason
     moving.view_settings.view_transform = "Standard"
     moving.rosy.look.shading = 0.0
     for frame in (4, 6):
@@ -161,7 +166,7 @@ def test_materials_play_the_frames(moving, tmp_path):
         assert np.abs(seen[..., :3] - linear[..., :3])[inside].mean() < 0.01, frame
         bpy.data.images.remove(image)
     moving.frame_set(3)
-    remove(moving)
+    remove_bakes(moving)
     for name in ("images", "materials", "node_groups"):
         assert contents()[name] == [
             x for x in contents()[name] if x in before[name] or "Render" in x
@@ -170,7 +175,7 @@ def test_materials_play_the_frames(moving, tmp_path):
 
 def test_half_floats(moving, tmp_path):
     before = sorted(scene.name for scene in bpy.data.scenes)
-    settings = Settings(folder=tmp_path, as_float=True)
+    settings = OutputSettings(folder=tmp_path, as_float=True)
     bake_animation(moving, [2], settings=settings)
     path = tmp_path / "RoSy_Scene_0002.exr"
     image = bpy.data.images.load(str(path))
@@ -178,7 +183,7 @@ def test_half_floats(moving, tmp_path):
     channels = path.read_bytes().split(b"chlist\0", 1)[1][4:]
     name, _, kind = channels.partition(b"\0")
     assert name == b"A" and kind[:4] == b"\1\0\0\0"  # half
-    bake_animation(moving, [2], settings=Settings(folder=tmp_path))
+    bake_animation(moving, [2], settings=OutputSettings(folder=tmp_path))
     png = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
     linear = np.where(png <= 0.04045, png / 12.92, ((png + 0.055) / 1.055) ** 2.4)
     np.testing.assert_allclose(pixels(image)[..., :3], linear[..., :3], atol=0.01)
@@ -193,7 +198,7 @@ def test_errors_name_the_frame(moving, tmp_path):
     monkey.location.x = 500
     monkey.keyframe_insert("location", frame=2)
     with pytest.raises(RosyError, match=r"frame 2: .* outside the frame"):
-        bake_animation(moving, range(1, 4), settings=Settings(folder=tmp_path))
+        bake_animation(moving, range(1, 4), settings=OutputSettings(folder=tmp_path))
     assert len(frames_of(tmp_path)) == 1 and moving.frame_current == 3
 
 
@@ -259,15 +264,15 @@ def test_several_processes(file, tmp_path):
     finished(start(file, tmp_path / "two", "--frames", "1-7", "--jobs", "3", "--save"))
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
     bpy.ops.wm.open_mainfile(filepath=str(file))
-    (bake_,) = bakes(bpy.context.scene)
-    assert bake_.frames == "1 to 7"
+    (bake_,) = list_bakes(bpy.context.scene)
+    assert bake_.frame_range == "1 to 7"
 
 
 def test_a_frame_that_fails_is_named(file, tmp_path, monkeypatch):
-    command = [*own_command("", file), "--out", str(tmp_path / "out"), "--camera", "Nobody"]
+    command = [*worker_command("", file), "--out", str(tmp_path / "out"), "--camera", "Nobody"]
     monkeypatch.chdir(ROOT)
     with pytest.raises(RosyError, match=r"frames 1-5:2: there is no camera 'Nobody'"):
-        list(run_here(command, range(1, 7), 2))
+        list(run_local(command, range(1, 7), 2))
 
 
 @pytest.fixture
@@ -320,6 +325,27 @@ def test_what_makes_no_sense_is_refused(file, tmp_path):
         process = start(file, tmp_path / "out", *words)
         _, err = process.communicate(timeout=120)
         assert process.returncode == 2 and wanted in err, err
+
+
+def test_an_animated_method_is_drawn_by_the_renderer_that_can(moving, tmp_path, monkeypatch):
+    """The graphics card does not draw the method "members": the choice is made for each frame."""
+    look = moving.rosy.look
+    for frame, method in ((1, "sheets"), (2, "members"), (3, "sheets")):
+        look.method = method
+        look.keyframe_insert("method", frame=frame)
+    chosen = []
+
+    def select(device, look, *options, **keywords):
+        chosen.append((moving.frame_current, device, look.method))
+        return select_renderer(device, look, *options, **keywords)
+
+    monkeypatch.setattr(animation, "select_renderer", select)
+    settings = OutputSettings(folder=tmp_path, device="auto")
+    bake_animation(moving, [1, 2, 3], settings=settings)
+    assert chosen[:2] == [(1, "auto", "sheets"), (2, "auto", "members")]
+    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
+    moving.frame_set(2)
+    np.testing.assert_allclose(pixels(bake(moving)[0].image), frame, atol=1 / 255)
 
 
 # --- turntables ------------------------------------------------------------------------------

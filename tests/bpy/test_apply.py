@@ -5,15 +5,15 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake, baking
-from rosy.rosy_addon.compositor.colour import to_display
+from rosy.rosy_addon.bake import bake, bake_task
+from rosy.rosy_addon.cache import BAKE_CACHE
+from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.reuse import KEPT
-from rosy.rosy_addon.scene import apply as apply_room
-from rosy.rosy_addon.scene.apply import bakes, remove, use_bake
+from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.cameras import scene_cameras
-from rosy.rosy_addon.ui.properties import apply_look, look_of
+from rosy.rosy_addon.scene.pictures import list_bakes, remove_bakes, show_bake
+from rosy.rosy_addon.ui.properties import apply_look, read_look
 from scenes import add_camera, add_field, add_plane, contents, link, pixels, set_vectors
 
 
@@ -48,7 +48,7 @@ def test_it_survives_saving(scene, camera, monkey, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), before)
     scene = bpy.context.scene
-    assert [(bake.camera, bake.stale) for bake in bakes(scene)] == [("Camera", "")]
+    assert [(bake.camera, bake.stale_reason) for bake in list_bakes(scene)] == [("Camera", "")]
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
 
 
@@ -111,21 +111,21 @@ def test_remove_leaves_no_trace(scene, camera, monkey):
     before = contents()
     bake(scene, cameras=scene_cameras(scene))
     assert contents() != before
-    removed = remove(scene)
-    assert (removed.objects, removed.images, removed.materials, removed.groups) == (2, 2, 2, 2)
+    removed = remove_bakes(scene)
+    assert (removed.objects, removed.images, removed.materials, removed.node_groups) == (2, 2, 2, 2)
     assert contents() == before
-    assert remove(scene).objects == 0
+    assert remove_bakes(scene).objects == 0
 
 
 def test_remove_from_one_object(scene, camera, monkey):
     other = add_field(add_plane("Other"), kind="axis")
     other.location.x = 1.0
     bake(scene)
-    assert remove(scene, [other]).objects == 1
+    assert remove_bakes(scene, [other]).objects == 1
     assert not other.modifiers
-    assert [entry.camera for entry in bakes(scene)] == ["Camera"]
-    assert remove(scene, [monkey]).images == 1
-    assert not bakes(scene)
+    assert [entry.camera for entry in list_bakes(scene)] == ["Camera"]
+    assert remove_bakes(scene, [monkey]).images == 1
+    assert not list_bakes(scene)
     assert not bpy.data.materials
 
 
@@ -133,15 +133,15 @@ def test_cancelled_at_any_step_nothing_is_left(scene, camera, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
     steps = 0
-    KEPT.clear()
-    work = baking(scene)
+    BAKE_CACHE.clear()
+    work = bake_task(scene)
     for _ in work:
         steps += 1
-    remove(scene)
+    remove_bakes(scene)
     assert steps > 3
     for stop in range(steps):
-        KEPT.clear()
-        work = baking(scene)
+        BAKE_CACHE.clear()
+        work = bake_task(scene)
         for _ in range(stop + 1):
             next(work)
         work.close()
@@ -154,7 +154,7 @@ def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypat
     def fails(*_):
         raise RosyError("no more")
 
-    monkeypatch.setattr(apply_room, "new_group", fails)
+    monkeypatch.setattr(pictures_room, "new_group", fails)
     with pytest.raises(RosyError, match="no more"):
         bake(scene)
     assert contents() == before
@@ -164,16 +164,16 @@ def test_several_cameras(scene, camera, monkey):
     second = add_camera("Second", (3.0, -4.0, 1.0))
     first_bake, last_bake = bake(scene, cameras=scene_cameras(scene))
     assert (first_bake.camera, last_bake.camera) == ("Second", "Camera")
-    assert [entry.camera for entry in bakes(scene)] == ["Camera", "Second"]
+    assert [entry.camera for entry in list_bakes(scene)] == ["Camera", "Second"]
     assert material_of(monkey).name == "RoSy Camera"
-    assert [entry.shown for entry in bakes(scene)] == [True, False]
+    assert [entry.is_shown for entry in list_bakes(scene)] == [True, False]
     groups = len(bpy.data.node_groups)
-    use_bake(scene, "Second")
+    show_bake(scene, "Second")
     assert material_of(monkey).name == "RoSy Second"
-    assert [entry.shown for entry in bakes(scene)] == [False, True]
+    assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
     with pytest.raises(RosyError, match="camera 'Third'; there are 'Second', 'Camera'"):
-        use_bake(scene, "Third")
+        show_bake(scene, "Third")
     assert second.name == "Second"
 
 
@@ -239,29 +239,29 @@ def delete_camera(scene, camera, monkey):
     ],
 )
 def test_out_of_date(scene, camera, monkey, change, monkeypatch):
-    monkeypatch.setattr(apply_room, "PATIENCE", 0.0)
+    monkeypatch.setattr(pictures_room, "STATE_TTL_SECONDS", 0.0)
     bake(scene)
-    assert bakes(scene)[0].stale == ""
+    assert list_bakes(scene)[0].stale_reason == ""
     why = change(scene, camera, monkey)
-    assert why in bakes(scene)[0].stale
+    assert why in list_bakes(scene)[0].stale_reason
 
 
 def test_notes(scene, camera, monkey):
-    assert bake(scene)[0].notes == ()
+    assert bake(scene)[0].warnings == ()
     scene.view_settings.view_transform = "Filmic"
-    (note,) = bake(scene)[0].notes
+    (note,) = bake(scene)[0].warnings
     assert "Filmic" in note
     assert scene.view_settings.view_transform == "Filmic"
 
 
 def test_settings_of_a_look(scene):
-    assert look_of(scene.rosy) == Look()
+    assert read_look(scene.rosy) == Look()
     look = Look(method="brute", gain=1.234, density=0.999, seed=2**31 - 1, magnitude="both")
     apply_look(scene.rosy, look)
-    assert look_of(scene.rosy) == look
-    for name, rules in ((entry.name, entry.metadata) for entry in look_fields()):
+    assert read_look(scene.rosy) == look
+    for name, setting in ((entry.name, entry.metadata["setting"]) for entry in look_fields()):
         description = scene.rosy.look.bl_rna.properties[name].description
-        assert description == rules["text"]
+        assert description == setting.text
 
 
 def look_fields():
@@ -272,7 +272,7 @@ def look_fields():
 
 def test_same_scene_same_bytes(scene, camera, monkey):
     first = bytes(bake(scene)[0].image.packed_file.data)
-    remove(scene)
+    remove_bakes(scene)
     assert bytes(bake(scene)[0].image.packed_file.data) == first
 
 
@@ -305,7 +305,7 @@ def test_undo_brings_back_the_former_picture(scene, camera, monkey):
 
 def test_a_look_given_does_not_make_it_stale(scene, camera, monkey):
     bake(scene, look=Look(seed=3))
-    assert bakes(scene)[0].stale == ""
+    assert list_bakes(scene)[0].stale_reason == ""
 
 
 def test_a_view(scene, monkey):
@@ -316,4 +316,4 @@ def test_a_view(scene, monkey):
     view = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 80, 60, name=VIEW_NAME)
     (baked,) = bake(scene, cameras=[view])
     assert tuple(baked.image.size) == (80, 60)
-    assert [(entry.camera, entry.stale) for entry in bakes(scene)] == [("3D View", "")]
+    assert [(entry.camera, entry.stale_reason) for entry in list_bakes(scene)] == [("3D View", "")]

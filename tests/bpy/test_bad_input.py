@@ -10,10 +10,10 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
-from rosy.rosy_addon.scene.attributes import read_mesh_field, write_mesh_field
-from rosy.rosy_addon.scene.bodies import rosy_objects
 from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.field_attributes import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.scene_reader import field_objects
 from scenes import (
     add_camera,
     add_field,
@@ -44,14 +44,14 @@ def test_no_field(scene, camera):
     plane = add_plane()
     refused("no visible object has a RoSy field")
     with pytest.raises(RosyError, match="object 'Plane' has no attribute 'rosy'"):
-        rosy_objects(bpy.context.view_layer, ["Plane"])
+        field_objects(bpy.context.view_layer, ["Plane"])
     with pytest.raises(RosyError, match="there is no object 'Plain'"):
-        rosy_objects(bpy.context.view_layer, ["Plain"])
+        field_objects(bpy.context.view_layer, ["Plain"])
     with pytest.raises(RosyError, match="'Camera' is a camera, not a mesh"):
-        rosy_objects(bpy.context.view_layer, ["Camera"])
+        field_objects(bpy.context.view_layer, ["Camera"])
     add_field(plane, kind="axis").hide_render = True
     with pytest.raises(RosyError, match="'Plane' is hidden in renders"):
-        rosy_objects(bpy.context.view_layer, ["Plane"])
+        field_objects(bpy.context.view_layer, ["Plane"])
 
 
 def test_hidden_in_the_viewport(scene, camera, monkey):
@@ -91,7 +91,7 @@ def test_not_finite(scene, camera, value, domain):
     scene.rosy.undefined = True
     (baked,) = bake(scene)
     assert baked.picture.rgba[..., 3].max() == 1
-    field = read_mesh_field(plane.data, undefined="zero")
+    field = read_mesh_field(plane.data, nonfinite="zero")
     assert np.isfinite(field.vectors).all()
     if domain in ("FACE", "ANGLE"):
         np.testing.assert_array_equal(field.magnitude > 0, np.arange(9) != 1)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from rosy.rosy_addon.sketch import sketch
+from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.strokes.svg import Pen
 from scenes import add_camera
 
@@ -105,7 +105,7 @@ def test_strokes_of_a_file_are_what_the_button_draws(drawable, tmp_path):
         (["--camera", "Side", "--size", "120x90"], {"camera": "Side", "size": (120, 90)}),
     ):
         wanted = {**more, "camera": scene.objects[more.get("camera", "Camera")]}
-        sketch(scene, kind="SVG", path=tmp_path / "button.svg", **wanted)
+        draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", **wanted)
         done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
         assert done.returncode == 0, done.stderr
         assert f"{more.get('camera', 'Camera')}: {tmp_path / 'out.svg'}" in done.stdout
@@ -123,7 +123,7 @@ def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
     settings.unit, settings.distance, settings.tone = "world", 0.2, False
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
-    sketch(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)
+    draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)
     assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
 
 
@@ -164,7 +164,7 @@ def test_strokes_of_frames(drawable, tmp_path):
         (["field.rosy"], "suzanne.blend: FIELD is for mesh files"),
         (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh is for mesh files"),
         (["--view", "0,90"], "suzanne.blend: --view is for mesh files"),
-        (["--frames", "1-3"], "out.svg: of several frames, # in the name"),
+        (["--frames", "1-3"], "out.svg: several frames need #"),
         (
             ["--frames", "9", "--spacing", "9999", "--no-outline"],
             "frame 9: there is no room for a stroke",

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.compositor.colour import to_display
+from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
 from scenes import add_field, add_plane, aim, link, render
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rosy.rosy_addon import bake as bake_room
 from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.compositor import compose as compose_room
-from rosy.rosy_addon.reuse import KEPT, Kept, digest
+from rosy.rosy_addon.cache import BAKE_CACHE, Cache, content_hash
+from rosy.rosy_addon.compositor import stages
+from rosy.rosy_addon.projection import project as projection
 from scenes import add_camera, add_field, add_plane, set_vectors
 
 
 @pytest.fixture(autouse=True)
 def empty():
-    KEPT.clear()
+    BAKE_CACHE.clear()
     yield
-    KEPT.clear()
+    BAKE_CACHE.clear()
 
 
 @pytest.fixture
@@ -32,9 +32,9 @@ def done(monkeypatch):
 
         monkeypatch.setattr(room, name, watched)
 
-    watch(bake_room, "projecting")
-    watch(compose_room, "surface_flow")
-    watch(compose_room, "_images")
+    watch(projection, "project_task")
+    watch(stages, "surface_pixel_field")
+    watch(stages, "lic_task")
     return names
 
 
@@ -43,7 +43,7 @@ def drawn(scene):
 
 
 def drawn_anew(scene):
-    KEPT.clear()
+    BAKE_CACHE.clear()
     return drawn(scene)
 
 
@@ -104,7 +104,7 @@ def test_a_change_is_seen(scene, camera, monkey, done, change):
     change(scene, monkey)
     done.clear()
     after = drawn(scene)
-    assert done == ["projecting", "surface_flow", "_images"]
+    assert done == ["project_task", "surface_pixel_field", "lic_task"]
     assert not np.array_equal(before, after)
     np.testing.assert_array_equal(after, drawn_anew(scene))
 
@@ -115,14 +115,14 @@ def test_a_change_is_seen(scene, camera, monkey, done, change):
         ("gain", 1.0, []),
         ("shading", 0.2, []),
         ("light", "scene", []),
-        ("length", 20, ["_images"]),
-        ("seed", 3, ["_images"]),
-        ("guiding_angle", 0.4, ["_images"]),
-        ("noise", "colour", ["_images"]),
-        ("magnitude", "both", ["_images"]),
-        ("method", "members", ["_images"]),
-        ("crease_angle", 0.05, ["surface_flow", "_images"]),
-        ("supersampling", 2, ["projecting", "surface_flow", "_images"]),
+        ("length", 20, ["lic_task"]),
+        ("seed", 3, ["lic_task"]),
+        ("guiding_angle", 0.4, ["lic_task"]),
+        ("noise", "colour", ["lic_task"]),
+        ("magnitude", "both", ["lic_task"]),
+        ("method", "members", ["lic_task"]),
+        ("crease_angle", 0.05, ["surface_pixel_field", "lic_task"]),
+        ("supersampling", 2, ["project_task", "surface_pixel_field", "lic_task"]),
     ],
 )
 def test_a_look_does_again_what_depends_on_it(scene, camera, monkey, done, setting, value, again):
@@ -155,24 +155,24 @@ def test_another_object_may_move_alone(scene, camera, monkey, done):
     """What is known of a body does not go when another changes."""
     plane = add_field(add_plane("Other"), kind="axis")
     bake(scene)
-    entries = len(KEPT)
+    entries = len(BAKE_CACHE)
     plane.location.z -= 0.5
     bake(scene)
-    # Its body, and a G-buffer.
-    assert len(KEPT) == entries + 2
+    # Its instance, a G-buffer, a pixel field, and LIC images.
+    assert len(BAKE_CACHE) == entries + 4
     set_vectors(plane.data, np.zeros((len(plane.data.polygons), 3)) + (1, 0, 0.5))
     bake(scene)
-    # Its field as it was given and as it is drawn, its body, and a G-buffer.
-    assert len(KEPT) == entries + 6
+    # Its field as it was given and as it is drawn, its instance, its corner field, and the same.
+    assert len(BAKE_CACHE) == entries + 11
 
 
 def test_what_is_over_the_limit_is_given_up_oldest_first():
-    kept = Kept(limit=10_000)
+    kept = Cache(max_bytes=10_000)
     for number in range(5):
         kept.put(number, np.zeros(500))
-    assert kept.find(0) is not None
-    kept.trim()
-    assert [kept.find(number) is not None for number in range(5)] == [
+    assert kept.get(0) is not None
+    kept.evict_over_limit()
+    assert [kept.get(number) is not None for number in range(5)] == [
         True,
         False,
         False,
@@ -182,23 +182,23 @@ def test_what_is_over_the_limit_is_given_up_oldest_first():
 
 
 def test_a_shared_array_counts_once():
-    kept = Kept(limit=10_000)
+    kept = Cache(max_bytes=10_000)
     array = np.zeros(1000)
     for number in range(5):
         kept.put(number, [array, array[:10]])
-    kept.trim()
+    kept.evict_over_limit()
     assert len(kept) == 5
 
 
 def test_digests_tell_apart_what_differs():
     array = np.arange(6.0)
-    assert digest(array) == digest(array.copy())
+    assert content_hash(array) == content_hash(array.copy())
     others = (
         array.reshape(2, 3),
         array.astype(np.float32),
         array[::-1],
         array + 1e-16 * np.arange(6) ** 2 + np.spacing(array),
     )
-    assert len({digest(array), *map(digest, others)}) == 5
-    assert digest("ab", "c") != digest("a", "bc")
-    assert digest(None) != digest("")
+    assert len({content_hash(array), *map(content_hash, others)}) == 5
+    assert content_hash("ab", "c") != content_hash("a", "bc")
+    assert content_hash(None) != content_hash("")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from rosy.bench.stroke_spacing import lateral_gaps
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.surface import build_surface
-from rosy.rosy_addon.projection.gbuffer import Body
-from rosy.rosy_addon.strokes.evenness import side_gaps
-from rosy.rosy_addon.strokes.ground import lay_ground
-from rosy.rosy_addon.strokes.trace import trace
+from rosy.rosy_addon.projection.gbuffer import MeshInstance
+from rosy.rosy_addon.strokes.tangent_mesh import build_tangent_mesh
+from rosy.rosy_addon.strokes.trace import trace_strokes
 
 pytestmark = pytest.mark.long
 
@@ -29,7 +29,9 @@ def suzanne(levels=2):
 @pytest.mark.parametrize("degree", [2, 4, 6])
 def test_spacing_on_suzanne(scene, degree):
     surface = suzanne()
-    body = Body(surface, np.eye(4), generate(surface, "smoothest", degree))
-    gaps = side_gaps(lay_ground(body), trace(body, 0.012 * surface.size))
-    assert gaps.even() >= 0.9
-    assert gaps.nearest.min() >= 0.5
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", degree))
+    gaps = lateral_gaps(
+        build_tangent_mesh(instance), trace_strokes(instance, 0.012 * surface.extent)
+    )
+    assert gaps.evenness() >= 0.9
+    assert gaps.nearest_distance.min() >= 0.5

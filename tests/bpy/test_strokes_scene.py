@@ -9,19 +9,23 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
+from rosy.rosy_addon.draw_strokes import draw_strokes, draw_strokes_task
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.scene.bodies import read_scene
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.strokes import remove_strokes, stroke_objects
-from rosy.rosy_addon.sketch import sketch, sketching
-from rosy.rosy_addon.strokes.draw import Manner
-from rosy.rosy_addon.strokes.outline import KINDS
-from rosy.rosy_addon.strokes.seen import on_screen, pixel_size
+from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
+from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.stroke_objects import remove_strokes, stroke_objects
+from rosy.rosy_addon.strokes.outline import OUTLINE_KINDS
+from rosy.rosy_addon.strokes.style import StrokeStyle
 from rosy.rosy_addon.strokes.svg import Pen
+from rosy.rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
 
-PLAIN = Manner(spacing=6, outline=True)
+PLAIN = StrokeStyle(spacing=6, outline=True)
 BLACK = Pen(width=1.5)
+
+#: Type of a Grease Pencil object: Blender 4.3 replaced Grease Pencil by a new one.
+PENCIL = "GREASEPENCIL" if has_grease_pencil_drawings() else "GPENCIL"
 
 
 def view(scene):
@@ -34,9 +38,31 @@ def values(attribute, key="value", columns=1):
     return found.reshape(-1, columns) if columns > 1 else found
 
 
+def pencil_strokes(layer):
+    """(points, widths, material index) of each stroke of a layer: (n, 3) and (n,), world units."""
+    (frame,) = layer.frames
+    if has_grease_pencil_drawings():
+        return [
+            (
+                np.array([point.position for point in stroke.points]),
+                np.array([2 * point.radius for point in stroke.points]),
+                stroke.material_index,
+            )
+            for stroke in frame.drawing.strokes
+        ]
+    return [
+        (
+            np.array([point.co for point in stroke.points]),
+            np.array([point.pressure for point in stroke.points]) * stroke.line_width / 1000,
+            stroke.material_index,
+        )
+        for stroke in frame.strokes
+    ]
+
+
 def coverage(points, start, radius, camera, fine=8):
     """(H, W) share of each pixel, rows from the bottom, that lines cover, by many small discs."""
-    pixels, _ = on_screen(points, camera)
+    pixels, _ = project_to_pixels(points, camera)
     size = radius / pixel_size(points, camera)
     canvas = np.zeros((camera.height * fine, camera.width * fine), dtype=bool)
     y, x = np.mgrid[: camera.height * fine, : camera.width * fine]
@@ -55,35 +81,32 @@ def coverage(points, start, radius, camera, fine=8):
 
 
 def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
-    made = sketch(scene, kind="PENCIL", manner=PLAIN, pen=BLACK)
-    data, strokes = made.thing.data, made.drawn.strokes
-    assert made.thing.type == "GPENCIL"
-    assert [layer.info for layer in data.layers] == ["Family 1", "Family 2", "Outline"]
+    made = draw_strokes(scene, kind="PENCIL", style=PLAIN, pen=BLACK)
+    data, strokes = made.obj.data, made.drawing.strokes
+    assert made.obj.type == PENCIL
+    titles = [layer.name if has_grease_pencil_drawings() else layer.info for layer in data.layers]
+    assert titles == ["Family 1", "Family 2", "Outline"]
     assert not any(material.grease_pencil.show_fill for material in data.materials)
     eye = view(scene)
     for number, layer in enumerate(data.layers):
-        lines = layer.frames[0].strokes
-        own = np.array([strokes.names[family] in KINDS for family in strokes.family])
+        lines = pencil_strokes(layer)
+        own = np.array([strokes.names[family] in OUTLINE_KINDS for family in strokes.family])
         own = own if number == 2 else strokes.family == number
         assert len(lines) == own.sum() and not layer.use_lights
-        assert {line.material_index for line in lines} == {number}
-        for line, stroke in zip(lines, np.flatnonzero(own), strict=True):
+        assert {material for _, _, material in lines} == {number}
+        for (points, width, _), stroke in zip(lines, np.flatnonzero(own), strict=True):
             part = slice(*strokes.start[stroke : stroke + 2])
-            points = np.empty(3 * len(line.points))
-            line.points.foreach_get("co", points)
-            points = points.reshape(-1, 3)
-            where, _ = on_screen(points, eye)
-            wanted, _ = on_screen(strokes.points[part], eye)
+            where, _ = project_to_pixels(points, eye)
+            wanted, _ = project_to_pixels(strokes.points[part], eye)
             np.testing.assert_allclose(where[[0, -1]], wanted[[0, -1]], atol=0.01)
-            width = np.array([point.pressure for point in line.points]) * line.line_width / 1000
             width = width / pixel_size(points, eye)
             assert np.isclose(width.max(), 1.5 * strokes.width[part].max(), rtol=0.03)
 
 
 def test_curves_hold_the_strokes_and_what_is_known_of_them(monkey, camera, scene):
-    made = sketch(scene, kind="CURVES", manner=PLAIN, pen=BLACK)
-    data, strokes = made.thing.data, made.drawn.strokes
-    assert made.thing.type == "CURVES" and len(data.curves) == len(strokes)
+    made = draw_strokes(scene, kind="CURVES", style=PLAIN, pen=BLACK)
+    data, strokes = made.obj.data, made.drawing.strokes
+    assert made.obj.type == "CURVES" and len(data.curves) == len(strokes)
     found = {name: data.attributes[name] for name in data.attributes.keys()}  # noqa: SIM118
     wanted = {
         "radius": ("POINT", "FLOAT"),
@@ -116,9 +139,9 @@ def test_curves_hold_the_strokes_and_what_is_known_of_them(monkey, camera, scene
         np.einsum("ni,ni->n", np.array(camera.location) - points, normal)[drawn] > 0
     ).mean() > 0.95
     first = np.array([curve.first_point_index for curve in data.curves])
-    where, _ = on_screen(points[first].astype(float), eye)
+    where, _ = project_to_pixels(points[first].astype(float), eye)
     np.testing.assert_allclose(
-        where, on_screen(strokes.points[strokes.start[:-1]], eye)[0], atol=0.01
+        where, project_to_pixels(strokes.points[strokes.start[:-1]], eye)[0], atol=0.01
     )
 
 
@@ -128,14 +151,14 @@ def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
     wall = add_plane("Wall", size=0.5)
     wall.location = (0.5, -2.0, 0.3)
     bpy.context.view_layer.update()
-    made = sketch(scene, kind="CURVES", manner=Manner(spacing=5), pen=Pen(width=2.0))
+    made = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=5), pen=Pen(width=2.0))
     eye = view(scene)
     corners = np.array([[x, 0, z] for x in (-0.5, 0.5) for z in (-0.5, 0.5)]) + wall.location
-    low, high = (edge(on_screen(corners, eye)[0], axis=0) for edge in (np.min, np.max))
+    low, high = (edge(project_to_pixels(corners, eye)[0], axis=0) for edge in (np.min, np.max))
     covered = (slice(int(low[1]) + 2, int(high[1]) - 2), slice(int(low[0]) + 2, int(high[0]) - 2))
     wall.hide_render = monkey.hide_render = True
     alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
-    strokes = made.drawn.strokes
+    strokes = made.drawing.strokes
     radius = pixel_size(strokes.points, eye) * strokes.width
     expected = coverage(strokes.points, strokes.start, radius, eye)
     assert expected.mean() > 0.03
@@ -144,8 +167,10 @@ def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
     # Behind the wall was nothing to be seen, and it is not there now that the wall is gone.
     assert alpha[covered].size > 300 and alpha[covered].mean() < 1e-4
     monkey.hide_render = False
-    kept = sketch(scene, kind="CURVES", manner=Manner(spacing=5, hidden=True), pen=Pen(width=2.0))
-    assert kept.thing == made.thing
+    kept = draw_strokes(
+        scene, kind="CURVES", style=StrokeStyle(spacing=5, hidden=True), pen=Pen(width=2.0)
+    )
+    assert kept.obj == made.obj
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "kept.exr", samples=8)[..., 3]
     assert alpha[covered].mean() > 0.1
@@ -165,11 +190,11 @@ def workbench():
 
 
 def test_workbench_shows_grease_pencil_of_the_old_kind(workbench, monkey, camera, scene, tmp_path):
-    made = sketch(scene, kind="PENCIL", manner=Manner(spacing=6), pen=Pen(width=3.0))
+    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=6), pen=Pen(width=3.0))
     eye = view(scene)
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "pencil.exr", engine="BLENDER_WORKBENCH")[..., 3]
-    strokes = made.drawn.strokes
+    strokes = made.drawing.strokes
     radius = pixel_size(strokes.points, eye) * strokes.width * 3 / 2
     expected = coverage(strokes.points, strokes.start, radius, eye)
     assert expected.mean() > 0.05
@@ -182,31 +207,37 @@ def test_strokes_that_run_on_are_covered_by_nothing(monkey, camera, scene, tmp_p
     wall = add_plane("Wall", size=0.5)
     wall.location = (0.5, -2.0, 0.3)
     bpy.context.view_layer.update()
-    manner = Manner(spacing=7, overshoot=15)
-    made = sketch(scene, kind="CURVES", manner=manner, pen=Pen(width=2.0))
+    style = StrokeStyle(spacing=7, overshoot=15)
+    made = draw_strokes(scene, kind="CURVES", style=style, pen=Pen(width=2.0))
     wall.is_holdout = monkey.is_holdout = True
     alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
-    strokes, eye = made.drawn.strokes, view(scene)
+    strokes, eye = made.drawing.strokes, view(scene)
     radius = pixel_size(strokes.points, eye) * strokes.width
     expected = coverage(strokes.points, strokes.start, radius, eye)
     assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
     assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
-    short = sketch(scene, kind="CURVES", manner=Manner(spacing=7)).drawn.strokes
+    short = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=7)).drawing.strokes
     assert len(short) == len(strokes) and strokes.length.sum() > 1.05 * short.length.sum()
+
+
+def pencil_modifiers(obj):
+    """The modifiers of a Grease Pencil object."""
+    return obj.modifiers if has_grease_pencil_drawings() else obj.grease_pencil_modifiers
 
 
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
 def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
     before = contents()
-    first = sketch(scene, kind=kind, manner=PLAIN).thing
+    first = draw_strokes(scene, kind=kind, style=PLAIN).obj
     once = contents()
     first.name = "Mine"
     if kind == "PENCIL":
-        first.grease_pencil_modifiers.new("Noise", "GP_NOISE")
+        noise = "GREASE_PENCIL_NOISE" if has_grease_pencil_drawings() else "GP_NOISE"
+        pencil_modifiers(first).new("Noise", noise)
     first.location.x = 5.0
-    again = sketch(scene, kind=kind, manner=Manner(spacing=12, outline=True)).thing
+    again = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=12, outline=True)).obj
     assert again == first and again.name == "Mine"
-    assert kind == "CURVES" or again.grease_pencil_modifiers[0].name == "Noise"
+    assert kind == "CURVES" or pencil_modifiers(again)[0].name == "Noise"
     assert np.allclose(again.matrix_basis, np.eye(4))
     again.name = f"RoSy Strokes {camera.name}"
     after = contents()
@@ -222,14 +253,14 @@ def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
 
 
 def test_copies_are_the_users(monkey, camera, scene):
-    first = sketch(scene, kind="CURVES", manner=PLAIN).thing
+    first = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     copy = first.copy()
     copy.data = first.data.copy()
     scene.collection.objects.link(copy)
     count = len(copy.data.curves)
     linked = first.copy()  # on the same data
     scene.collection.objects.link(linked)
-    assert sketch(scene, kind="CURVES", manner=Manner(spacing=14)).thing == first
+    assert draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=14)).obj == first
     assert len(copy.data.curves) == len(linked.data.curves) == count > len(first.data.curves)
     assert stroke_objects(scene) == [first]
     remove_strokes(scene)
@@ -237,21 +268,21 @@ def test_copies_are_the_users(monkey, camera, scene):
 
 
 def test_deleted_by_the_user_it_is_made_anew(monkey, camera, scene):
-    first = sketch(scene, kind="PENCIL", manner=PLAIN).thing
+    first = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     bpy.data.objects.remove(first)
     assert not stroke_objects(scene)
-    sketch(scene, kind="PENCIL", manner=PLAIN)
+    draw_strokes(scene, kind="PENCIL", style=PLAIN)
     scene.collection.objects.unlink(stroke_objects(scene)[0])  # as Delete does
     assert not stroke_objects(scene)
-    second = sketch(scene, kind="PENCIL", manner=PLAIN).thing
+    second = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     assert stroke_objects(scene) == [second]
-    assert [thing.name for thing in bpy.data.objects if thing.type == "GPENCIL"] == [second.name]
+    assert [thing.name for thing in bpy.data.objects if thing.type == PENCIL] == [second.name]
 
 
 def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
     side = add_camera("Side", (5.0, 0.0, 0.5))
     made = [
-        sketch(scene, kind=kind, camera=source, manner=PLAIN).thing
+        draw_strokes(scene, kind=kind, camera=source, style=PLAIN).obj
         for kind in ("PENCIL", "CURVES")
         for source in (camera, side, camera)
     ]
@@ -261,39 +292,44 @@ def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
 def test_strokes_of_one_mesh_move_with_it(monkey, camera, scene):
     monkey.location, monkey.scale = (0.2, 0.0, 0.1), (1.2, 1.0, 0.9)
     bpy.context.view_layer.update()
-    thing = sketch(scene, kind="CURVES", manner=PLAIN).thing
+    thing = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     bpy.context.view_layer.update()
     assert np.allclose(thing.matrix_world, np.eye(4), atol=1e-6)
     monkey.location.x += 1.0
     bpy.context.view_layer.update()
     assert np.allclose(thing.matrix_world.translation, (1, 0, 0), atol=1e-6)
     add_field(add_plane("Other", cuts=4), "axis")
-    assert sketch(scene, kind="CURVES", manner=PLAIN).thing.parent is None
+    assert draw_strokes(scene, kind="CURVES", style=PLAIN).obj.parent is None
 
 
 def test_chosen_objects_are_drawn_on_and_the_others_hide(monkey, camera, scene):
     wall = add_field(add_plane("Wall", size=0.6, cuts=3), "axis")
     wall.location.y = -2.0
     bpy.context.view_layer.update()
-    bodies = read_scene(bpy.context.evaluated_depsgraph_get()).bodies
-    assert len(bodies) == 2
-    made = sketch(
-        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], manner=Manner(spacing=6)
+    instances = read_scene(bpy.context.evaluated_depsgraph_get()).instances
+    assert len(instances) == 2
+    made = draw_strokes(
+        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=6)
     )
-    assert np.allclose(made.drawn.strokes.points[:, 1], -2.0)
+    assert np.allclose(made.drawing.strokes.points[:, 1], -2.0)
     alone = len(
-        sketch(scene, kind="CURVES", objects=[monkey], manner=Manner(spacing=6)).drawn.strokes
+        draw_strokes(
+            scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=6)
+        ).drawing.strokes
     )
     wall.hide_render = True
-    assert len(sketch(scene, kind="CURVES", manner=Manner(spacing=6)).drawn.strokes) > alone
+    assert (
+        len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6)).drawing.strokes)
+        > alone
+    )
 
 
 def test_what_was_made_of_strokes_hides_nothing(monkey, camera, scene):
     """Geometry Nodes may make meshes of them; these are not what is drawn on."""
-    wanted = sketch(scene, kind="CURVES", manner=Manner(spacing=6))
-    thicken(wanted.thing, 0.3)
-    again = sketch(scene, kind="CURVES", manner=Manner(spacing=6))
-    np.testing.assert_array_equal(again.drawn.strokes.points, wanted.drawn.strokes.points)
+    wanted = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6))
+    thicken(wanted.obj, 0.3)
+    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6))
+    np.testing.assert_array_equal(again.drawing.strokes.points, wanted.drawing.strokes.points)
 
 
 def thicken(thing, radius):
@@ -318,17 +354,17 @@ def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, 
     settings.spacing, settings.taper, settings.width = 6.3, 0.4, 0.7
     settings.tone, settings.light, settings.outline = True, "lamp", True
     settings.inks, settings.outline_colour = "FAMILIES", (1.0, 0.0, 0.0)
-    assert sketch(scene).path == tmp_path / "a.svg"
-    manner = Manner(spacing=6.3, taper=0.4, tone=True, light="lamp", outline=True)
+    assert draw_strokes(scene).path == tmp_path / "a.svg"
+    style = StrokeStyle(spacing=6.3, taper=0.4, tone=True, light="lamp", outline=True)
     pen = Pen(width=0.7, colours=["#db8021", "#4594eb"], outline="#ff0000")
-    sketch(scene, kind="SVG", path=tmp_path / "b.svg", manner=manner, pen=pen)
+    draw_strokes(scene, kind="SVG", path=tmp_path / "b.svg", style=style, pen=pen)
     text = (tmp_path / "a.svg").read_text()
     assert text == (tmp_path / "b.svg").read_text() and 'stroke="#ff0000"' in text
 
 
 def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
     before = contents()
-    work = sketching(scene, kind="PENCIL", manner=PLAIN)
+    work = draw_strokes_task(scene, kind="PENCIL", style=PLAIN)
     labels = []
     for step in work:
         labels.append(step.label)
@@ -347,8 +383,8 @@ def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
         ("", {"kind": "SVG", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
         ("", {"kind": "SVG", "path": "/tmp/a.png"}, "/tmp/a.png: strokes are written to .svg"),
         ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "there is no folder /nowhere"),
-        ("", {"manner": Manner(spacing=1e4)}, "no room for a stroke"),
-        ("", {"manner": Manner(unit="world", distance=1e-6)}, "too many"),
+        ("", {"style": StrokeStyle(spacing=1e4)}, "no room for a stroke"),
+        ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "too many"),
     ],
 )
 def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoil, more, wanted):
@@ -361,7 +397,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoi
         bpy.context.view_layer.update()
     before = contents()
     with pytest.raises(RosyError) as caught:
-        sketch(scene, **{"kind": "PENCIL", **more})
+        draw_strokes(scene, **{"kind": "PENCIL", **more})
     assert wanted in str(caught.value) and "\n" not in str(caught.value)
     assert contents() == before
 
@@ -369,7 +405,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoi
 def test_other_meshes_without_a_field_do_not_matter(camera, scene):
     add_mesh("Points", [(0, 0, 0)], [])
     add_field(add_plane("Square", cuts=4), "axis")
-    made = sketch(scene, kind="PENCIL", manner=Manner(spacing=6))
-    assert made.thing.data.layers[0].frames[0].frame_number == min(
+    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=6))
+    assert made.obj.data.layers[0].frames[0].frame_number == min(
         scene.frame_start, scene.frame_current
     )

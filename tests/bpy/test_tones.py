@@ -7,15 +7,20 @@ import numpy as np
 import pytest
 from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.compositor.colour import to_linear
+from rosy.rosy_addon.color import to_linear
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.progress import drain
-from rosy.rosy_addon.scene.apply import settings_of
-from rosy.rosy_addon.scene.bodies import read_scene
-from rosy.rosy_addon.scene.following import Follower
-from rosy.rosy_addon.scene.occlusion import OCCLUSION, storing_occlusion
-from rosy.rosy_addon.scene.tones import ToneWish, image_luminance, read_rendered, tone_wish
+from rosy.rosy_addon.progress import run_to_completion
+from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion_task
+from rosy.rosy_addon.scene.pictures import read_output_settings
+from rosy.rosy_addon.scene.scene_cache import SceneCache
+from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.tone_inputs import (
+    ToneRequest,
+    image_luminance,
+    load_reference,
+    make_tone_request,
+)
 from scenes import add_field, add_mesh, add_plane, link, pixels
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -60,8 +65,8 @@ def wall(scene, camera):
 
 
 def tone_of(wish, name="Plane"):
-    reading = read_scene(depsgraph(), wish=wish)
-    return reading.bodies[[owner.name for owner in reading.owners].index(name)].tone
+    reading = read_scene(depsgraph(), tone_request=wish)
+    return reading.instances[[owner.name for owner in reading.objects].index(name)].tone
 
 
 # --- attributes -----------------------------------------------------------------------------------
@@ -83,7 +88,7 @@ def test_attributes_of_all_domains(wall, domain, kind):
     mesh.loops.foreach_get("vertex_index", corner)
     face = np.repeat(np.arange(4), 4)
     at = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
-    found = tone_of(ToneWish("attribute", "Ink")).values
+    found = tone_of(ToneRequest("attribute", "Ink")).values
     np.testing.assert_allclose(found[:, 0], wanted[at], atol=0.01 if kind == "BYTE_COLOR" else 1e-6)
 
 
@@ -91,14 +96,14 @@ def test_no_name_is_the_active_colour(wall):
     add_attribute(wall.data, "Some", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.2))
     add_attribute(wall.data, "Paint", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.7))
     wall.data.color_attributes.active_color_name = "Paint"
-    found = tone_of(ToneWish("attribute")).values
+    found = tone_of(ToneRequest("attribute")).values
     np.testing.assert_allclose(found, 0.7, atol=1e-6)
 
 
 def test_modifiers_carry_attributes(wall):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.linspace(0, 1, 9))
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
-    found = tone_of(ToneWish("attribute", "Ink")).values
+    found = tone_of(ToneRequest("attribute", "Ink")).values
     assert len(found) == 4 * 16
     height = depsgraph().id_eval_get(wall).data
     places = np.empty(3 * len(height.vertices), dtype=np.float32)
@@ -111,25 +116,25 @@ def test_modifiers_carry_attributes(wall):
 
 def test_objects_without_the_attribute_have_the_light(wall, monkey):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    assert tone_of(ToneWish("attribute", "Ink"), "Suzanne") is None
+    assert tone_of(ToneRequest("attribute", "Ink"), "Suzanne") is None
 
 
 def test_attributes_that_nobody_has(wall, monkey):
     add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
     with pytest.raises(RosyError) as caught:
-        read_scene(depsgraph(), wish=ToneWish("attribute", "Pain"))
+        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "Pain"))
     said = str(caught.value)
     assert "'Pain'" in said and "'Paint'" in said and "'Plane'" in said and "'Suzanne'" in said
     with pytest.raises(RosyError, match="no vertex colours"):
-        read_scene(depsgraph(), wish=ToneWish("attribute"))
+        read_scene(depsgraph(), tone_request=ToneRequest("attribute"))
 
 
 def test_attributes_that_will_not_do(wall):
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': found"):
-        read_scene(depsgraph(), wish=ToneWish("attribute", "rosy"))
+        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "rosy"))
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
     with pytest.raises(RosyError, match="attribute 'Ink': has values that are not finite"):
-        read_scene(depsgraph(), wish=ToneWish("attribute", "Ink"))
+        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "Ink"))
 
 
 # --- images ---------------------------------------------------------------------------------------
@@ -180,16 +185,16 @@ def test_images_on_uv_maps_are_drawn(scene, wall):
 
 def test_images_without_a_map_or_none_at_all(wall):
     with pytest.raises(RosyError, match="no image is chosen for the tone of 'Plane'"):
-        read_scene(depsgraph(), wish=ToneWish("image"))
+        read_scene(depsgraph(), tone_request=ToneRequest("image"))
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
     with pytest.raises(RosyError, match="object 'Plane': its mesh has no UV map"):
-        read_scene(depsgraph(), wish=ToneWish("image"))
+        read_scene(depsgraph(), tone_request=ToneRequest("image"))
     add_uv(wall.data)
-    assert tone_of(ToneWish("image")).image.shape == (2, 2)
+    assert tone_of(ToneRequest("image")).image.shape == (2, 2)
     wall.rosy.tone_uv_map = "Other"
     with pytest.raises(RosyError, match="no UV map 'Other'"):
-        read_scene(depsgraph(), wish=ToneWish("image"))
+        read_scene(depsgraph(), tone_request=ToneRequest("image"))
 
 
 # --- pictures -------------------------------------------------------------------------------------
@@ -204,7 +209,7 @@ def test_pictures_from_files(scene, wall, tmp_path):
     save_picture(tmp_path / "shot.png", values)
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
-    rendered = read_rendered(scene, depsgraph(), scene.camera, PICTURE)
+    rendered = load_reference(scene, depsgraph(), scene.camera, PICTURE)
     np.testing.assert_allclose(
         rendered.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
     )
@@ -243,13 +248,13 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
         save_picture(tmp_path / f"shot_{frame:03d}.png", np.full((16, 16), value))
     scene.rosy.tone_picture = str(tmp_path / "shot_###.png")
     scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "out")
-    settings = settings_of(scene)
+    settings = read_output_settings(scene)
 
     def run():
         made = bake_animation(
             scene, [1, 2], look=PICTURE, size=(128, 128), settings=settings, show=False
         )
-        return made[0].drawn
+        return made[0].rendered
 
     assert run() == (1, 2)
     means = []
@@ -268,25 +273,25 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
 
 def test_wishes_of_looks(scene):
     scene.rosy.tone_attribute = "Ink"
-    assert tone_wish(scene, Look()) is None
-    assert tone_wish(scene, Look(tone="attribute")) == ToneWish("attribute", "Ink")
-    assert tone_wish(scene, Look(tone="image")) == ToneWish("image")
-    assert tone_wish(scene, Look(tone="picture")) is None
+    assert make_tone_request(scene, Look()) is None
+    assert make_tone_request(scene, Look(tone="attribute")) == ToneRequest("attribute", "Ink")
+    assert make_tone_request(scene, Look(tone="image")) == ToneRequest("image")
+    assert make_tone_request(scene, Look(tone="picture")) is None
 
 
 def test_a_live_view_reads_tones_again_when_they_change(wall):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    wish, follower = ToneWish("attribute", "Ink"), Follower()
-    (first,) = follower.read(depsgraph(), wish=wish)
-    (again,) = follower.read(depsgraph(), wish=wish)
-    assert again.number == first.number and not first.body.tone.values.any()
+    wish, follower = ToneRequest("attribute", "Ink"), SceneCache()
+    (first,) = follower.read(depsgraph(), tone_request=wish)
+    (again,) = follower.read(depsgraph(), tone_request=wish)
+    assert again.version == first.version and not first.instance.tone.values.any()
     wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
     wall.data.update()
-    follower.forget({"Plane"})
-    (changed,) = follower.read(depsgraph(), wish=wish)
-    assert changed.number != first.number and changed.body.tone.values.all()
+    follower.invalidate({"Plane"})
+    (changed,) = follower.read(depsgraph(), tone_request=wish)
+    assert changed.version != first.version and changed.instance.tone.values.all()
     (none,) = follower.read(depsgraph())
-    assert none.body.tone is None
+    assert none.instance.tone is None
 
 
 def test_shadows_are_of_what_renders_show(scene, wall):
@@ -313,10 +318,10 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     floor = add_mesh("Floor", [(-9, 0, -1), (9, 0, -1), (9, -9, -1), (-9, -9, -1)], [(3, 2, 1, 0)])
     add_field(floor, "axis", 2, (1.0, 0.0, 0.0))
     bpy.context.view_layer.update()
-    drain(storing_occlusion(depsgraph(), [wall], directions=128))
-    attribute = wall.data.attributes[OCCLUSION]
+    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=128))
+    attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
-    assert OCCLUSION not in floor.data.attributes
+    assert OCCLUSION_ATTRIBUTE not in floor.data.attributes
     values = np.empty(16, dtype=np.float32)
     attribute.data.foreach_get("value", values)
     corner = np.array([loop.vertex_index for loop in wall.data.loops])
@@ -324,22 +329,22 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     # In the edge with the floor, which is as good as endless, half of the sky; more above.
     assert values[height == -1].mean() == pytest.approx(0.5, abs=0.05)
     assert values[height == 1].mean() > values[height == 0].mean() > 0.55
-    assert tone_of(ToneWish("attribute", OCCLUSION)) is not None
+    assert tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)) is not None
     # Once more in its place.
-    drain(storing_occlusion(depsgraph(), [wall], directions=16))
-    assert sum(a.name.startswith(OCCLUSION) for a in wall.data.attributes) == 1
+    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
+    assert sum(a.name.startswith(OCCLUSION_ATTRIBUTE) for a in wall.data.attributes) == 1
 
 
 def test_occlusion_of_meshes_that_modifiers_make_anew(scene, wall):
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
     bpy.context.view_layer.update()
-    drain(storing_occlusion(depsgraph(), [wall], directions=16))
-    assert len(wall.data.attributes[OCCLUSION].data) == 16
-    assert len(tone_of(ToneWish("attribute", OCCLUSION)).values) == 64
+    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
+    assert len(wall.data.attributes[OCCLUSION_ATTRIBUTE].data) == 16
+    assert len(tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)).values) == 64
 
 
 def test_occlusion_leaves_other_attributes_alone(scene, wall):
-    add_attribute(wall.data, OCCLUSION, "POINT", "FLOAT", np.arange(9))
+    add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
     with pytest.raises(RosyError, match="object 'Plane': has an attribute 'Occlusion' already"):
-        drain(storing_occlusion(depsgraph(), [wall], directions=4))
-    assert wall.data.attributes[OCCLUSION].data[3].value == 3
+        run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=4))
+    assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3

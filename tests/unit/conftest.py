@@ -15,9 +15,6 @@ settings.load_profile("patient")
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: Modules that draw many pictures and measure them; `make check` leaves them out.
-SLOW = {"test_compositor", "test_hatching", "test_occlusion", "test_pictures", "test_tone"}
-
 
 def long(*cases):
     """Cases of a test that `make test-long` adds to the usual ones."""
@@ -25,9 +22,9 @@ def long(*cases):
 
 
 def pytest_collection_modifyitems(items):
-    """Mark the tests of slow modules, and those that draw on a graphics card and in numpy."""
+    """Mark the tests that draw on a graphics card as slow."""
     for item in items:
-        if item.path.stem in SLOW or "card" in item.fixturenames:
+        if "card" in item.fixturenames:
             item.add_marker(pytest.mark.slow)
 
 

@@ -7,7 +7,7 @@ import json
 import pytest
 from conftest import ROOT
 
-from rosy_addon.jobs import frame_range
+from rosy_addon.frame_workers import parse_frames
 
 quickjs = pytest.importorskip("quickjs")
 
@@ -73,7 +73,7 @@ def test_two_cameras_have_a_sequence_each():
         "Close 3,5,6", "Close 7-8", "Far 3,5,6", "Far 7-8",
     ]  # fmt: skip
     # The command line takes what the manager makes of frames.
-    assert list(frame_range("3,5,6")) == [3, 5, 6] and list(frame_range("7-8")) == [7, 8]
+    assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]
 
 
 def test_settings_are_what_the_manager_knows():

@@ -13,27 +13,53 @@ from conftest import ROOT
 PACKAGE = ROOT / "rosy_addon"
 
 #: What each room may import besides itself. Modules at the top are rooms of their own.
-BASE = {"errors", "progress", "files", "memory", "trigonometry"}
+BASE = {
+    "errors",
+    "progress",
+    "file_io",
+    "memory",
+    "deterministic_trig",
+    "color",
+    "settings",
+    "cache",
+}
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
     "memory": set(),
-    "reuse": set(),
-    "trigonometry": set(),
-    "files": {"errors"},
+    "cache": {"progress"},
+    "deterministic_trig": set(),
+    "color": {"errors"},
+    "file_io": {"errors"},
+    "settings": {"errors"},
     "field": BASE,
     "projection": BASE | {"field"},
     "compositor": BASE | {"field", "projection"},
     "strokes": BASE | {"field", "projection"},
-    "gpu": BASE | {"field", "projection", "compositor"},
-    "scene": BASE | {"field", "projection", "compositor", "strokes", "reuse"},
-    "bake": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse"},
-    "animation": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse", "bake"},
-    "live": BASE | {"field", "projection", "compositor", "scene", "gpu", "reuse", "bake"},
-    "sketch": BASE | {"projection", "compositor", "strokes", "scene", "reuse", "bake"},
-    "jobs": BASE,
-    "turntable": BASE | {"field", "projection", "compositor"},
-    "ui": BASE | {"field", "projection", "compositor", "strokes", "scene", "gpu", "bake", "live"},
+    "image_io": BASE,
+    "render": BASE | {"field", "projection", "compositor", "cache"},
+    "presets": BASE | {"field", "projection", "compositor", "image_io"},
+    "gpu": BASE | {"field", "projection", "compositor", "render", "cache"},
+    "scene": BASE
+    | {"field", "projection", "compositor", "strokes", "render", "cache", "image_io", "presets"},
+    "bake": BASE | {"compositor", "scene", "gpu", "cache"},
+    "animation": BASE | {"projection", "compositor", "render", "scene", "gpu", "cache"},
+    "viewport": BASE | {"projection", "compositor", "render", "scene", "gpu"},
+    "draw_strokes": BASE | {"projection", "compositor", "strokes", "scene", "cache"},
+    "frame_workers": BASE,
+    "turntable": BASE | {"projection", "compositor", "render", "image_io"},
+    "ui": BASE
+    | {
+        "presets",
+        "field",
+        "projection",
+        "compositor",
+        "strokes",
+        "scene",
+        "gpu",
+        "bake",
+        "viewport",
+    },
     "cli": BASE
     | {
         "field",
@@ -41,21 +67,24 @@ MAY_IMPORT = {
         "compositor",
         "scene",
         "gpu",
+        "render",
         "bake",
         "ui",
         "animation",
-        "jobs",
+        "frame_workers",
         "turntable",
         "strokes",
-        "sketch",
+        "draw_strokes",
+        "image_io",
+        "presets",
     },
     "__main__": {"cli"},
     "__init__": set(),
 }
-NUMPY_ROOMS = ("field", "projection", "compositor", "strokes")
+NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
 
 #: What of the room `gpu` draws with Blender, and imports that when it does.
-DRAWN_WITH = ("device.py", "processor.py")
+DRAWN_WITH = ("device.py",)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -88,11 +117,11 @@ def test_imports_run_one_way(path):
     rooms = {name.split(".")[0] for name in inside} - {room}
     assert rooms <= MAY_IMPORT[room]
     allowed = set(sys.stdlib_module_names) | {"numpy"}
-    if room in ("scene", "ui", "bake", "sketch", "live", "cli", "animation"):
+    if room in ("scene", "ui", "bake", "draw_strokes", "viewport", "cli", "animation"):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in DRAWN_WITH and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
-    if room == "jobs":
+    if room == "frame_workers":
         allowed |= {"distributed"}  # asked for by name, and only then
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
@@ -112,7 +141,7 @@ def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         for path in FILES
-        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli", "jobs", "turntable")
+        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli", "frame_workers", "turntable")
         and path.stem != "__init__"
     ]
     assert len(modules) > 20

@@ -11,12 +11,15 @@ from hypothesis import strategies as st
 from PIL import Image
 from shapes import icosphere, torus
 
-from rosy_addon.compositor.gif import BAYER, LEVELS, compressed, gif_bytes
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
 from rosy_addon.field.generate import axis_field
-from rosy_addon.projection.gbuffer import Body
-from rosy_addon.turntable import check_film, pictures, write_film
+from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.turntable import check_video_path, turntable_task, turntable_views
 
 QUICK = Look(length=8)
 
@@ -50,7 +53,7 @@ def test_long_runs_of_codes(tmp_path):
     noise = np.random.default_rng(0).integers(0, 256, (300, 400, 1), dtype=np.uint8)
     ((_, (found,)),) = [frames_of(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
     assert np.array_equal(found[..., :1], noise)
-    assert len(compressed(bytes(100_000))) < 1500
+    assert len(lzw_compress(bytes(100_000))) < 1500
 
 
 def test_colours_are_right_on_average():
@@ -58,7 +61,7 @@ def test_colours_are_right_on_average():
     ramp[...] = (200, 90, 30)
     _, (found,) = frames_of(gif_bytes([ramp], 10))
     assert np.abs(found.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
-    assert BAYER.shape == (4, 4) and np.prod(LEVELS) <= 256
+    assert BAYER_MATRIX.shape == (4, 4) and np.prod(PALETTE_LEVELS) <= 256
 
 
 def test_rate_and_repetition():
@@ -71,9 +74,10 @@ def test_all_of_it_is_in_the_frame_all_the_way_round():
     surface = torus(48, 24)
     matrix = np.diag((1.0, 2.0, 1.5, 1.0))
     matrix[:3, 3] = (5.0, -2.0, 1.0)
-    body = Body(surface, matrix, axis_field(surface, 2))
+    instance = MeshInstance(surface, matrix, axis_field(surface, 2))
     covered = []
-    for rgba in pictures(body, QUICK, 5, (80, 60), (10.0, 25.0)):
+    for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
+        rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
         assert rgba.shape == (60, 80, 4)
         seen = rgba[..., 3] > 0
         assert not (seen[0].any() or seen[-1].any() or seen[:, 0].any() or seen[:, -1].any())
@@ -83,11 +87,37 @@ def test_all_of_it_is_in_the_frame_all_the_way_round():
 
 def test_a_film_is_written_whole(tmp_path):
     surface = icosphere(2)
-    body = Body(surface, np.eye(4), axis_field(surface, 2))
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     path = tmp_path / "film.gif"
-    write_film(path, pictures(body, QUICK, 3, (32, 32), (0.0, 0.0)), 12)
+    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
+    assert run_to_completion(turntable_task(CpuRenderer(), views, 3, path, 12)) == path
     film, found = frames_of(path.read_bytes())
     assert len(found) == 3 and film.size == (32, 32)
     assert (found[0][0, 0] == 255).all(), "on white paper"
     with pytest.raises(RosyError, match=r"films are written to .mp4 and .gif"):
-        check_film(tmp_path / "film.avi")
+        check_video_path(tmp_path / "film.avi")
+
+
+def test_lights_stand_still_while_the_camera_goes_round():
+    """A sun from +y lights the far side in the first picture and the near side in the second."""
+    surface = icosphere(3)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
+    look = Look(length=8, shading=1.0, light="scene")
+    sun = Light("sun", np.array([0.0, 1.0, 0.0]), np.ones(3), 1.0)
+    dark, lit = (
+        run_to_completion(CpuRenderer().render_task(view)).rgba[20:44, 20:44, :3].mean()
+        for view in turntable_views(instance, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
+    )
+    assert dark < 0.05 < 0.2 < lit
+
+
+def test_a_video_that_is_not_finished_leaves_no_file(tmp_path):
+    surface = icosphere(2)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
+    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
+    task = turntable_task(CpuRenderer(), views, 3, tmp_path / "film.gif", 12)
+    for progress in task:
+        if progress.label == "picture 3 of 3":
+            break
+    task.close()
+    assert not list(tmp_path.iterdir())

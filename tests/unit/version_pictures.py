@@ -15,11 +15,11 @@ from shapes import icosphere, torus
 
 from rosy_addon.compositor.compose import compose, compose_planar
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.png import to_bytes
-from rosy_addon.compositor.presets import load_preset
 from rosy_addon.field.generate import generate
+from rosy_addon.image_io.png import to_srgb_uint8
+from rosy_addon.presets.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
 
@@ -37,9 +37,9 @@ def draw() -> dict[str, np.ndarray]:
     for name, (surface, kind, degree, drawn) in shapes.items():
         size = 160 * drawn.supersampling
         camera = orbit_camera(surface, -25, 30, size, size)
-        body = Body(surface, np.eye(4), generate(surface, kind, degree))
-        pictures[name] = compose(project([body], camera), drawn)
-    return {name: to_bytes(picture.rgba) for name, picture in pictures.items()}
+        instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
+        pictures[name] = compose(project([instance], camera), drawn)
+    return {name: to_srgb_uint8(picture.rgba) for name, picture in pictures.items()}
 
 
 if __name__ == "__main__":

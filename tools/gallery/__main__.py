@@ -12,10 +12,10 @@ from .page import FOLDER, SOURCE
 PAGES = {
     "figure-02": ("Figure 2", "One direction is not enough", "one of six directions, and all six"),
     "figure-05": ("Figure 5", "From a field to a picture", "a 3-RoSy field, step by step"),
-    "figure-06": ("Figure 6", "Contrast", "its loss by blending, and its correction"),
-    "figure-07": ("Figures 7, 8", "Tilted surfaces", "members in the view plane, and artefacts"),
-    "figure-09": ("Figure 9", "Magnitude", "as colour, as length of streaks, as both"),
-    "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how well N can be read"),
+    "figure-06": ("Figure 6", "Contrast", "how blending reduces it, and the correction"),
+    "figure-07": ("Figures 7, 8", "Tilted surfaces", "members in the view plane, and artifacts"),
+    "figure-09": ("Figure 9", "Magnitude", "as color, as the length of streaks, as both"),
+    "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how legible each N is"),
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
 #: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
@@ -53,11 +53,11 @@ def main() -> int:
 def _write_index() -> None:
     pieces = [
         "# Gallery",
-        f"The figures of {SOURCE}, redrawn by RoSy: the same kinds of fields and the same "
-        "comparisons, with what was measured in the pictures beside them. `make gallery` draws "
-        "the pictures, measures them and writes these pages; nothing in the tables is typed by "
-        "hand. Look at the pictures at their own size: scaled by anything but a whole number, "
-        "streaks beat with the pixels of the screen.",
+        f"Here you can compare RoSy with the figures of {SOURCE}. RoSy redraws the same kinds of "
+        "fields and the same comparisons, with measurements beside the pictures. `make gallery` "
+        "draws the pictures, measures them and writes these pages. No number in the tables is "
+        "typed by hand. Look at the pictures at their original size. If they are scaled by a "
+        "factor that is not a whole number, the streaks alias with the pixels of the screen.",
         "\n".join(
             f"- [{figure}: {title}]({name}.md): {about}"
             for name, (figure, title, about) in PAGES.items()

@@ -6,12 +6,12 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.directions import directions_field, tensor_field
-from rosy_addon.field.frames import dot, unit
-from rosy_addon.field.generate import Recipe, axis_field, generate
-from rosy_addon.field.singularities import singularities
+from rosy_addon.field.directional_field import field_from_directions, tensor_field
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
 from .page import ROOT
@@ -46,7 +46,9 @@ def write() -> None:
     ]
     save(sheet([smooth]), IMAGES / "fields-smoothest.png")
     curved = [
-        _panel(monkey, Recipe("curvature", reach=reach), 4, (-26, 8), text, WIDE)
+        _panel(
+            monkey, GeneratorSettings("curvature", smoothing_length=reach), 4, (-26, 8), text, WIDE
+        )
         for reach, text in ((0.0, "Curvature of each face"), (0.05, "Curvature, reach 0.05"))
     ]
     save(sheet([curved]), IMAGES / "fields-curvature.png")
@@ -68,7 +70,7 @@ def write() -> None:
 def _strokes(monkey: Surface) -> list[Panel]:
     """The smoothest field of Suzanne, and that which follows strokes drawn on her."""
     camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
-    buffer = project([Body(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
+    buffer = project([MeshInstance(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
     place = np.full((camera.height * camera.width, 3), np.nan)
     place[buffer.pixel] = (
         buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
@@ -82,7 +84,12 @@ def _strokes(monkey: Surface) -> list[Panel]:
         strokes.append(points[np.isfinite(points).all(axis=1)])
     panels = [_panel(monkey, "smoothest", 2, (-26, 8), "Smoothest, N = 2", WIDE)]
     guided = _panel(
-        monkey, Recipe("guided", strokes=strokes), 2, (-26, 8), "Guided by four strokes", WIDE
+        monkey,
+        GeneratorSettings("guided", strokes=strokes),
+        2,
+        (-26, 8),
+        "Guided by four strokes",
+        WIDE,
     )
     picture = Image.fromarray(guided.picture)
     pen = ImageDraw.Draw(picture)
@@ -103,15 +110,15 @@ def _curve(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
 def _free() -> list[Panel]:
     """Two pairs of directions on a sphere, whose angle goes from 90 degrees to 25."""
     ball = sphere()
-    up = 1 - np.abs(ball.face_centre[:, 2])
+    up = 1 - np.abs(ball.face_center[:, 2])
     half = np.radians(12.5 + (45 - 12.5) * np.clip(up, 0, 1))
-    along = unit(axis_field(ball, 1).vectors)
+    along = normalize(axis_field(ball, 1).vectors)
     across = np.cross(ball.face_normal, along)
     pair = [
         np.cos(half)[:, None] * along + sign * np.sin(half)[:, None] * across for sign in (1, -1)
     ]
     directions = np.stack([pair[0], pair[1], -pair[0], -pair[1]], axis=1)
-    field = directions_field(ball, directions)
+    field = field_from_directions(ball, directions)
     panels = []
     for text, look in (
         ("Pairs at 25 to 90 degrees", LOOK),
@@ -125,9 +132,9 @@ def _free() -> list[Panel]:
 def _tensor() -> list[Panel]:
     """The directions in which a ring is pulled and pressed by a force at its side."""
     ring = torus()
-    offset = ring.face_centre - (1.2, -1.4, 0.6)
+    offset = ring.face_center - (1.2, -1.4, 0.6)
     distance = np.sqrt(dot(offset, offset))[:, None, None]
-    away = unit(offset)
+    away = normalize(offset)
     tensors = away[:, :, None] * away[:, None, :] / distance - 0.35 * np.eye(3) * distance
     field = tensor_field(ring, tensors)
     panels = []
@@ -145,10 +152,10 @@ def _singular(monkey: Surface) -> list[Panel]:
     panels = []
     for degree in (2, 4):
         field = generate(monkey, "smoothest", degree)
-        vertex, index = singularities(monkey, field)
+        vertex, index = find_singularities(monkey, field)
         camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
         picture = display(compose_view(monkey, field, LOOK, camera).rgba)
-        buffer = project([Body(monkey, np.eye(4), field)], camera)
+        buffer = project([MeshInstance(monkey, np.eye(4), field)], camera)
         depth = np.full(camera.height * camera.width, -np.inf)
         depth[buffer.pixel] = buffer.position[:, 2]
         clip = np.c_[monkey.vertices[vertex], np.ones(len(vertex))]
@@ -174,7 +181,7 @@ def _box() -> Surface:
 
 def _panel(
     surface: Surface,
-    recipe: Recipe | str,
+    recipe: GeneratorSettings | str,
     degree: int,
     angles: tuple[float, float],
     text: str,

@@ -22,11 +22,13 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-02", "One direction is not enough")
     page.text(
-        """A 6-RoSy field around a singularity: going once around the dot, its members turn by a
-        sixth of a circle, forward above (index +1/6), backward below (−1/6). One direction out of
-        the six (a, c) has to jump somewhere, here along the line to the right of the dot, and says
-        little of the pattern. All six (b, d) go on everywhere, and show it: straight lines leave
-        the dot in five directions in (b), in seven in (d)."""
+        """This page shows why all directions of a field must be visible. The field is a 6-RoSy
+        field around a singularity, which the dot marks. On a path once around the dot, the members
+        rotate by a sixth of a turn: in the sense of the path for index +1/6 (top row), against it
+        for index −1/6 (bottom row). A single direction (a, c) must jump somewhere, here along the
+        line to the right of the dot, and it shows little of the pattern. All six directions (b, d)
+        are continuous everywhere. Straight lines leave the dot in five directions in (b), and in
+        seven in (d)."""
     )
     rows, letters = [], iter("abcd")
     for index in (1, -1):
@@ -39,15 +41,16 @@ def write() -> None:
             row.append(Panel(drawn, f"({next(letters)}) {what}, index {signed(index)}/6"))
         rows.append(row)
     page.picture(rows, "One direction of a 6-RoSy field beside all six, around two singularities")
-    page.text("## Measured")
+    page.text("## Measurements")
     page.text(
-        """The orientations of the streaks in two windows of 128 by 64 pixels to the right of the
-        dot, just above and just below the line, in degrees: those of the members in the middle of
-        each window, and those at which the power of streaks peaks. One direction changes from one
-        window to the other by nearly a sixth of a circle; all six are nearly the same ones."""
+        """The table lists the orientations of the streaks, in degrees, in two windows of 128 by 64
+        pixels to the right of the dot, just above and just below the line. The columns show the
+        members in the center of each window, and the peaks of the orientation spectrum of the
+        picture. The single direction changes by nearly a sixth of a turn from one window to the
+        other. The six directions are nearly the same in both windows."""
     )
     page.table(
-        ["Picture", "Members above", "Found above", "Members below", "Found below"],
+        ["Picture", "Members above", "Measured above", "Members below", "Measured below"],
         [_measured(index, degree) for index in (1, -1) for degree in (1, DEGREE)],
     )
     page.write("Figure 2")

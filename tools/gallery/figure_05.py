@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rosy_addon.compositor.compose import compose_planar
-from rosy_addon.compositor.flow import blend_weights, planar_flow
-from rosy_addon.compositor.picture import Layers
+from rosy_addon.compositor.picture import DegreeLayer
+from rosy_addon.compositor.pixel_field import blend_weights, planar_pixel_field
 
 from .looks import MEASURED, RED
 from .measure import correlation
@@ -32,12 +32,13 @@ def write() -> None:
     brute = compose_planar(angles, DEGREE, LOOK.with_settings({"method": "brute"})).layers[0]
 
     page.text(
-        """A 3-RoSy field with a singularity of index +1/3 in the middle becomes three vector
-        fields: V₀ takes at each point the member nearest to the guiding angle 0°, V₁ and V₂ those
-        nearest to 120° and 240°. Their LIC images I₀, I₁, I₂ together have every streak, but all
-        break along the line to the left of the middle, where two members are equally near to the
-        guiding angle. The second set, I′₀, I′₁, I′₂, is guided by 60°, 180° and 300°, and breaks
-        along the line to the right."""
+        """This page shows how the paper's method draws a 3-RoSy field with a singularity of index
+        +1/3 in the center. The field is split into three vector fields. At each point, V₀ takes the
+        member nearest to the guiding angle 0°, and V₁ and V₂ the members nearest to 120° and 240°.
+        Together, their LIC images I₀, I₁ and I₂ contain every streak. But all three break along the
+        line to the left of the center, where two members are equally near to the guiding angle. The
+        second set, I′₀, I′₁ and I′₂, uses the guiding angles 60°, 180° and 300°. It breaks along
+        the line to the right."""
     )
     page.picture(
         [_members(first, "I", 0), _members(second, "I′", 60)],
@@ -45,8 +46,8 @@ def write() -> None:
         "members",
     )
     page.text(
-        """The mean of either set has every streak, and streaks that break off where all of its
-        images do, as in the marked squares."""
+        """The mean of each set contains every streak. The streaks end where all images of the set
+        break, as in the marked squares."""
     )
     means = [
         Panel(_with_closeup(first, -1), "I, the mean of I₀, I₁, I₂, corrected; closeup 3 times"),
@@ -56,11 +57,11 @@ def write() -> None:
     ]
     page.picture([means], "The means of both sets, with closeups of the breaking points", "means")
     page.text(
-        """The blend takes I by the weight cos²(3θ/2) and I′ by sin²(3θ/2), θ being the angle of
-        any member: each where it does not break. A mean of three images is pale; its contrast is
-        corrected as on the page of [Figure 6](figure-06.md)."""
+        """The blend weights I by cos²(3θ/2) and I′ by sin²(3θ/2), where θ is the angle of any
+        member. So each set contributes where it does not break. The mean of three images has low
+        contrast. The page of [Figure 6](figure-06.md) explains the correction."""
     )
-    weight = blend_weights(planar_flow(angles, DEGREE), 0.0)[:, None]
+    weight = blend_weights(planar_pixel_field(angles, DEGREE), 0.0)[:, None]
     page.picture(
         [
             [
@@ -73,8 +74,8 @@ def write() -> None:
         "weights",
     )
     page.text(
-        """The result, beside brute force, which follows the best of the three members at every
-        step and so has no breaking points."""
+        """The result is shown beside brute force. Brute force follows the best of the three members
+        at every step, so it has no breaking points."""
     )
     result = [
         Panel(_contrasted(blend.tone, LARGE), "the blend, corrected"),
@@ -85,12 +86,14 @@ def write() -> None:
     page.write("Figure 5")
 
 
-def _measure(page: Page, first: Layers, second: Layers, blend: Layers, brute: Layers) -> None:
-    page.text("## Measured")
+def _measure(
+    page: Page, first: DegreeLayer, second: DegreeLayer, blend: DegreeLayer, brute: DegreeLayer
+) -> None:
+    page.text("## Measurements")
     page.text(
-        """Correlation with brute force in strips 17 pixels high along the line to the left and to
-        the right of the singularity, from 24 pixels away from it, and in the rest of the
-        picture."""
+        """The table lists the correlation with brute force in three regions: in strips 17 pixels
+        high along the line to the left and to the right of the singularity, starting 24 pixels from
+        it, and in the rest of the picture."""
     )
     place = points(WHOLE)
     shown = np.maximum(np.abs(place.real), np.abs(place.imag)) < LARGE / 2
@@ -111,12 +114,12 @@ def _measure(page: Page, first: Layers, second: Layers, blend: Layers, brute: La
     page.table(["Picture", "Left, where I breaks", "Right, where I′ breaks", "Rest"], rows)
     same = correlation(tones["I"][rest], tones["I′"][rest])
     page.text(
-        f"""I and I′ have a correlation of {same:.4f} with each other in the rest of the picture:
-        they are almost one image, which is why their blend needs no correction of its own."""
+        f"""In the rest of the picture, I and I′ have a correlation of {same:.4f} with each other.
+        They are almost the same image, so their blend needs no correction of its own."""
     )
 
 
-def _set(angles: np.ndarray, guiding_angle: float) -> Layers:
+def _set(angles: np.ndarray, guiding_angle: float) -> DegreeLayer:
     """One set of member images alone."""
     look = LOOK.with_settings({"weights": "none", "guiding_angle": guiding_angle})
     return compose_planar(angles, DEGREE, look).layers[0]
@@ -132,7 +135,7 @@ def _contrasted(values: np.ndarray, size: int) -> np.ndarray:
     return grey(0.5 + GAIN * (_shown(values, size) - 0.5))
 
 
-def _members(layers: Layers, name: str, guide: int) -> list[Panel]:
+def _members(layers: DegreeLayer, name: str, guide: int) -> list[Panel]:
     return [
         Panel(
             _contrasted(image, SMALL),
@@ -142,7 +145,7 @@ def _members(layers: Layers, name: str, guide: int) -> list[Panel]:
     ]
 
 
-def _with_closeup(layers: Layers, side: int) -> np.ndarray:
+def _with_closeup(layers: DegreeLayer, side: int) -> np.ndarray:
     """A set's mean, with a part of its breaking points, on its left or right, enlarged."""
     picture = _contrasted(layers.tone, LARGE)
     left, top = LARGE // 2 + side * 110 - CLOSEUP // 2, LARGE // 2 - CLOSEUP // 2

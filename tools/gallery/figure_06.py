@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from rosy_addon.compositor.contrast import blend_gain, expected_deviation, scale_contrast
+from rosy_addon.compositor.contrast import blend_gain, expected_std, scale_contrast
+from rosy_addon.compositor.image_noise import NOISE_MEAN
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.noise import MEAN
 
 from .looks import MEASURED
 from .page import Page
@@ -30,7 +30,7 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-06", "Contrast")
     layers = compose_field(constant(MEMBER, DEGREE), DEGREE, WHOLE, LOOK).layers[0]
-    expected = expected_deviation(LOOK)
+    expected = expected_std(LOOK)
     # Streamlines are whole in the part that is shown.
     gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
     blend = layers.images.blend
@@ -43,12 +43,13 @@ def write() -> None:
         (f"expanded {EXPANDED} times", scale_contrast(layers.tone, EXPANDED), expected * EXPANDED),
     ]
     page.text(
-        """A constant 6-RoSy field with coloured noise, half of whose cells are bright. Each pixel
-        of a member's LIC image is the mean of many samples of noise, and so nearly normally
-        distributed. Blending the three members makes their spread smaller: the picture turns grey.
-        It is known beforehand by how much, so that no image has to be analysed to set it right:
-        differences from 0.5 are multiplied by a factor. The histograms are those of the red
-        channel; the line is the normal distribution expected from theory, not a fit."""
+        """This page shows how blending reduces the contrast, and how RoSy corrects it. The field is
+        a constant 6-RoSy field. The noise is colored, and half of its cells are bright. Each pixel
+        of a member's LIC image is the mean of many noise samples, so its values are nearly normally
+        distributed. The blend of the three members has a smaller spread, so the picture gets gray.
+        The reduction is known in advance, so no image analysis is needed: differences from 0.5 are
+        multiplied by a factor. The histograms show the red channel. The line is the normal
+        distribution expected from theory, not a fit."""
     )
     images = [_cut(channel_wise) for _, channel_wise, _ in shown]
     panels = [
@@ -61,8 +62,11 @@ def write() -> None:
             "Images of a constant 6-RoSy field, each with the histogram of its red channel",
             part,
         )
-    page.text("## Measured")
-    page.text("Mean and standard deviation over the three channels, beside theory.")
+    page.text("## Measurements")
+    page.text(
+        """The table lists the mean and the standard deviation over the three channels, beside
+        the value from theory."""
+    )
     rows = []
     for (name, _, deviation), image in zip(shown, images, strict=True):
         found = float(image.std(axis=(0, 1)).mean())
@@ -77,13 +81,13 @@ def write() -> None:
         )
     page.table(["Image", "Mean", "Standard deviation", "Theory", "Difference"], rows)
     page.text(
-        f"""The paper takes the M streamlines through a pixel for independent, and multiplies by
-        √M. They cross at that pixel and share the noise around it. In white noise, which the paper
-        uses, they have enough in common for √M to be too much; here variations broader than
-        {LOOK.high_pass:.0f} pixels are taken out of the noise before, and little is left in
-        common. Below, for grey pictures of constant fields: the factor used, and the standard
-        deviation after correction over that of one member image in theory (mean of {SEEDS}
-        noises)."""
+        f"""The paper assumes that the M streamlines through a pixel are independent, and multiplies
+        by √M. But they cross at that pixel and share the noise around it. In white noise, which the
+        paper uses, they share enough to make √M too large. Here, variations broader than
+        {LOOK.high_pass:.0f} pixels are first removed from the noise, and the streamlines share
+        little. The next table is for gray pictures of constant fields. It lists the factor, and the
+        ratio of the standard deviation after correction to the theoretical one of a single member
+        image (mean of {SEEDS} noise patterns)."""
     )
     rows = []
     for degree in range(2, 8):
@@ -119,7 +123,7 @@ def _corrected(degree: int, look: Look) -> list[float]:
             0
         ]
     )
-    return [factor, float(np.mean(found)) / expected_deviation(look)]
+    return [factor, float(np.mean(found)) / expected_std(look)]
 
 
 def _cut(image: np.ndarray) -> np.ndarray:
@@ -134,7 +138,9 @@ def _histogram(red: np.ndarray, deviation: float) -> Panel:
     axes = figure.subplots()
     axes.hist(np.clip(red.ravel(), *RANGE), bins=100, range=RANGE, density=True, color="#d98880")
     value = np.linspace(*RANGE, 500)
-    normal = np.exp(-0.5 * ((value - MEAN) / deviation) ** 2) / (deviation * np.sqrt(2 * np.pi))
+    normal = np.exp(-0.5 * ((value - NOISE_MEAN) / deviation) ** 2) / (
+        deviation * np.sqrt(2 * np.pi)
+    )
     axes.plot(value, normal, color="#333333", linewidth=1)
     axes.set_xlim(*RANGE)
     axes.set_ylim(0, 11)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.compositor.picture import Layers
+from rosy_addon.compositor.picture import DegreeLayer
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import singularities
+from rosy_addon.field.singularities import find_singularities
 
 from .looks import RED, SOLID
 from .measure import correlation, local_correlation, orientation_spectrum, peaks
@@ -43,8 +43,9 @@ def write() -> None:
 
 def _write_plane(page: Page) -> None:
     page.text(
-        """A constant 4-RoSy field on a plane. Where the plane is parallel to the view its members
-        are at right angles in the picture too. The more it is tilted, the less they are."""
+        """This page shows how members look on tilted surfaces. The first field is a constant 4-RoSy
+        field on a plane. If the plane is parallel to the view, the members are at right angles in
+        the picture too. The more the plane is tilted, the more they deviate from right angles."""
     )
     surface = plane()
     member = [np.cos(MEMBER), np.sin(MEMBER), 0.0]
@@ -70,24 +71,24 @@ def _write_plane(page: Page) -> None:
         rows.append([f"{tilt}°", listed(there), listed(found)])
     page.picture([panels], "A 4-RoSy field on a plane at three tilts", "plane")
     page.text(
-        """Measured: the orientations at which the power of streaks peaks, beside those of the
-        projected members, in degrees."""
+        """The table lists the orientations of the projected members, and the peaks of the
+        orientation spectrum of the picture, in degrees."""
     )
-    page.table(["Tilt", "Projected members", "Found in the picture"], rows)
+    page.table(["Tilt", "Projected members", "Measured in the picture"], rows)
 
 
 def _write_sphere(page: Page) -> None:
     surface = sphere(64)
     field = harmonic_field(surface, 4, np.eye(3))
-    _, index = singularities(surface, field)
-    page.text("## Choosing members where they are at equal angles")
+    _, index = find_singularities(surface, field)
+    page.text("## Choosing members in the view plane")
     page.text(
-        f"""A 4-RoSy field on a sphere that forms a cube: {len(index)} singularities of index +1/4
-        at the corners. If members are chosen among their projections, as in the plane, the two
-        sets of images break at lines that come close to each other where the surface turns away,
-        and the weights do not know it: streaks break off (left). If the members are first rotated
-        into the view plane, where they are at equal angles, and rotated back once chosen, nothing
-        breaks (right)."""
+        f"""The second field is a 4-RoSy field on a sphere with the symmetry of a cube: {len(index)}
+        singularities of index +1/4 at the corners. On the left, members are chosen among their
+        projections, as in the plane. Where the surface turns away, the lines at which the two sets
+        of images break come close to each other. The weights do not account for this, and streaks
+        break. On the right, the members are first rotated into the view plane, where they are at
+        equal angles, and rotated back after the choice. No streak breaks."""
     )
     camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
     pictures = {name: compose_view(surface, field, look, camera) for name, look in WAYS.items()}
@@ -103,16 +104,17 @@ def _write_sphere(page: Page) -> None:
         Panel(outlined(shown[name], box, RED), f"members chosen {NAMES[name]}")
         for name in ("off", "on")
     ]
-    page.picture([spheres], "A sphere with the field of a cube, drawn in both ways", "sphere")
+    page.picture([spheres], "A sphere with the field of a cube, drawn with both methods", "sphere")
     closeups = [
         Panel(magnified(shown[name][top:bottom, left:right], TIMES), f"{label}, {TIMES} times")
         for name, label in NAMES.items()
     ]
     page.picture([closeups], "Closeups of the marked square, and brute force", "closeup")
     page.text(
-        """Measured: correlation with brute force, over the sphere, in the marked square, and
-        around each pixel (Gaussian window with a deviation of 3 pixels): its lowest hundredth, and
-        the part of the sphere where it is below 0.9."""
+        """The table lists the correlation with brute force over the sphere and in the marked
+        square. It also lists the local correlation around each pixel (Gaussian window with a
+        standard deviation of 3 pixels): its 1st percentile, and the part of the sphere where it is
+        below 0.9."""
     )
     covered, square = seen > 0, np.zeros(seen.shape, dtype=bool)
     square[_fine(SIZE - bottom, SIZE - top), _fine(left, right)] = True
@@ -124,11 +126,11 @@ def _write_sphere(page: Page) -> None:
         row += [float(np.nanquantile(local, 0.01)), f"{100 * np.mean(local < 0.9):.2f} %"]
         rows.append(row)
     page.table(
-        ["Members chosen", "Whole sphere", "Marked square", "Lowest hundredth", "Below 0.9"], rows
+        ["Members chosen", "Whole sphere", "Marked square", "1st percentile", "Below 0.9"], rows
     )
 
 
-def _frame(layers: Layers, channel: int | None) -> np.ndarray:
+def _frame(layers: DegreeLayer, channel: int | None) -> np.ndarray:
     """(H, W) one channel of the uncorrected blend, or 1 where there is any."""
     values = 1.0 if channel is None else layers.images.blend[:, channel]
     return frame_of(values, layers.pixel, (SIZE * SOLID.supersampling,) * 2)

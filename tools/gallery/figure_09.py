@@ -35,10 +35,11 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-09", "Magnitude")
     page.text(
-        """A 4-RoSy field with five singularities, at which its magnitude falls to zero. With
-        nothing driven by it (a), the magnitude cannot be seen; it can be mapped to colour (b), to
-        the length of the streaks (c), or to both (d). Where streaks are short their contrast is
-        lowered, or the mean of a few samples would glare."""
+        """This page shows how RoSy can display the magnitude of a field. The field is a 4-RoSy
+        field with five singularities, where its magnitude is zero. In (a), the magnitude is not
+        shown. It can be mapped to color (b), to the length of the streaks (c), or to both (d).
+        Short streaks are means of few samples and would have too much contrast, so their contrast
+        is reduced."""
     )
     names = {
         "none": "(a) magnitude not shown",
@@ -56,14 +57,15 @@ def write() -> None:
 
 
 def _measure(page: Page) -> None:
-    page.text("## Measured")
+    page.text("## Measurements")
     z = field(points(SIZE))
     rho = np.abs(z) / np.abs(z).max()
     page.text(
-        """Colour: rank correlation of the magnitude with the luminance of the picture, averaged
-        over squares of 10 pixels so that streaks do not count. Length: how many pixels ahead along
-        a member the image of that member has a correlation of one half with itself; near zeros it
-        is shorter even for streaks of full length, since they bend."""
+        """The column for luminance lists the rank correlation of the magnitude with the luminance
+        of the picture, averaged over squares of 10 pixels so that single streaks have no effect.
+        The half-length is the distance along a member at which the image of that member has an
+        autocorrelation of one half, by ranges of the magnitude ρ. Near zeros of the field it is
+        shorter even for streaks of full length, because they bend."""
     )
     cells = (SIZE // 10, 10, SIZE // 10, 10)
     luminance = {}

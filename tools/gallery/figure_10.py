@@ -17,24 +17,25 @@ SIZE, MEMBER, SIDE, SEEDS, BINS = 400, np.radians(12), 64, 2, 60
 
 def write() -> None:
     """Draw and write the page."""
-    page = Page("figure-10", "More directions than can be read")
+    page = Page("figure-10", "Many directions are hard to read")
     page.text(
-        """RoSy fields of degree 5 and 7 around a singularity of index +1/N. All N directions are
-        there, but each of the M images has only the M-th part of the variance of the blend, and an
-        odd N needs N images where an even one needs half as many: the pattern gets hard to make
-        out."""
+        """This page shows how many directions can be read. The fields have degree 5 and 7, with a
+        singularity of index +1/N. All N directions are drawn, but each of the M images contributes
+        only 1/M of the variance of the blend. An odd N needs N images, an even N only half as many.
+        So the pattern gets hard to read."""
     )
     panels = [
         Panel(draw_field(singularity(1), degree, SIZE, PLANE), f"({letter}) N = {degree}")
         for degree, letter in ((5, "a"), (7, "b"))
     ]
     page.picture([panels], "A 5-RoSy and a 7-RoSy field around a singularity")
-    page.text("## Measured")
+    page.text("## Measurements")
     page.text(
-        f"""Constant fields of each degree, drawn with the same settings: the power of streaks by
-        their orientation, in windows of {SIDE} pixels, over the mean of all orientations.
-        Legibility is the power at the directions of the members over that midway between them. A
-        streak has no head: N = 1 and 2 look the same, and so do 3 and 6."""
+        f"""The measurements use constant fields of each degree, drawn with the same settings. The
+        charts show the power of the streaks by orientation, in windows of {SIDE} pixels, divided by
+        the mean over all orientations. Legibility is the power at the directions of the members
+        divided by the power midway between them. A streak has no arrowhead, so N = 1 and 2 look the
+        same, and so do 3 and 6."""
     )
     spectra = {degree: _spectrum(degree) for degree in range(1, 8)}
     page.picture(

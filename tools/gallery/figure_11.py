@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rosy_addon.compositor.contrast import expected_deviation
+from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
 from rosy_addon.field.generate import curvature_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import euler_characteristic, singularities
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera
 
@@ -37,11 +37,12 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-11", "Surfaces")
     page.text(
-        """4-RoSy fields along the principal curvatures of Suzanne (a, b) and of a triple torus (c,
-        d), in grey and in coloured noise, which makes a plaid; a trefoil knot with the confidence
-        of its curvature as colour (e); and 6-RoSy fields on a sphere, singular at the twelve
-        vertices of an icosahedron (f), and on a torus, singular nowhere (g, h). The light comes
-        from the eye. All of the meshes are made by Blender or by this page's own script."""
+        """This page shows fields on surfaces. (a) to (d) are 4-RoSy fields along the principal
+        curvatures of Suzanne and of a triple torus, with gray noise and with colored noise, which
+        gives a plaid. (e) is a trefoil knot with the confidence of its curvature as color. (f) is a
+        6-RoSy field on a sphere with singularities at the twelve vertices of an icosahedron. (g)
+        and (h) are a 6-RoSy field on a torus without singularities. The light comes from the eye.
+        Blender and the script of this page generate all meshes."""
     )
     monkey, rings, ring, ball, trefoil = suzanne(), triple_torus(), torus(), sphere(64), knot()
     fields = {
@@ -78,10 +79,10 @@ def write() -> None:
     )
     for number, about in enumerate(abouts):
         page.picture([panels[2 * number : 2 * number + 2]], about, "abcd"[number])
-    page.text("## Measured")
+    page.text("## Measurements")
     page.text(
-        """Singularities, with their indices in units of 1/N. By the theorem of Poincaré and Hopf
-        the indices sum to N times the Euler characteristic."""
+        """The first table lists the singularities with their indices in units of 1/N. By the
+        Poincaré-Hopf theorem, the indices sum to N times the Euler characteristic."""
     )
     page.table(
         [
@@ -95,9 +96,10 @@ def write() -> None:
         [_census(name, surface, field) for name, (surface, field) in fields.items()],
     )
     page.text(
-        """The pixels' standard deviation after correction, over all that is seen, beside that
-        expected of one member image with whole streamlines times the gain; drawn at twice the
-        size, before light and averaging."""
+        """The second table lists the mean and the standard deviation of all visible pixels after
+        correction. Theory is the standard deviation of a single member image with full-length
+        streamlines, times the gain. The pictures are drawn at twice the size and measured before
+        light and averaging."""
     )
     page.table(["Picture", "Mean", "Standard deviation", "Theory"], rows)
     page.write("Figure 11")
@@ -112,14 +114,14 @@ def _marked(
     shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, finer: int
 ) -> np.ndarray:
     """A picture of the unit sphere with dots at the singularities."""
-    at = surface.vertices[singularities(surface, field)[0]]
+    at = surface.vertices[find_singularities(surface, field)[0]]
     for x, y in seen_points(at, at, camera, finer):
         shown = dotted(shown, x, y, RED)
     return shown
 
 
 def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
-    _, index = singularities(surface, field)
+    _, index = find_singularities(surface, field)
     kinds, counts = np.unique(index, return_counts=True)
     shown = ", ".join(
         f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)
@@ -130,5 +132,5 @@ def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
 
 def _spread(picture: Picture, look: Look) -> list[object]:
     tone = picture.layers[0].tone
-    theory = look.gain * expected_deviation(enlarged(look, look.supersampling))
+    theory = look.gain * expected_std(enlarged(look, look.supersampling))
     return [float(tone.mean()), float(tone.std()), theory]

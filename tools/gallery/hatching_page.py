@@ -8,17 +8,17 @@ import numpy as np
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.presets import load_preset
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field, curvature_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.surface import Surface
+from rosy_addon.presets.store import load_preset
+from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import look_at, perspective_camera
-from rosy_addon.projection.gbuffer import Body
-from rosy_addon.projection.occlusion import ambient_occlusion
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.projection.tone import SurfaceTone
+from rosy_addon.projection.surface_tone import SurfaceTone
 
 from .figure_11 import smoothed_a_little
 from .looks_page import IMAGES
@@ -95,7 +95,7 @@ def write() -> None:
     save(sheet(_units(monkey, field)), IMAGES / "hatching-units.png")
 
 
-def _on_a_table(monkey: Surface, field: RosyField) -> list[Body]:
+def _on_a_table(monkey: Surface, field: RosyField) -> list[MeshInstance]:
     """Suzanne and a ball."""
     ball, table = sphere(), plane(24)
     fields = field, smoothest_field(ball, 4), axis_field(table, 4, (1.0, 0.25, 0.0))
@@ -103,19 +103,21 @@ def _on_a_table(monkey: Surface, field: RosyField) -> list[Body]:
         (monkey, ball, table),
         (_at(0, 0, 0.985), _at(1.55, -0.75, 0.5, 0.5), _at(0, 0, 0, 7.0)),
     )
-    return [Body(*entry) for entry in zip(surfaces, places, fields, strict=True)]
+    return [MeshInstance(*entry) for entry in zip(surfaces, places, fields, strict=True)]
 
 
-def _ends(bodies: list[Body]) -> list[Panel]:
+def _ends(instances: list[MeshInstance]) -> list[Panel]:
     """Lines that end with a shadow, and those that run on."""
     look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
     return [
-        _tone_panel(bodies, replace(look, overshoot=length), f"overshoot {length:g}")
+        _tone_panel(instances, replace(look, overshoot=length), f"overshoot {length:g}")
         for length in (0.0, 14.0)
     ]
 
 
-def _outlines(bodies: list[Body], monkey: Surface, field: RosyField) -> list[list[Panel]]:
+def _outlines(
+    instances: list[MeshInstance], monkey: Surface, field: RosyField
+) -> list[list[Panel]]:
     """Without and with lines along silhouettes, and in other inks."""
     look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
     others = {
@@ -124,7 +126,7 @@ def _outlines(bodies: list[Body], monkey: Surface, field: RosyField) -> list[lis
     }
     return [
         [
-            _tone_panel(bodies, replace(look, outline=width), f"outline {width:g}")
+            _tone_panel(instances, replace(look, outline=width), f"outline {width:g}")
             for width in (0.0, 1.6)
         ],
         [
@@ -147,19 +149,19 @@ def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
             side = THIRD * look.supersampling
             place = look_at((-0.35 * away, -0.9 * away, 0.25 * away), (0, 0, 0))
             camera = perspective_camera(place, side, side, fov=np.radians(24))
-            shown = compose(project([Body(monkey, np.eye(4), field)], camera), look)
+            shown = compose(project([MeshInstance(monkey, np.eye(4), field)], camera), look)
             row.append(Panel(display(shown.rgba), f"unit: {unit}"))
         rows.append(row)
     return rows
 
 
-def _tones(bare: list[Body]) -> list[list[Panel]]:
+def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
     """One thing after another that tones come from."""
     hidden = [
-        replace(body, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]), carried={})
-        for number, body in enumerate(bare)
+        replace(instance, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]))
+        for number, instance in enumerate(bare)
     ]
-    mapped = [replace(body, tone=_banded(body.surface), carried={}) for body in bare]
+    mapped = [replace(instance, tone=_banded(instance.surface)) for instance in bare]
     mapped[2] = bare[2]
     look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
     return [
@@ -178,14 +180,14 @@ def _tones(bare: list[Body]) -> list[list[Panel]]:
     ]
 
 
-def _tone_panel(bodies: list[Body], look: Look, label: str) -> Panel:
+def _tone_panel(instances: list[MeshInstance], look: Look, label: str) -> Panel:
     side = look.supersampling * SIDE
     camera = perspective_camera(
         look_at((1.9, -6.0, 3.3), (0.45, -0.2, 0.75)), side, side, fov=np.radians(29)
     )
     toward = np.array([-0.55, -0.5, 0.75])
     sun = Light("sun", camera.view[:3, :3] @ (toward / np.linalg.norm(toward)), np.ones(3), 1.25)
-    return Panel(display(compose(project(bodies, camera), look, [sun]).rgba), label)
+    return Panel(display(compose(project(instances, camera), look, [sun]).rgba), label)
 
 
 def _banded(surface: Surface) -> SurfaceTone:

@@ -1,15 +1,15 @@
-"""The page of looks: every setting from its own metadata, and what the main ones do."""
+"""The page of looks: a table of all settings, and pictures of the main ones."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.presets import load_preset, preset_names
 from rosy_addon.field.generate import curvature_field
+from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
 
 from .figure_11 import smoothed_a_little
 from .page import ROOT
@@ -25,40 +25,45 @@ IMAGES = ROOT / "docs" / "images"
 SHOWN = {
     "length": (
         (10, 40, 160),
-        "Longer streaks show where directions lead, and want more gain; short ones show turns.",
+        "Long streaks show where the directions lead, and need more gain. Short streaks show how "
+        "the field turns.",
     ),
-    "grain": ((1.0, 1.5, 4.0), "Broader streaks read from further away and hide small detail."),
+    "grain": ((1.0, 1.5, 4.0), "Broad streaks are legible from a distance and hide small details."),
     "density": (
         (0.02, 0.1, 0.5),
-        "Few bright cells leave single streaks; half of them are a weave.",
+        "With few bright cells, the streaks are separate. With half of the cells bright, they form "
+        "a weave.",
     ),
-    "high_pass": (
-        (0.0, 16.0, 4.0),
-        "Without it crossing streaks gather into clouds; 0 is the paper's.",
+    "high_pass": ((0.0, 16.0, 4.0), "Without it, crossing streaks form clouds. The paper uses 0."),
+    "gain": (
+        (1.0, 2.5, 6.0),
+        "1 gives the contrast of a single direction. Higher values look like ink.",
     ),
-    "gain": ((1.0, 2.5, 6.0), "1 is the contrast of one direction alone; more comes near ink."),
 }
 SIDE = 256
 
 #: What is said of a user's own presets, a paragraph each.
 OWN = (
-    "![The presets in the panel, each with its picture and its sentence](images/presets.png)",
-    "In the panel's *Look* section, the picture opens all presets; a choice can be undone. The "
-    "line below says which one the look was taken from, and whether it was changed since. **+** "
-    "keeps the look of the scene as a preset of your own, with a name, a sentence, and a picture "
-    "that RoSy draws; the menu beside it renames and deletes your own, and imports and exports. "
-    "None is replaced or deleted unless you say so, and those that come with RoSy stay as they are.",
-    "They are in the extension's folder among Blender's user files, which stays when RoSy is "
-    "updated; `blender -b --command rosy presets` lists all with their sentences and says where "
-    "yours are. Plain Python, which knows no Blender, keeps its own with the user's data: "
-    "`python -m rosy_addon presets` says where, and the environment variable `ROSY_PRESETS` "
-    "names one folder for both.",
-    "`--preset` takes what `presets` lists, a name as it is in the panel, or the path of a file.",
-    "A preset is a small `.json` file that can be read, mailed and pasted: a `name` (a line of at "
-    "most 48 characters), a `description` (200) and a `look` of the settings that differ from the "
-    "default. There is no picture in it, since every RoSy draws the same one from the look. It is "
-    "data, and a stranger's is safe to import: at most 64 KiB, nothing but these entries, and a "
-    "setting or a value that does not exist is refused in one line that names it.",
+    "![The presets in the panel, each with its picture and its description](images/presets.png)",
+    "To choose a preset, click the picture in the panel's *Look* section. You can undo the choice. "
+    "The line below the picture shows the name of the preset, and whether the look has changed "
+    "since. **+** saves the look of the scene as your own preset, with a name, a description, and "
+    "a picture that RoSy draws. The menu beside it renames, deletes, imports and exports your "
+    "presets. RoSy never replaces or deletes a preset unless you confirm. The presets that come "
+    "with RoSy do not change.",
+    "Your presets are in the extension's folder among Blender's user files. An update of RoSy "
+    "keeps this folder. `blender -b --command rosy presets` lists all presets with their "
+    "descriptions and prints the folder. Plain Python, without Blender, keeps its presets in the "
+    "user's data folder; `python -m rosy_addon presets` prints it. The environment variable "
+    "`ROSY_PRESETS` sets one folder for both.",
+    "`--preset` takes a name from the output of `presets`, a name as shown in the panel, or the "
+    "path of a file.",
+    "A preset is a small, readable `.json` file with three entries: a `name` (one line of at most "
+    "48 characters), a `description` (at most 200 characters), and a `look` with the settings that "
+    "differ from the default. It contains no picture, because RoSy draws the picture from the "
+    "look. A preset is only data, so you can safely import one from other people. A file has at "
+    "most 64 KiB and no other entries. If a setting or a value does not exist, the error message "
+    "names it.",
     """```json
 {
   "name": "Wet ink",
@@ -70,9 +75,10 @@ OWN = (
   }
 }
 ```""",
-    "The buttons are operators, `preset_apply`, `preset_save`, `preset_rename`, `preset_remove`, "
-    "`preset_import` and `preset_export`, over functions of `rosy_addon.compositor.presets`: "
-    "`load_preset`, `save_preset`, `rename_preset`, `remove_preset`, `read_preset`, `write_preset`.",
+    "The buttons are operators: `preset_apply`, `preset_save`, `preset_rename`, `preset_remove`, "
+    "`preset_import` and `preset_export`. They call functions of the module "
+    "`rosy_addon.presets.store`: `load_preset`, `save_preset`, `rename_preset`, `remove_preset`, "
+    "`read_preset` and `write_preset`.",
 )
 
 
@@ -80,13 +86,14 @@ def write() -> None:
     """Draw and write the page."""
     pieces = [
         "# Looks",
-        "A *look* is everything that can be chosen about a picture. In Blender it is in the panel's "
-        "*Look* section, on the command line `--preset NAME` and `--set NAME=VALUE`, in a script a "
-        "`Look` from `rosy_addon.compositor.look`. Lengths are in pixels of the finished picture. "
-        "This page is written, and its pictures are drawn, by `make gallery`.",
+        "With a *look* you choose how a field is drawn. A look is the set of all settings of a "
+        "picture. In Blender, it is the *Look* section of the panel. On the command line, use "
+        "`--preset NAME` and `--set NAME=VALUE`. In a script, use a `Look` from "
+        "`rosy_addon.compositor.look`. Lengths are in pixels of the finished picture. `make "
+        "gallery` writes this page and draws its pictures.",
         "## Presets",
         _presets(),
-        "## Presets of your own",
+        "## Your own presets",
         *OWN,
         "## What the main settings do",
         *(_setting(name, values, text) for name, (values, text) in SHOWN.items()),
@@ -101,7 +108,7 @@ def _presets() -> str:
     monkey = suzanne()
     curved = curvature_field(monkey, 4)
     even = smoothed_a_little(monkey, curved)
-    presets = [load_preset(name) for name in preset_names()]
+    presets = [load_preset(name) for name in preset_keys()]
     panels = []
     for preset in presets:
         look = preset.look.with_settings({"supersampling": 2})
@@ -135,23 +142,25 @@ def _setting(name: str, values: tuple[Any, ...], text: str) -> str:
 
 def _table() -> str:
     lines = ["| setting | default | values | what it does |", "| --- | --- | --- | --- |"]
-    for entry in fields(Look):
-        rules, default = entry.metadata, entry.default
-        text = rules["text"]
-        if "options" in rules:
-            values = "<br>".join(
-                f"`{option}`: {about}" for option, about in rules["options"].items()
-            )
-        elif "colour" in rules:
-            values = "a colour, `#rrggbb`"
-        elif isinstance(default, bool):
-            values = "`true`, `false`"
-        else:
-            values = f"{rules['low']:g} to {rules['high']:g}"
-            values += " radians" if rules.get("unit") == "angle" else ""
-        shown = str(default).lower() if isinstance(default, bool) else default
-        lines.append(f"| `{entry.name}` | `{shown}` | {values} | {text} |")
+    for name, setting in settings_of(Look).items():
+        default = setting.default
+        if isinstance(setting, Switch):
+            default = str(default).lower()
+        lines.append(f"| `{name}` | `{default}` | {_values(setting)} | {setting.text} |")
     return "\n".join(lines)
+
+
+def _values(setting: Setting) -> str:
+    """Return the allowed values of a setting, as Markdown."""
+    match setting:
+        case Choice(options=options):
+            return "<br>".join(f"`{option}`: {text}" for option, text in options.items())
+        case Color():
+            return "a color, `#rrggbb`"
+        case Number(low=low, high=high, unit=unit):
+            return f"{low:g} to {high:g}{' radians' if unit == 'angle' else ''}"
+        case _:
+            return "`true`, `false`"
 
 
 def _listed(values: tuple[Any, ...]) -> str:

@@ -6,8 +6,8 @@ import numpy as np
 from PIL import Image
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.presets import picture_path, preset_files, read_preset
-from rosy_addon.compositor.preview import draw_preview
+from rosy_addon.presets.preview import draw_preview
+from rosy_addon.presets.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
@@ -19,7 +19,7 @@ COLOURS, TONE = 64, 8
 def write() -> None:
     """Draw them all."""
     for path in preset_files().values():
-        _small(read_preset(path).look).save(picture_path(path), optimize=True)
+        _small(read_preset(path).look).save(preview_path(path), optimize=True)
 
 
 def _small(look: Look) -> Image.Image:

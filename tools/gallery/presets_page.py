@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image
 
-from rosy_addon.cli import UP, UPRIGHT
-from rosy_addon.compositor.colour import from_hex, to_linear
+from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.presets import Preset, load_preset, preset_names
-from rosy_addon.field.generate import Recipe, generate
-from rosy_addon.field.meshfile import read_mesh
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import Surface
+from rosy_addon.presets.store import Preset, load_preset, preset_keys
 from rosy_addon.projection.camera import orbit_camera
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.render.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .looks_page import IMAGES
 from .page import ROOT
@@ -49,7 +49,7 @@ class Model:
     Attributes
     ----------
     name : str
-    body : Body
+    instance : Body
         With the field that presets of ink show.
     raw : Body
         With the magnitudes that curvature gives.
@@ -58,8 +58,8 @@ class Model:
     """
 
     name: str
-    body: Body
-    raw: Body
+    instance: MeshInstance
+    raw: MeshInstance
     view: tuple[float, float]
 
 
@@ -85,18 +85,20 @@ def write() -> None:
     models = _models()
     pieces = [
         "# Presets",
-        "Every look that comes with RoSy, on Suzanne (three times subdivided), on [Spot](https://www."
-        "cs.cmu.edu/~kmcrane/Projects/ModelRepository/) and on the Stanford bunny: the same field, "
-        f"curvature with a reach of {REACH:g}, and the lamp that the preset brings. The two lines "
-        "below each picture go from a selected mesh in a new scene to it, in Blender's Python console "
-        "or a script; in the panel they are *Make Field*, *Look > Presets* and *Bake*. The view "
-        "transform *Standard* shows ink and paper as they were drawn. With a mesh file and no Blender:",
+        "Here you can compare all presets that come with RoSy, on Suzanne (subdivided three "
+        "times), on [Spot](https://www.cs.cmu.edu/~kmcrane/Projects/ModelRepository/) and on the "
+        f"Stanford bunny. All pictures use a curvature field with a reach of {REACH:g} and the "
+        "light of the preset, unless the lines below the picture say otherwise. These two lines "
+        "make the picture from a selected mesh in a new scene. Use them in Blender's Python "
+        "console or in a script. In the panel, use *Make Field*, *Look* and *Bake*. The view "
+        "transform *Standard* shows ink and paper as they were drawn.",
+        "With a mesh file and without Blender:",
         "    python -m rosy_addon render bunny.obj -o bunny.png --generate curvature --reach "
         f"{REACH:g} --preset engraving --size 1600x1200",
-        "Lengths are in pixels of the finished picture: pictures of twice the size show twice as "
+        "Lengths are in pixels of the finished picture. A picture of twice the size shows twice as "
         "many lines, not broader ones. `python -m tools.gallery presets-page` draws this page.",
     ]
-    for name in preset_names():
+    for name in preset_keys():
         pieces.append(_section(name, load_preset(name), models))
     PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
 
@@ -105,13 +107,19 @@ def _models() -> dict[str, Model]:
     models = {"Suzanne": _model("Suzanne", suzanne(), np.eye(4), (-26.0, 8.0))}
     for name, (file, view) in FILES.items():
         path = MESHES / file
-        models[name] = _model(name, read_mesh(path), UPRIGHT[UP[path.suffix]], view)
+        models[name] = _model(
+            name, read_mesh(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]], view
+        )
     return models
 
 
 def _model(name: str, surface: Surface, matrix: np.ndarray, view: tuple[float, float]) -> Model:
     smooth, raw = (
-        Body(surface, matrix, generate(surface, Recipe("curvature", reach=reach), 4))
+        MeshInstance(
+            surface,
+            matrix,
+            generate(surface, GeneratorSettings("curvature", smoothing_length=reach), 4),
+        )
         for reach in (REACH, 0.0)
     )
     return Model(name, smooth, raw, view)
@@ -143,11 +151,11 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
 
 def _drawn(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
     """(H, W, 3) uint8 of a model on the paper of a look."""
-    body = model.body if look.magnitude == "none" else model.raw
-    points = body.surface.vertices @ body.matrix[:3, :3].T + body.matrix[:3, 3]
+    instance = model.instance if look.magnitude == "none" else model.raw
+    points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
     camera = orbit_camera(points, *model.view, width, height, margin=MARGIN)
-    rgba = compose(project([body], camera, look.display), look).rgba
+    rgba = compose(project([instance], camera, look.display), look).rgba
     return display(on_paper(rgba, look))
 
 

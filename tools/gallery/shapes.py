@@ -83,7 +83,7 @@ def triple_torus(cells: int = 110) -> Surface:
         np.add.at(middle, ends[:, 0], vertices[ends[:, 1]])
         vertices = _onto_level(0.5 * vertices + 0.5 * middle / count)
     surface = _polygons("triple torus", vertices, faces)
-    outward = np.sum(surface.face_normal * _gradient(surface.face_centre)) > 0
+    outward = np.sum(surface.face_normal * _gradient(surface.face_center)) > 0
     return surface if outward else _polygons("triple torus", vertices, faces[:, ::-1])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
-from rosy_addon.compositor.colour import to_display
+from rosy_addon.color import to_display
 
 #: The widest sheet that is shown unscaled beside the text of a page.
 WIDEST = 820

@@ -9,8 +9,8 @@ import numpy as np
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
-from rosy_addon.field.corners import corner_angles, corner_rotations, smooth_faces
-from rosy_addon.field.frames import unit
+from rosy_addon.field.corner_fans import corner_angles, corner_rotations, smooth_face_values
+from rosy_addon.field.frames import normalize
 from rosy_addon.field.representation import (
     face_frames,
     face_representation,
@@ -20,7 +20,7 @@ from rosy_addon.field.representation import (
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera, orbit_camera
-from rosy_addon.projection.gbuffer import Body
+from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
 
@@ -39,14 +39,14 @@ def icosahedron_axes() -> np.ndarray:
     """(6, 3) unit directions to the vertices of an icosahedron, one of each opposite pair."""
     golden = (1 + np.sqrt(5)) / 2
     axes = [np.roll([0, sign, golden], turn) for turn in range(3) for sign in (1, -1)]
-    return unit(np.array(axes, dtype=np.float64))
+    return normalize(np.array(axes, dtype=np.float64))
 
 
 def around_field(surface: Surface, degree: int) -> RosyField:
     """One member around the z axis."""
-    ahead = np.cross([0.0, 0.0, 1.0], surface.face_centre)
+    ahead = np.cross([0.0, 0.0, 1.0], surface.face_center)
     ahead -= np.sum(ahead * surface.face_normal, axis=1)[:, None] * surface.face_normal
-    return RosyField(degree, unit(ahead))
+    return RosyField(degree, normalize(ahead))
 
 
 def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
@@ -58,7 +58,7 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
     turn = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
     weights, z = corner_angles(surface), face_representation(surface, field)
     for _ in range(rounds):
-        z = smooth_faces(surface, z, turn, field.degree, weights)
+        z = smooth_face_values(surface, z, turn, field.degree, weights)
         z /= np.maximum(np.abs(z), 1e-12)
     return RosyField(field.degree, from_representation(z, x, y, field.degree))
 
@@ -77,7 +77,7 @@ def view(
 
 def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:
     """What a camera sees of a field; the camera is as fine as the look's supersampling."""
-    return compose(project([Body(surface, np.eye(4), field)], camera, look.display), look)
+    return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
 def seen_points(

@@ -6,12 +6,13 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from rosy_addon.compositor.shading import lights_of
-from rosy_addon.field.generate import Recipe, generate
+from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.projection.camera import Camera, orbit_camera
-from rosy_addon.projection.gbuffer import Body
-from rosy_addon.strokes.draw import Manner, draw
-from rosy_addon.strokes.seen import on_screen
-from rosy_addon.strokes.strokes import Strokes
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.pipeline import draw_bodies
+from rosy_addon.strokes.stroke_set import Strokes
+from rosy_addon.strokes.style import StrokeStyle
+from rosy_addon.strokes.visibility import project_to_pixels
 
 from .looks_page import IMAGES
 from .shapes import suzanne
@@ -25,26 +26,30 @@ WIDTH = 1.3
 
 #: What is shown, by labels: how Suzanne is drawn.
 DRAWN = {
-    "evenly spaced, with an outline": Manner(spacing=6, outline=True),
-    "by tone, of a lamp": Manner(spacing=4, outline=True, tone=True, light="lamp"),
+    "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
+    "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, tone=True, light="lamp"),
 }
 
 
 def write() -> None:
     """Draw them."""
     surface = suzanne()
-    body = Body(surface, np.eye(4), generate(surface, Recipe("curvature", reach=0.1), 4))
+    instance = MeshInstance(
+        surface,
+        np.eye(4),
+        generate(surface, GeneratorSettings("curvature", smoothing_length=0.1), 4),
+    )
     camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
     panels = []
     for label, manner in DRAWN.items():
-        strokes = draw([body], camera, manner, lights=lights_of(manner, ())).strokes
+        strokes = draw_bodies([instance], camera, manner, lights=lights_of(manner, ())).strokes
         panels.append(Panel(rastered(strokes, camera), label))
     save(sheet([panels]), IMAGES / "strokes.png")
 
 
 def rastered(strokes: Strokes, camera: Camera) -> np.ndarray:
     """(H, W, 3) uint8 from the top: black strokes on white paper, as round pens draw them."""
-    pixels, _ = on_screen(strokes.points, camera)
+    pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     pixels *= FINE
     paper = Image.new("L", (camera.width * FINE, camera.height * FINE), 255)

@@ -6,8 +6,10 @@ import numpy as np
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
-from rosy_addon.projection.gbuffer import Body
-from rosy_addon.turntable import pictures, write_film
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.turntable import turntable_task, turntable_views
 
 from .page import ROOT
 from .shapes import suzanne
@@ -18,6 +20,7 @@ LOOK = Look(length=40, gain=2.8, supersampling=2)
 def write() -> None:
     """Suzanne from all around."""
     monkey = suzanne()
-    body = Body(monkey, np.eye(4), generate(monkey, "smoothest", 4))
-    frames = pictures(body, LOOK, 24, (240, 240), (-26.0, 10.0))
-    write_film(ROOT / "docs" / "images" / "turntable.gif", frames, 10)
+    instance = MeshInstance(monkey, np.eye(4), generate(monkey, "smoothest", 4))
+    views = turntable_views(instance, LOOK, 24, (240, 240), (-26.0, 10.0))
+    path = ROOT / "docs" / "images" / "turntable.gif"
+    run_to_completion(turntable_task(CpuRenderer(), views, 24, path, 10))

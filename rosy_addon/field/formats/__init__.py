@@ -1,1 +1,1 @@
-"""The mesh formats, one module each: every one returns vertices and polygons as flat arrays."""
+"""Readers and writers of mesh and field files, one module for each format."""

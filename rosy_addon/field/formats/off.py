@@ -1,4 +1,7 @@
-"""Object File Format, .off, with the colours, normals and texture coordinates of its variants left out."""
+"""Read Object File Format (.off) text files: vertices and faces.
+
+The colors, normals and texture coordinates of the variants are ignored.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,22 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError
-from .polygons import Polygons, starts_of
-from .rows import Rows, read_rows, shown
+from .polygons import Polygons, offsets_from_sizes
+from .text_rows import TextRows, abbreviate, read_rows
 
 _KEYWORD = re.compile(rb"(ST)?C?N?OFF$", re.IGNORECASE)
 
 
 def read_off(path: Path) -> Polygons:
-    """Read an .off file: text, counts on the line of the keyword or after it, comments anywhere."""
+    """Read a text .off file.
+
+    The counts may be on the line of the keyword or on the next one. Comments may be anywhere.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is binary, malformed or truncated, or an index is out of range.
+    """
     rows = _after_keyword(read_rows(path))
     if not len(rows):
         raise RosyError(f"{path}: ends before the counts of vertices and faces")
@@ -33,38 +44,39 @@ def read_off(path: Path) -> Polygons:
     return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))
 
 
-def _after_keyword(rows: Rows) -> Rows:
-    """The rows from the counts on. The keyword may be missing, and the counts may follow it."""
+def _after_keyword(rows: TextRows) -> TextRows:
+    """The rows from the counts on. The keyword is optional; the counts may share its line."""
     if not len(rows) or rows.words[0][0].isdigit():
         return rows
     keyword, *rest = rows.words[0]
     if not _KEYWORD.match(keyword):
-        raise rows.error(0, f"found {shown(keyword)}, wanted OFF")
+        raise rows.error(0, f"found {abbreviate(keyword)}, wanted OFF")
     if rest and rest[0].upper() == b"BINARY":
         raise rows.error(0, "binary .off files are not read")
-    return Rows(rows.path, [rest, *rows.words[1:]], rows.line) if rest else rows[1:]
+    return TextRows(rows.path, [rest, *rows.words[1:]], rows.line_numbers) if rest else rows[1:]
 
 
-def _faces(rows: Rows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    sizes = Rows(rows.path, [words[:1] for words in rows.words], rows.line).ints(
+def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
+    sizes = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers).ints(
         "corners of a face"
     )
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if not 3 <= size < len(words):
-            found = f"{size} corners" if size < 3 else f"{len(words) - 1} of its {size} corners"
-            raise rows.error(row, f"face {row} has {found}, at least 3 and all are wanted")
-    corners = Rows(
+            message = f"{size} corners" if size < 3 else f"{len(words) - 1} of its {size} corners"
+            raise rows.error(row, f"face {row} has {message}, at least 3 and all are wanted")
+    corners = TextRows(
         rows.path,
         [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
-        rows.line,
+        rows.line_numbers,
     )
     corner_vertex = corners.ints("vertex of a face")
-    wrong = (corner_vertex < 0) | (corner_vertex >= vertex_count)
-    if wrong.any():
-        corner = int(np.argmax(wrong))
+    out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
+    if out_of_range.any():
+        corner = int(np.argmax(out_of_range))
         raise rows.error(
             corners.row_of_word(corner),
             f"a face refers to vertex {corner_vertex[corner]}, there are {vertex_count}, "
             "counted from 0",
         )
-    return corner_vertex, starts_of(sizes)
+    return corner_vertex, offsets_from_sizes(sizes)

@@ -1,4 +1,7 @@
-"""Plain numbers: text, and numpy's `.npy`, of one member, all directions or a tensor a row."""
+"""Read and write fields as plain tables of numbers: text and `.npy` files.
+
+A row holds one member vector (3 numbers), all N directions (3 N) or a symmetric tensor (9).
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,26 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError
-from ...files import read_bytes
+from ...file_io import read_bytes
 from ..rosy_field import MAX_DEGREE
-from .given import Given
-from .rows import lines, read_rows
+from .raw_field import RawField
+from .text_rows import format_rows, read_rows
 
-#: How far, of its largest entry, a matrix may be from its transpose and be called symmetric.
-SYMMETRIC = 1e-5
+#: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
+SYMMETRY_TOLERANCE = 1e-5
 
 
-def read_text(path: Path) -> Given:
-    """Rows of 3, 3 N or 9 numbers, with commas or white space between; # begins a comment."""
-    data = read_bytes(path, text=True).replace(b",", b" ")
+def read_text(path: Path) -> RawField:
+    """Read a text file with rows of 3, 3 N or 9 numbers.
+
+    Numbers are separated by commas or white space. ``#`` starts a comment.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, holds no numbers, or its rows differ in length.
+    """
+    data = read_bytes(path, reject_binary=True).replace(b",", b" ")
     rows = read_rows(path, data=data)
     if not len(rows):
         raise RosyError(f"{path}: holds no numbers")
@@ -28,15 +39,21 @@ def read_text(path: Path) -> Given:
     for row, words in enumerate(rows.words):
         if len(words) != columns:
             raise rows.error(row, f"has {len(words)} numbers, the rows above have {columns}")
-    return _given(rows.floats("part of a vector").reshape(-1, columns))
+    return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
 
 
-def read_npy(path: Path) -> Given:
-    """An array (n, 3), (n, 3 N), (n, N, 3) or, of symmetric tensors, (n, 3, 3)."""
+def read_npy(path: Path) -> RawField:
+    """Read an `.npy` array of shape (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, or is not a real array of such a shape.
+    """
     data = read_bytes(path)
     try:
         values = np.load(io.BytesIO(data), allow_pickle=False)
-    except Exception as reason:  # its header is read as Python, and may fail in any way
+    except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         what = str(reason).splitlines() or [type(reason).__name__]
         raise RosyError(f"{path}: is no .npy file of numbers: {what[0]}") from None
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
@@ -45,22 +62,23 @@ def read_npy(path: Path) -> Given:
         raise RosyError(f"{path}: holds an array {values.shape}; (n, 3 N) or (n, N, 3) is wanted")
     values = values.reshape(len(values), -1).astype(np.float64)
     _check_columns(str(path), values.shape[1])
-    return _given(values)
+    return _raw_field(values)
 
 
-def text_of(directions: np.ndarray) -> str:
-    """A text file of (F, N, 3) directions."""
-    return "\n".join([*lines(directions.reshape(len(directions), -1)), ""])
+def directions_text(directions: np.ndarray) -> str:
+    """Format (F, N, 3) directions as text, 3 N numbers a row."""
+    return "\n".join([*format_rows(directions.reshape(len(directions), -1)), ""])
 
 
 def npy_bytes(directions: np.ndarray) -> bytes:
-    """An `.npy` file of (F, N, 3) directions, as (F, 3 N)."""
+    """The contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N)."""
     file = io.BytesIO()
     np.save(file, np.ascontiguousarray(directions.reshape(len(directions), -1)))
     return file.getvalue()
 
 
 def _check_columns(source: str, columns: int) -> None:
+    """Raise an error unless a row has 3 numbers for each of 1 to `MAX_DEGREE` directions."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
             f"{source}: has {columns} numbers a row; wanted 3 for each of up to {MAX_DEGREE} "
@@ -68,10 +86,11 @@ def _check_columns(source: str, columns: int) -> None:
         )
 
 
-def _given(values: np.ndarray) -> Given:
+def _raw_field(values: np.ndarray) -> RawField:
+    """Classify (n, k) values as members, directions or, if all are symmetric, tensors."""
     matrices = values.reshape(len(values), -1, 3)
     if values.shape[1] == 9:
-        uneven = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
-        if (uneven <= SYMMETRIC * np.abs(matrices).max(axis=(1, 2))).all():
-            return Given(matrices, 4, tensors=True)
-    return Given(matrices, None if values.shape[1] == 3 else values.shape[1] // 3)
+        asymmetry = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
+        if (asymmetry <= SYMMETRY_TOLERANCE * np.abs(matrices).max(axis=(1, 2))).all():
+            return RawField(matrices, 4, tensors=True)
+    return RawField(matrices, None if values.shape[1] == 3 else values.shape[1] // 3)

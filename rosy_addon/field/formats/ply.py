@@ -1,4 +1,7 @@
-"""Stanford .ply, text and binary: the elements `vertex` and `face`; all others are skipped."""
+"""Read Stanford .ply files, text and binary: the elements `vertex` and `face`.
+
+Other elements are skipped.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,11 @@ from struct import Struct
 import numpy as np
 
 from ...errors import RosyError
-from ...files import read_bytes
-from .polygons import Polygons, starts_of
-from .rows import Rows, read_rows, shown
+from ...file_io import read_bytes
+from .polygons import Polygons, offsets_from_sizes
+from .text_rows import TextRows, abbreviate, read_rows
 
-_TYPES = {
+_DTYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
     **dict.fromkeys(("short", "int16"), "i2"),
@@ -24,114 +27,138 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_CORNERS = ("vertex_indices", "vertex_index")
+_BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_CORNER_PROPERTIES = ("vertex_indices", "vertex_index")
 
 
 @dataclass(frozen=True)
 class _Property:
+    """A property of an element, as the header declares it; types are numpy type codes."""
+
     name: str
     type: str
-    #: Type of the count before a list; None for a single value.
+    #: Type of the count that precedes a list; None for a scalar property.
     count_type: str | None = None
 
 
 @dataclass(frozen=True)
 class _Element:
+    """An element, as the header declares it; `count` is its number of rows."""
+
     name: str
     count: int
     properties: list[_Property] = field(default_factory=list)
 
 
-#: Values of an element, by property: single ones as arrays, lists as (values, starts).
+#: Values of an element by property: scalars as arrays, lists as (values, starts).
 _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 
 def read_ply(path: Path) -> Polygons:
-    """Read a .ply file of polygons."""
-    columns, _ = _columns(path)
+    """Read the vertices and polygons of a .ply file.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is malformed or truncated, has no vertices or faces, or an index
+        is out of range.
+    """
+    columns, _ = _read_columns(path)
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
         raise RosyError(f"{path}: has no {missing} of vertices") from None
     face = columns.get("face", {})
-    corners = next((face[name] for name in _CORNERS if name in face), None)
-    if not isinstance(corners, tuple):
+    corner_list = next((face[name] for name in _CORNER_PROPERTIES if name in face), None)
+    if not isinstance(corner_list, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
-    corner_vertex, face_start = corners
-    wrong = ~((corner_vertex >= 0) & (corner_vertex < len(vertices)) & (corner_vertex % 1 == 0))
-    if wrong.any():
-        corner = int(np.argmax(wrong))
-        number = int(np.searchsorted(face_start, corner, side="right")) - 1
+    corner_vertex, face_start = corner_list
+    out_of_range = ~(
+        (corner_vertex >= 0) & (corner_vertex < len(vertices)) & (corner_vertex % 1 == 0)
+    )
+    if out_of_range.any():
+        corner = int(np.argmax(out_of_range))
+        face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
         raise RosyError(
-            f"{path}: face {number} refers to vertex {corner_vertex[corner]:.10g}, "
+            f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
             f"there are {len(vertices)}, counted from 0"
         )
-    with np.errstate(invalid="ignore"):  # signalling NaN; refused with the other ones
+    with np.errstate(invalid="ignore"):  # a signalling NaN; `build_surface` rejects all NaN
         vertices = vertices.astype(np.float64)
     return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
 
 
 def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
-    """What the vertices of a .ply file have besides their places.
+    """Read the scalar vertex properties of a .ply file other than the position.
 
     Returns
     -------
     dict of str to (V,) float64 ndarray
-        By property. Whole numbers are taken as the share of the largest that their type holds.
+        By property name. Integers are divided by the largest value of their type, so that colors
+        range from 0 to 1.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is malformed or truncated.
     """
-    columns, elements = _columns(path)
-    found = {}
-    for entry in next((e.properties for e in elements if e.name == "vertex"), []):
-        if entry.name in "xyz" or entry.count_type is not None:
+    columns, elements = _read_columns(path)
+    values = {}
+    for prop in next((e.properties for e in elements if e.name == "vertex"), []):
+        if prop.name in "xyz" or prop.count_type is not None:
             continue
-        kind = np.dtype(entry.type)
-        whole = np.iinfo(kind).max if kind.kind in "iu" else 1
-        found[entry.name] = columns["vertex"][entry.name].astype(np.float64) / whole
-    return found
+        dtype = np.dtype(prop.type)
+        scale = np.iinfo(dtype).max if dtype.kind in "iu" else 1
+        values[prop.name] = columns["vertex"][prop.name].astype(np.float64) / scale
+    return values
 
 
-def _columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
-    """All values of a file by element and property, and what it says its elements are."""
+def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
+    """All values of a file by element and property, and the elements that its header declares."""
     data = read_bytes(path)
-    order, elements, body = _header(path, data)
-    read = _text_elements if order == "" else _binary_elements
-    return read(path, data, body, order, elements), elements
+    byte_order, elements, offset = _header(path, data)
+    read = _text_elements if byte_order == "" else _binary_elements
+    return read(path, data, offset, byte_order, elements), elements
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
-    """Byte order ("" for text), elements, and where the header ends."""
+    """The byte order ("" for text), the elements, and the offset of the data in bytes."""
     if data[:3] != b"ply":
-        raise RosyError(f"{path}:1: found {shown(data[:3])}, wanted 'ply'")
+        raise RosyError(f"{path}:1: found {abbreviate(data[:3])}, wanted 'ply'")
     end = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE).search(data)
     if end is None:
         raise RosyError(f"{path}: the header has no end")
-    order, elements = None, []
-    for number, line in enumerate(data[: end.start()].decode("ascii", "replace").split("\n"), 1):
+    byte_order, elements = None, []
+    for line_number, line in enumerate(
+        data[: end.start()].decode("ascii", "replace").split("\n"), 1
+    ):
         try:
             match line.split():
                 case ["format", name, _]:
-                    order = _ORDERS[name]
+                    byte_order = _BYTE_ORDERS[name]
                 case ["element", name, count]:
-                    elements.append(_Element(name, _count(count)))
+                    elements.append(_Element(name, _parse_count(count)))
                 case ["property", "list", count_type, kind, name]:
-                    listed = _Property(name, _TYPES[kind], _TYPES[count_type])
-                    elements[-1].properties.append(listed)
+                    list_property = _Property(name, _DTYPES[kind], _DTYPES[count_type])
+                    elements[-1].properties.append(list_property)
                 case ["property", kind, name]:
-                    elements[-1].properties.append(_Property(name, _TYPES[kind]))
+                    elements[-1].properties.append(_Property(name, _DTYPES[kind]))
                 case [] | ["ply"] | ["comment", *_] | ["obj_info", *_]:
                     pass
                 case _:
                     raise ValueError
         except (KeyError, IndexError, ValueError):
-            found = shown(line.strip().encode())
-            raise RosyError(f"{path}:{number}: found {found}, wanted a line of a header") from None
-    if order is None:
+            found = abbreviate(line.strip().encode())
+            raise RosyError(
+                f"{path}:{line_number}: found {found}, wanted a line of a header"
+            ) from None
+    if byte_order is None:
         raise RosyError(f"{path}: the header names no format")
-    return order, elements, end.end()
+    return byte_order, elements, end.end()
 
 
-def _count(word: str) -> int:
+def _parse_count(word: str) -> int:
+    """A number of rows; raises `ValueError` if it is not a whole number from 0 on."""
     count = int(word)
     if count < 0:
         raise ValueError
@@ -139,157 +166,175 @@ def _count(word: str) -> int:
 
 
 def _text_elements(
-    path: Path, data: bytes, body: int, order: str, elements: list[_Element]
+    path: Path, data: bytes, offset: int, byte_order: str, elements: list[_Element]
 ) -> dict[str, _Columns]:
-    # The header stays in for the sake of the line numbers.
+    """The values of all elements of a text file; `offset` and `byte_order` are not used."""
+    # The header is included, so that line numbers are those of the file.
     rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}
     for element in elements:
-        part = rows[first : first + element.count]
-        if len(part) < element.count:
-            raise _truncated(path, element, len(part))
+        element_rows = rows[first : first + element.count]
+        if len(element_rows) < element.count:
+            raise _truncated(path, element, len(element_rows))
         first += element.count
-        columns[element.name] = _text_columns(part, element)
+        columns[element.name] = _text_columns(element_rows, element)
     return columns
 
 
-def _text_columns(rows: Rows, element: _Element) -> _Columns:
-    starts = starts_of([len(words) for words in rows.words])
+def _text_columns(rows: TextRows, element: _Element) -> _Columns:
+    """The values of one element, given its rows."""
+    starts = offsets_from_sizes([len(words) for words in rows.words])
     values = rows.floats(f"value of a {element.name}")
-    place = starts[:-1]
+    position = starts[:-1]
     columns: _Columns = {}
-    for entry in element.properties:
+    for prop in element.properties:
         count = np.ones(len(rows), dtype=np.int64)
-        if entry.count_type is not None:
-            _check_room(rows, element, place + 1, starts)
-            count = np.maximum(values[place], 0).astype(np.int64)
-            place = place + 1
-        _check_room(rows, element, place + count, starts)
-        ends = starts_of(count)
-        each = np.arange(ends[-1]) + np.repeat(place - ends[:-1], count)
-        columns[entry.name] = values[each] if entry.count_type is None else (values[each], ends)
-        place = place + count
+        if prop.count_type is not None:
+            _check_row_lengths(rows, element, position + 1, starts)
+            count = np.maximum(values[position], 0).astype(np.int64)
+            position = position + 1
+        _check_row_lengths(rows, element, position + count, starts)
+        list_starts = offsets_from_sizes(count)
+        index = np.arange(list_starts[-1]) + np.repeat(position - list_starts[:-1], count)
+        columns[prop.name] = (
+            values[index] if prop.count_type is None else (values[index], list_starts)
+        )
+        position = position + count
     return columns
 
 
-def _check_room(rows: Rows, element: _Element, end: np.ndarray, starts: np.ndarray) -> None:
-    """Raise an error if some row ends before the values that it should have."""
+def _check_row_lengths(
+    rows: TextRows, element: _Element, end: np.ndarray, starts: np.ndarray
+) -> None:
+    """Raise an error if a row ends before word `end`, counted like `starts` over all rows."""
     short = end > starts[1:]
     if short.any():
         row = int(np.argmax(short))
-        found, wanted = starts[row + 1] - starts[row], end[row] - starts[row]
-        raise rows.error(row, f"{element.name} {row} has {found} values, {wanted} are wanted")
+        available, required = starts[row + 1] - starts[row], end[row] - starts[row]
+        raise rows.error(row, f"{element.name} {row} has {available} values, {required} are wanted")
 
 
 def _binary_elements(
-    path: Path, data: bytes, body: int, order: str, elements: list[_Element]
+    path: Path, data: bytes, offset: int, byte_order: str, elements: list[_Element]
 ) -> dict[str, _Columns]:
+    """The values of all elements of a binary file, whose data begin at `offset`."""
     columns = {}
     for element in elements:
-        columns[element.name], body = _binary_columns(path, data, body, order, element)
+        columns[element.name], offset = _binary_columns(path, data, offset, byte_order, element)
     return columns
 
 
 def _binary_columns(
-    path: Path, data: bytes, body: int, order: str, element: _Element
+    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
 ) -> tuple[_Columns, int]:
-    """The values of one element, and where the next one begins."""
-    lengths = _first_lengths(path, data, body, order, element)
-    layout = _row_layout(element, order, lengths)
-    if layout.itemsize * element.count <= len(data) - body:
-        table = np.frombuffer(data, layout, element.count, body)
+    """The values of one element, and the offset of the next one in bytes.
+
+    If all rows have the same list lengths, the element is read as one structured array.
+    """
+    lengths = _first_row_list_lengths(path, data, offset, byte_order, element)
+    layout = _row_dtype(element, byte_order, lengths)
+    if layout.itemsize * element.count <= len(data) - offset:
+        table = np.frombuffer(data, layout, element.count, offset)
         if all((table[f"{name} count"] == length).all() for name, length in lengths.items()):
             columns = {
-                entry.name: table[entry.name]
-                if entry.count_type is None
+                prop.name: table[prop.name]
+                if prop.count_type is None
                 else (
-                    table[entry.name].ravel(),
-                    starts_of(np.full(element.count, lengths[entry.name])),
+                    table[prop.name].ravel(),
+                    offsets_from_sizes(np.full(element.count, lengths[prop.name])),
                 )
-                for entry in element.properties
+                for prop in element.properties
             }
-            return columns, body + layout.itemsize * element.count
+            return columns, offset + layout.itemsize * element.count
     if not lengths:
-        raise _truncated(path, element, (len(data) - body) // max(layout.itemsize, 1))
-    return _mixed_columns(path, data, body, order, element)
+        raise _truncated(path, element, (len(data) - offset) // max(layout.itemsize, 1))
+    return _ragged_columns(path, data, offset, byte_order, element)
 
 
-def _first_lengths(
-    path: Path, data: bytes, body: int, order: str, element: _Element
+def _first_row_list_lengths(
+    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
 ) -> dict[str, int]:
-    """Lengths of the lists of the first row: most files have the same in all rows."""
+    """Lengths of the lists in the first row, by property; most files have the same in all rows."""
     lengths: dict[str, int] = {}
     if not element.count:
-        return {entry.name: 0 for entry in element.properties if entry.count_type}
-    for entry in element.properties:
-        if entry.count_type is not None:
-            layout = _row_layout(element, order, lengths, until=entry.name)
-            if body + layout.itemsize > len(data):
+        return {prop.name: 0 for prop in element.properties if prop.count_type}
+    for prop in element.properties:
+        if prop.count_type is not None:
+            layout = _row_dtype(element, byte_order, lengths, until=prop.name)
+            if offset + layout.itemsize > len(data):
                 raise _truncated(path, element, 0)
-            row = np.frombuffer(data, layout, 1, body)[0]
-            lengths[entry.name] = _list_length(path, element, 0, row[f"{entry.name} count"])
+            row = np.frombuffer(data, layout, 1, offset)[0]
+            lengths[prop.name] = _list_length(path, element, 0, row[f"{prop.name} count"])
     return lengths
 
 
-def _row_layout(
-    element: _Element, order: str, lengths: dict[str, int], until: str | None = None
+def _row_dtype(
+    element: _Element, byte_order: str, lengths: dict[str, int], until: str | None = None
 ) -> np.dtype:
-    """The bytes of a row whose lists have these lengths, up to the count of the list `until`."""
+    """The layout of a row with these list lengths, up to the count of the list `until`."""
     layout = []
-    for entry in element.properties:
-        if entry.count_type is None:
-            layout.append((entry.name, order + entry.type))
+    for prop in element.properties:
+        if prop.count_type is None:
+            layout.append((prop.name, byte_order + prop.type))
             continue
-        layout.append((f"{entry.name} count", order + entry.count_type))
-        if entry.name == until:
+        layout.append((f"{prop.name} count", byte_order + prop.count_type))
+        if prop.name == until:
             break
-        layout.append((entry.name, order + entry.type, (lengths[entry.name],)))
+        layout.append((prop.name, byte_order + prop.type, (lengths[prop.name],)))
     return np.dtype(layout)
 
 
-def _mixed_columns(
-    path: Path, data: bytes, body: int, order: str, element: _Element
+def _ragged_columns(
+    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
 ) -> tuple[_Columns, int]:
-    """Rows of different lengths: each begins where the one before ends, so they take a loop."""
-    kinds = [
-        (np.dtype(order + entry.type), entry.count_type and np.dtype(order + entry.count_type))
-        for entry in element.properties
+    """The values of an element whose rows differ in length, and the offset of the next element.
+
+    Each row begins where the previous one ends, so the rows are read in a loop.
+    """
+    dtypes = [
+        (
+            np.dtype(byte_order + prop.type),
+            prop.count_type and np.dtype(byte_order + prop.count_type),
+        )
+        for prop in element.properties
     ]
-    pieces: list[list[bytes]] = [[] for _ in kinds]
-    sizes: list[list[int]] = [[] for _ in kinds]
-    length_of = [count and Struct(order + count.char).unpack_from for _, count in kinds]
-    place = body
+    chunks: list[list[bytes]] = [[] for _ in dtypes]
+    sizes: list[list[int]] = [[] for _ in dtypes]
+    read_length = [count and Struct(byte_order + count.char).unpack_from for _, count in dtypes]
+    position = offset
     for row in range(element.count):
-        for column, (kind, count) in enumerate(kinds):
+        for column, (kind, count) in enumerate(dtypes):
             length = 1
             if count is not None:
-                if place + count.itemsize > len(data):
+                if position + count.itemsize > len(data):
                     raise _truncated(path, element, row)
-                length = _list_length(path, element, row, length_of[column](data, place)[0])
-                place += count.itemsize
-            end = place + length * kind.itemsize
+                length = _list_length(path, element, row, read_length[column](data, position)[0])
+                position += count.itemsize
+            end = position + length * kind.itemsize
             if end > len(data):
                 raise _truncated(path, element, row)
-            pieces[column].append(data[place:end])
+            chunks[column].append(data[position:end])
             sizes[column].append(length)
-            place = end
+            position = end
     columns: _Columns = {}
-    for entry, (kind, count), parts, size in zip(
-        element.properties, kinds, pieces, sizes, strict=True
+    for prop, (kind, count), column_chunks, size in zip(
+        element.properties, dtypes, chunks, sizes, strict=True
     ):
-        values = np.frombuffer(b"".join(parts), kind)
-        columns[entry.name] = values if count is None else (values, starts_of(size))
-    return columns, place
+        values = np.frombuffer(b"".join(column_chunks), kind)
+        columns[prop.name] = values if count is None else (values, offsets_from_sizes(size))
+    return columns, position
 
 
 def _list_length(path: Path, element: _Element, row: int, length) -> int:
+    """The count of a list as an int; raises an error if it is negative or not a whole number."""
     if not (length >= 0 and length == int(length)):
         raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
     return int(length)
 
 
 def _truncated(path: Path, element: _Element, found: int) -> RosyError:
+    """The error for a file that ends after `found` rows of an element."""
     return RosyError(
         f"{path}: says {element.count} rows of element '{element.name}', but ends after {found}"
     )

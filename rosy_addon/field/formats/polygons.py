@@ -1,4 +1,4 @@
-"""What every mesh format gives: vertices and polygons as flat arrays."""
+"""Vertices and polygons as flat arrays: the result of every mesh reader."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ class Polygons(NamedTuple):
     Attributes
     ----------
     vertices : (V, 3) float64 ndarray
+        Positions in object space.
     corner_vertex : (C,) int64 ndarray
-        Vertex of each corner, from 0.
+        Index of the vertex of each corner, counted from 0.
     face_start : (F + 1,) int64 ndarray
         The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``.
     """
@@ -25,10 +26,16 @@ class Polygons(NamedTuple):
 
     @property
     def face_count(self) -> int:
-        """F."""
+        """F, the number of polygons."""
         return len(self.face_start) - 1
 
 
-def starts_of(sizes: np.ndarray | list[int]) -> np.ndarray:
-    """(n + 1,) int64: where each of n stretches of these sizes starts, and the end of the last."""
+def offsets_from_sizes(sizes: np.ndarray | list[int]) -> np.ndarray:
+    """(n + 1,) int64 offsets of n consecutive ranges of these sizes; the last is the total size.
+
+    Examples
+    --------
+    >>> offsets_from_sizes([3, 4, 3])
+    array([ 0,  3,  7, 10])
+    """
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)

@@ -1,4 +1,7 @@
-"""Directional's `.sings` (also `.sing`): a degree, a count, and rows of an element and an index."""
+"""Read and write the singularities of a field (`.sings` and `.sing` files of Directional).
+
+A file holds the degree, a count, and rows with an element and its singularity index.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .rows import read_rows
+from .text_rows import read_rows
 
-#: How their names end.
-SINGULARITIES = (".sings", ".sing")
+#: File name extensions of the format.
+SINGULARITY_SUFFIXES = (".sings", ".sing")
 
 
 def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
@@ -18,16 +21,16 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     Returns
     -------
     degree : int
-        N.
+        N, the degree of the field.
     element : (K,) int64 ndarray
-        Vertices, of fields on faces.
+        Singular elements, counted from 0: vertices if the field is on faces.
     index : (K,) int64 ndarray
-        In units of 1 / N.
+        Singularity indices in units of 1 / N.
 
     Raises
     ------
     RosyError
-        If the file is missing, or holds anything else.
+        If the file is missing, or is not such a file.
     """
     rows = read_rows(Path(path), comment=None)
     numbers = rows.ints("degree, count, elements and indices")
@@ -40,6 +43,6 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
 
 
 def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> str:
-    """A `.sings` file."""
+    """Format singularities as a `.sings` file; the parameters are the results of `read_sings`."""
     rows = [f"{a} {b}" for a, b in zip(element.tolist(), index.tolist(), strict=True)]
     return "\n".join([f"{degree} {len(rows)}", *rows, ""])

@@ -1,4 +1,4 @@
-"""Stereolithography .stl, text and binary: triangles whose equal corners become one vertex."""
+"""Read stereolithography .stl files, text and binary, and merge equal corners into vertices."""
 
 from __future__ import annotations
 
@@ -7,45 +7,60 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError
-from ...files import read_bytes
+from ...file_io import read_bytes
 from .polygons import Polygons
-from .rows import Rows, read_rows
+from .text_rows import TextRows, read_rows
 
-_HEADER = 84
-_TRIANGLE = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])
+#: Size of the header of a binary file, with the number of triangles in its last 4 bytes.
+_HEADER_BYTES = 84
+_TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read_stl(path: Path) -> Polygons:
-    """Read an .stl file. Corners at exactly the same position share a vertex."""
+    """Read an .stl file; corners at exactly the same position share a vertex.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is malformed or truncated.
+    """
     data = read_bytes(path)
-    count = int.from_bytes(data[80:_HEADER], "little")
-    # Some binary files begin with "solid" too: only their length tells.
-    is_binary = len(data) == _HEADER + count * _TRIANGLE.itemsize
-    if not is_binary and data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:_HEADER]:
+    count = int.from_bytes(data[80:_HEADER_BYTES], "little")
+    # Some binary files also begin with "solid"; the file size identifies them.
+    is_binary = len(data) == _HEADER_BYTES + count * _TRIANGLE_DTYPE.itemsize
+    if (
+        not is_binary
+        and data.lstrip()[:5].lower() == b"solid"
+        and b"\0" not in data[:_HEADER_BYTES]
+    ):
         points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
-    with np.errstate(invalid="ignore"):  # signalling NaN; refused with the other ones
+    with np.errstate(invalid="ignore"):  # a signalling NaN; `build_surface` rejects all NaN
         points = points.astype(np.float64)
     vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
 
 def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Make points at exactly the same place one.
+    """Merge points that have exactly the same position.
+
+    Parameters
+    ----------
+    points : (P, 3) float ndarray
 
     Returns
     -------
     vertices : (V, 3) ndarray
-        In the order in which they first occur.
+        The distinct points, in the order of their first occurrence.
     index : (P,) int64 ndarray
-        The vertex of each point.
+        The index of the vertex of each point.
     """
-    points = points + 0.0  # -0 and 0 are one place
+    points = points + 0.0  # turns -0 into 0
     order = np.lexsort(points.T)
     is_new = np.ones(len(points), dtype=bool)
     is_new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
-    # The sort is stable, so the first of each run of equals occurs first.
+    # The sort is stable, so each run of equal points begins with the first occurrence.
     first = order[is_new]
     rank = np.empty(len(first), dtype=np.int64)
     by_occurrence = np.argsort(first)
@@ -56,23 +71,27 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
-    found = (len(data) - _HEADER) // _TRIANGLE.itemsize
-    if len(data) < _HEADER or found < count:
-        said = f"says {count} triangles" if len(data) >= _HEADER else "is no .stl file"
-        raise RosyError(f"{path}: {said}, but ends after {max(found, 0)}")
-    return np.frombuffer(data, _TRIANGLE, count, _HEADER)["points"].reshape(-1, 3)
+    """(3 T, 3) float32 corners of the triangles of a binary file."""
+    available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
+    if len(data) < _HEADER_BYTES or available < count:
+        said = f"says {count} triangles" if len(data) >= _HEADER_BYTES else "is no .stl file"
+        raise RosyError(f"{path}: {said}, but ends after {max(available, 0)}")
+    return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
 def _text_points(path: Path, data: bytes) -> np.ndarray:
+    """(3 T, 3) float64 corners of the triangles of a text file."""
     rows = read_rows(path, comment=None, data=data)
-    corners = [row for row, words in enumerate(rows.words) if words[0].lower() == b"vertex"]
+    corner_rows = [row for row, words in enumerate(rows.words) if words[0].lower() == b"vertex"]
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
-    if len(corners) != 3 * loops:
+    if len(corner_rows) != 3 * loops:
         raise rows.error(
-            corners[-1] if corners else len(rows),
-            f"the file has {len(corners)} corners in {loops} whole triangles; is it truncated?",
+            corner_rows[-1] if corner_rows else len(rows),
+            f"the file has {len(corner_rows)} corners in {loops} whole triangles; is it truncated?",
         )
-    chosen = Rows(
-        path, [rows.words[row][1:] for row in corners], [rows.line[row] for row in corners]
+    vertex_rows = TextRows(
+        path,
+        [rows.words[row][1:] for row in corner_rows],
+        [rows.line_numbers[row] for row in corner_rows],
     )
-    return chosen.points("corner") if corners else np.zeros((0, 3))
+    return vertex_rows.points("corner") if corner_rows else np.zeros((0, 3))

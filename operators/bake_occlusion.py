@@ -1,0 +1,53 @@
+"""Operator: compute ambient occlusion, and use it as the tone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..rosy_addon.progress import Task
+from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
+from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion_task
+from ..rosy_addon.scene.scene_reader import field_objects
+from .modal_task import ModalTaskMixin
+from .poll import poll_has_field
+
+
+class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
+    """Store how much of the sky each part of the meshes with a field sees, and take tones from that"""
+
+    bl_idname = "rosy.occlusion"
+    bl_label = "Tone by Occlusion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    directions: bpy.props.IntProperty(
+        name="Directions",
+        description="From how many sides it is looked at: more take longer and are smoother",
+        default=DIRECTION_COUNT,
+        min=1,
+        soft_min=32,
+        max=65536,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_has_field(cls, context)
+
+    def make_task(self, context: bpy.types.Context) -> Task[None]:
+        depsgraph = context.evaluated_depsgraph_get()
+        objects = field_objects(context.view_layer)
+        return store_occlusion_task(depsgraph, objects, direction_count=self.directions)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return field_objects(context.view_layer)
+
+    def finish(self, context: bpy.types.Context, result: None) -> None:
+        settings = context.scene.rosy
+        settings.tone_attribute, settings.look.tone = OCCLUSION_ATTRIBUTE, "attribute"
+        self.report(
+            {"INFO"}, f"Stored as attribute '{OCCLUSION_ATTRIBUTE}', which the tone now comes from"
+        )
+
+
+CLASSES = (ROSY_OT_occlusion,)

@@ -1,0 +1,33 @@
+"""Operator: remove the baked pictures."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon.scene.pictures import list_bakes, remove_bakes
+from .poll import poll_idle
+
+
+class ROSY_OT_remove(bpy.types.Operator):
+    """Take away the pictures and all that RoSy put on objects to show them; fields stay"""
+
+    bl_idname = "rosy.remove"
+    bl_label = "Remove Pictures"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not poll_idle(cls):
+            return False
+        if not list_bakes(context.scene):
+            cls.poll_message_set("Nothing is baked in this scene")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        removed = remove_bakes(context.scene)
+        self.report({"INFO"}, f"Removed {removed.images} pictures from {removed.objects} objects")
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_remove,)

@@ -1,0 +1,137 @@
+"""A cache of results, keyed by all inputs that a result depends on.
+
+Cached results cannot be out of date, because the key contains every input: settings by value,
+arrays by `content_hash`, and immutable objects (meshes, fields, G-buffers) by identity.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from .progress import Task
+
+Result = TypeVar("Result")
+
+#: Default size limit of a cache, in bytes. Baking a character at 1920 x 1080 takes a third.
+MAX_BYTES = 1 << 29
+
+
+class Cache:
+    """A least-recently-used cache of results by their keys, with a limit in bytes.
+
+    A key may contain objects that compare by identity, such as instances of frozen dataclasses with
+    ``eq=False``. The cache keeps them alive, so that no other object can have the same identity.
+
+    Nothing is evicted until one of the `evict_` methods is called.
+
+    Parameters
+    ----------
+    max_bytes : int
+        Limit that `evict_over_limit` applies: bytes of all arrays in keys and results.
+    """
+
+    def __init__(self, max_bytes: int = MAX_BYTES) -> None:
+        self._max_bytes = max_bytes
+        self._entries: OrderedDict[Hashable, Any] = OrderedDict()
+        self._used: set[Hashable] = set()
+
+    def get(self, key: Hashable) -> Any | None:
+        """Return the result of a key, or None if there is none."""
+        if key not in self._entries:
+            return None
+        self._entries.move_to_end(key)
+        self._used.add(key)
+        return self._entries[key]
+
+    def put(self, key: Hashable, result: Result) -> Result:
+        """Store a result under a key, and return the result."""
+        self._entries[key] = result
+        self._used.add(key)
+        return result
+
+    def get_or_create(self, key: Hashable, create: Callable[[], Result]) -> Result:
+        """Return the result of a key. If there is none, create and store it.
+
+        `create` must not return None: that result would be created again at every call.
+        """
+        cached = self.get(key)
+        return self.put(key, create()) if cached is None else cached
+
+    def get_or_create_task(
+        self, key: Hashable, create_task: Callable[[], Task[Result]]
+    ) -> Task[Result]:
+        """Do the same as `get_or_create`, for a result that is returned by a task."""
+        cached = self.get(key)
+        return self.put(key, (yield from create_task())) if cached is None else cached
+
+    def evict_over_limit(self) -> None:
+        """Evict least recently used entries until the rest is within the limit.
+
+        The size of an entry is that of all arrays in its key and its result. Arrays that several
+        entries share count once.
+        """
+        visited: set[int] = set()
+        total = 0
+        for key in reversed(list(self._entries)):
+            total += _array_bytes(key, visited) + _array_bytes(self._entries[key], visited)
+            if total > self._max_bytes:
+                del self._entries[key]
+
+    def evict_unused(self) -> None:
+        """Evict entries that were neither stored nor returned since the last call."""
+        for key in [key for key in self._entries if key not in self._used]:
+            del self._entries[key]
+        self._used.clear()
+
+    def clear(self) -> None:
+        """Evict all entries."""
+        self._entries.clear()
+        self._used.clear()
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
+#: The cache that all bakes of one Blender process share.
+BAKE_CACHE = Cache()
+
+
+def content_hash(*parts: object) -> bytes:
+    """Return a SHA-1 digest of arrays (shape, dtype, bytes) and of other objects (their repr)."""
+    hasher = hashlib.sha1(usedforsecurity=False)  # many processors have instructions for SHA-1
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            hasher.update(f"{part.shape}{part.dtype}".encode())
+            hasher.update(np.ascontiguousarray(part))
+        else:
+            hasher.update(repr(part).encode())
+        hasher.update(b"|")
+    return hasher.digest()
+
+
+def _array_bytes(obj: object, visited: set[int]) -> int:
+    """Return the size of all arrays in an object in bytes, without those visited before.
+
+    `visited` holds the ids of visited objects and is updated. A view counts as the array that it
+    views.
+    """
+    if id(obj) in visited:
+        return 0
+    visited.add(id(obj))
+    if isinstance(obj, np.ndarray):
+        return obj.nbytes if obj.base is None else _array_bytes(obj.base, visited)
+    if isinstance(obj, (list, tuple)):
+        return sum(_array_bytes(part, visited) for part in obj)
+    if isinstance(obj, dict):
+        return sum(_array_bytes(part, visited) for part in obj.values())
+    if is_dataclass(obj):
+        # vars() adds cached properties, which are not fields.
+        attributes = {field.name: getattr(obj, field.name) for field in fields(obj)} | vars(obj)
+        return sum(_array_bytes(part, visited) for part in attributes.values())
+    return 0

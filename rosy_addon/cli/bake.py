@@ -1,0 +1,159 @@
+"""The command `bake`: pictures of a Blender file, from its cameras."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import RosyError
+from ..frame_workers import parse_frames
+from ..gpu.select import RENDER_DEVICES
+from ..progress import Task
+from .bake_workers import run_workers, uses_workers
+from .look import add_look_options, requested_look
+from .options import add_subcommand, parse_size
+from .scene import open_scene, requested_cameras
+
+
+def add_bake_command(subparsers: Any) -> None:
+    """Add the command `bake`."""
+    parser = add_subcommand(subparsers, "bake", run_bake)
+    parser.add_argument(
+        "scene", nargs="?", type=Path, metavar="SCENE.blend", help="by default the open file"
+    )
+    parser.add_argument(
+        "--object", nargs="+", metavar="NAME", help="objects to draw; by default all with a field"
+    )
+    cameras = parser.add_mutually_exclusive_group()
+    cameras.add_argument("--camera", metavar="NAME", help="by default the scene's active camera")
+    cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
+    add_look_options(parser)
+    parser.add_argument(
+        "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write the pictures to this folder as .png files"
+    )
+    parser.add_argument(
+        "--device",
+        choices=list(RENDER_DEVICES),
+        help="draw with the processor, the graphics card, or the graphics card if there is one; by "
+        "default as set in the scene",
+    )
+    parser.add_argument("--save", action="store_true", help="save the Blender file")
+    parser.add_argument(
+        "--frames",
+        metavar="A-B[:STEP]",
+        help="draw a picture of each frame from the camera that renders it; pictures that exist and "
+        "are up to date are kept",
+    )
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
+        "--jobs", type=int, default=1, metavar="J", help="number of processes for the frames"
+    )
+    workers.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of a Dask cluster whose workers draw the frames",
+    )
+
+
+def run_bake(options: argparse.Namespace) -> None:
+    """Draw the fields of a Blender file from its cameras, at one frame or several."""
+    _check_bake_options(options)
+    if options.out is None and not options.save:
+        raise RosyError("the pictures would be lost: give --out DIR, --save, or both")
+    if uses_workers(options):
+        run_workers(options)
+        if not options.save:
+            return
+    scene = open_scene("bake", options.scene)
+    import bpy
+
+    from ..bake import bake as bake_scene
+    from ..scene.blend_files import save_blend
+    from ..scene.look_properties import read_look
+    from ..scene.pictures import read_output_settings
+    from ..scene.scene_reader import field_objects
+
+    settings = read_output_settings(scene)
+    if options.device is not None:
+        settings = replace(settings, device=options.device)
+    if options.out is not None:
+        settings = replace(settings, folder=options.out.resolve())
+    if options.frames is not None:
+        _bake_animation(options, scene, settings)
+        return
+    results = bake_scene(
+        scene,
+        objects=field_objects(bpy.context.view_layer, options.object),
+        cameras=requested_cameras(scene, options),
+        look=requested_look(options, read_look(scene.rosy)),
+        size=options.size,
+        settings=settings,
+    )
+    for note in dict.fromkeys(note for result in results for note in result.warnings):
+        print(f"rosy: {note}", file=sys.stderr)
+    for result in results:
+        location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
+        print(f"{result.camera}: {location}")
+    if options.save:
+        print(save_blend())
+
+
+def _check_bake_options(options: argparse.Namespace) -> None:
+    """Raise an error if options contradict each other, before any file is opened."""
+    if options.frames is None and uses_workers(options):
+        raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
+    if options.frames is not None and options.out is None:
+        raise RosyError("--frames writes files: give --out DIR")
+    if options.jobs < 1:
+        raise RosyError(f"--jobs {options.jobs}: expected 1 or more")
+
+
+def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> None:
+    """Draw the frames in this process, and print what was written."""
+    import bpy
+
+    from ..animation import bake_animation_task
+    from ..scene.blend_files import save_blend
+    from ..scene.look_properties import read_look
+    from ..scene.scene_reader import field_objects
+
+    frames = parse_frames(options.frames)
+    if uses_workers(options):
+        # The workers have drawn all frames. The range is enough to make the materials play them.
+        frames = sorted({frames[0], frames[-1]})
+    has_look_options = bool(options.preset or options.set)
+    task = bake_animation_task(
+        scene,
+        frames,
+        objects=field_objects(bpy.context.view_layer, options.object),
+        cameras=requested_cameras(scene, options),
+        look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
+        size=options.size,
+        settings=settings,
+        show=options.save,
+    )
+    for result in _run_with_log(task):
+        if result.skipped:
+            print(f"{len(result.skipped)} frames of {result.camera} were there")
+        print(f"{result.camera}: {result.sequence.path}")
+    if options.save:
+        print(save_blend())
+
+
+def _run_with_log(task: Task[Any]) -> Any:
+    """Run a task to its end and return its result. Print a line for each frame."""
+    last_label = ""
+    while True:
+        try:
+            progress = next(task)
+        except StopIteration as done:
+            return done.value
+        if progress.label != last_label and progress.label.startswith("frame "):
+            last_label = progress.label
+            print(f"{progress.label} ({100 * progress.fraction:.0f} %)", flush=True)

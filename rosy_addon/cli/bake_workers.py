@@ -1,0 +1,70 @@
+"""Processes that bake frames, for the command `bake`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..errors import RosyError
+from ..frame_workers import parse_frames, run_dask, run_local, worker_command
+from ..presets.store import SHIPPED_FOLDER, find_preset_file
+from .presets import user_presets_folder
+
+
+def uses_workers(options: argparse.Namespace) -> bool:
+    """Return whether other processes draw the frames."""
+    return options.jobs > 1 or options.scheduler is not None
+
+
+def run_workers(options: argparse.Namespace) -> None:
+    """Draw the frames in other processes, on this machine or on a cluster."""
+    blender_path = sys.modules["bpy"].app.binary_path if "bpy" in sys.modules else ""
+    scene = options.scene
+    if scene is None:
+        blend_data = sys.modules["bpy"].data if "bpy" in sys.modules else None
+        if blend_data is None or not blend_data.filepath or blend_data.is_dirty:
+            raise RosyError(
+                "--jobs and --scheduler need a saved file: save it, or give SCENE.blend"
+            )
+        scene = Path(blend_data.filepath)
+    if not scene.is_file():
+        raise RosyError(f"{scene}: cannot be read: no such file")
+    command = worker_command(blender_path, scene.resolve()) + _forwarded_args(options)
+    frames = parse_frames(options.frames)
+    if options.scheduler is not None:
+        output_lines = run_dask(command, frames, options.scheduler)
+    else:
+        output_lines = run_local(command, frames, options.jobs)
+    for line in output_lines:
+        if line.startswith("frame "):
+            print(line, flush=True)
+
+
+def _forwarded_args(options: argparse.Namespace) -> list[str]:
+    """Return the options that are passed on to the other processes."""
+    arguments = ["--out", str(options.out.resolve())]
+    if options.object:
+        arguments += ["--object", *options.object]
+    if options.camera is not None:
+        arguments += ["--camera", options.camera]
+    if options.all_cameras:
+        arguments += ["--all-cameras"]
+    if options.size is not None:
+        arguments += ["--size", f"{options.size[0]}x{options.size[1]}"]
+    if options.preset is not None:
+        arguments += ["--preset", _forwarded_preset(options.preset)]
+    if options.device is not None:
+        arguments += ["--device", options.device]
+    for setting in options.set:
+        arguments += ["--set", setting]
+    return arguments
+
+
+def _forwarded_preset(preset: str) -> str:
+    """Return the name of a preset of RoSy, or the path of another one.
+
+    RoSy may be installed in another folder where the worker runs.
+    """
+    path = find_preset_file(preset, user_presets_folder())
+    return path.stem if path.parent == SHIPPED_FOLDER else str(path.resolve())

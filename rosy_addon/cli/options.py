@@ -1,0 +1,65 @@
+"""Helpers shared by the commands: value types for argparse, and notes to the user."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return width and height of a text such as 640x480."""
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def float_tuple(count: int, metavar: str) -> Callable[[str], tuple[float, ...]]:
+    """Return a parser for numbers that are separated by commas."""
+
+    def parse(text: str) -> tuple[float, ...]:
+        try:
+            values = tuple(map(float, text.split(",")))
+        except ValueError:
+            values = ()
+        if len(values) != count:
+            raise argparse.ArgumentTypeError(f"{text!r} is not {metavar}")
+        return values
+
+    return parse
+
+
+def float_between(low: float, high: float) -> Callable[[str], float]:
+    """Return a parser for a number in a closed interval."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {low:g} to {high:g}")
+        return value
+
+    return parse
+
+
+def add_subcommand(
+    subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
+) -> argparse.ArgumentParser:
+    """Add a command. The first line of the function's docstring becomes its help."""
+    text = function.__doc__.splitlines()[0]
+    parser = subparsers.add_parser(name, help=text, description=text)
+    parser.set_defaults(run=function)
+    return parser
+
+
+def print_note(text: str) -> None:
+    """Print a note to the error stream, unless it is empty."""
+    if text:
+        print(f"rosy: {text}", file=sys.stderr)

@@ -1,0 +1,85 @@
+"""The parser of all commands, and `main`."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+
+from ..errors import RosyError
+from .bake import add_bake_command
+from .field import add_field_command, add_info_command
+from .presets import add_presets_command
+from .render import add_render_command, add_turntable_command
+from .strokes import add_strokes_command
+
+#: Exit statuses: success, an error in the user's input, interrupted by Ctrl-C.
+EXIT_OK, EXIT_USER_ERROR, EXIT_INTERRUPTED = 0, 2, 130
+
+
+def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command rosy") -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Without the program name; `sys.argv[1:]` by default.
+    prog : str
+        How the user starts the program, for the help.
+
+    Returns
+    -------
+    int
+        Exit status: 0 only if all outputs were written.
+    """
+    arguments = sys.argv[1:] if argv is None else argv
+    try:
+        options = _build_parser(prog).parse_args(_join_negative_values(arguments))
+        options.run(options)
+    except RosyError as error:
+        print(f"rosy: {error}", file=sys.stderr)
+        return EXIT_USER_ERROR
+    except KeyboardInterrupt:
+        print("rosy: stopped", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error
+        return EXIT_OK if exit_request.code is None else int(exit_request.code)
+    return EXIT_OK
+
+
+def _build_parser(prog: str) -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    parser = argparse.ArgumentParser(
+        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
+    )
+    subparsers = parser.add_subparsers(metavar="VERB", required=True)
+    for add_command in (
+        add_bake_command,
+        add_render_command,
+        add_strokes_command,
+        add_turntable_command,
+        add_field_command,
+        add_info_command,
+        add_presets_command,
+    ):
+        add_command(subparsers)
+    return parser
+
+
+def _join_negative_values(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments with `--view -30,20` as `--view=-30,20`.
+
+    Otherwise argparse reads the negative number as an option.
+    """
+    joined: list[str] = []
+    for argument in arguments:
+        if (
+            joined
+            and joined[-1] in ("--view", "--axis", "--frames")
+            and re.match(r"-[\d.]", argument)
+        ):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined

@@ -1,0 +1,48 @@
+"""The command `presets`, and the folder of the user's presets."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import RosyError
+from ..presets.store import default_user_folder, preset_files, read_preset
+from .options import add_subcommand, print_note
+
+
+def add_presets_command(subparsers: Any) -> None:
+    """Add the command `presets`."""
+    parser = add_subcommand(subparsers, "presets", run_presets)
+    parser.add_argument("--json", action="store_true", help="print a JSON list of objects")
+
+
+def run_presets(options: argparse.Namespace) -> None:
+    """List the presets of RoSy and your own, with their descriptions."""
+    folder, records = user_presets_folder(), []
+    for key, path in preset_files(folder).items():
+        try:
+            preset = read_preset(path)
+        except RosyError as error:
+            print_note(str(error))
+            continue
+        facts = {"preset": key, "name": preset.name, "description": preset.description}
+        records.append(facts | {"own": path.parent == folder})
+    if options.json:
+        print(json.dumps(records))
+        return
+    width = max(len(record["preset"]) for record in records)
+    for record in records:
+        print(f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}")
+    print(f"your own are in {folder}")
+
+
+def user_presets_folder() -> Path:
+    """Return the folder of the user's presets: in Blender, the one of the extension."""
+    if "bpy" not in sys.modules:
+        return default_user_folder()
+    from ..scene.paths import user_presets_folder
+
+    return user_presets_folder()

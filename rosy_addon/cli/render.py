@@ -1,0 +1,137 @@
+"""The commands `render` and `turntable`: pictures and videos of a mesh file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..cache import Cache
+from ..color import luminance
+from ..errors import RosyError
+from ..file_io import check_writable
+from ..image_io.png import read_png, write_png
+from ..progress import run_to_completion
+from ..render.cpu import CpuRenderer
+from ..render.mesh_view import mesh_instance, mesh_view
+from ..render.view_input import ViewInput
+from ..turntable import Encoder, check_video_path, has_ffmpeg, turntable_task, turntable_views
+from .look import (
+    add_look_options,
+    add_tone_options,
+    load_tone_map,
+    mesh_file_look,
+)
+from .mesh_field import add_mesh_options, load_mesh_and_field
+from .options import add_subcommand
+from .view import (
+    DEFAULT_SIZE,
+    DEFAULT_VIDEO_SIZE,
+    add_view_options,
+    requested_size,
+    up_axis,
+)
+
+
+def add_render_command(subparsers: Any) -> None:
+    """Add the command `render`."""
+    parser = add_subcommand(subparsers, "render", run_render)
+    add_mesh_options(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
+    add_view_options(parser, DEFAULT_SIZE)
+    add_look_options(parser)
+    add_tone_options(parser)
+    parser.add_argument(
+        "--tone-picture",
+        type=Path,
+        metavar="PICTURE.png",
+        help="take the tone from a picture of the same mesh in the same view",
+    )
+
+
+def run_render(options: argparse.Namespace) -> None:
+    """Draw the field of a mesh file as a picture."""
+    check_writable(options.output)
+    look = mesh_file_look(options)
+    surface, field = load_mesh_and_field(options)
+    size = requested_size(options)
+    instance = mesh_instance(surface, field, up_axis(options), load_tone_map(options, surface))
+    reference_luminance = None
+    if options.tone_picture is not None:
+        reference_luminance = luminance(read_png(options.tone_picture))
+    view = mesh_view(
+        instance,
+        look,
+        options.view,
+        size,
+        perspective=not options.ortho,
+        reference_luminance=reference_luminance,
+        reference_name=str(options.tone_picture),
+    )
+    picture = run_to_completion(CpuRenderer().render_task(view))
+    write_png(options.output, picture.rgba)
+
+
+def add_turntable_command(subparsers: Any) -> None:
+    """Add the command `turntable`."""
+    parser = add_subcommand(subparsers, "turntable", run_turntable)
+    add_mesh_options(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
+    parser.add_argument(
+        "--pictures",
+        type=int,
+        default=72,
+        metavar="N",
+        help="pictures in a full turn (%(default)d)",
+    )
+    parser.add_argument(
+        "--rate", type=float, default=24.0, metavar="N", help="pictures per second (%(default)g)"
+    )
+    add_view_options(parser, DEFAULT_VIDEO_SIZE)
+    add_look_options(parser)
+    add_tone_options(parser)
+
+
+def run_turntable(options: argparse.Namespace) -> None:
+    """Draw the field of a mesh file from all sides, as a video."""
+    check_writable(options.output)
+    check_video_path(options.output)
+    if options.pictures < 2 or not options.rate > 0:
+        raise RosyError("a turntable needs 2 or more --pictures, and a --rate above 0")
+    encode = _video_encoder(options.output)
+    look = mesh_file_look(options)
+    surface, field = load_mesh_and_field(options)
+    instance = mesh_instance(surface, field, up_axis(options), load_tone_map(options, surface))
+    count, size = options.pictures, requested_size(options)
+    views = turntable_views(
+        instance, look, count, size, options.view, perspective=not options.ortho
+    )
+    views = _log_views(views, count)
+    task = turntable_task(
+        CpuRenderer(Cache(), keep_gbuffers=False),
+        views,
+        count,
+        options.output,
+        options.rate,
+        encode,
+    )
+    run_to_completion(task)
+
+
+def _video_encoder(path: Path) -> Encoder | None:
+    """Return Blender's encoder if the video needs one and there is no ffmpeg."""
+    if path.suffix.lower() != ".mp4" or has_ffmpeg():
+        return None
+    try:
+        from ..scene.video import encode_video
+    except ImportError:
+        raise RosyError(f"{path}: an .mp4 needs ffmpeg or Blender; a .gif needs neither") from None
+    return encode_video
+
+
+def _log_views(views: Iterator[ViewInput], count: int) -> Iterator[ViewInput]:
+    """Yield the same views, and print a line before each is drawn."""
+    for number, view in enumerate(views, 1):
+        print(f"picture {number} of {count}", flush=True)
+        yield view

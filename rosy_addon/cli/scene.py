@@ -1,0 +1,52 @@
+"""Access to Blender files, for the commands that read them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import RosyError
+
+
+def open_scene(command: str, path: Path | None) -> Any:
+    """Open a Blender file, if one is given, and return the scene.
+
+    Raises
+    ------
+    RosyError
+        If this is not Blender, or the file cannot be read.
+    """
+    try:
+        import bpy
+    except ImportError:
+        raise RosyError(
+            f"{command} needs Blender: run `blender -b SCENE.blend --command rosy {command}`, "
+            "or install the Python module bpy"
+        ) from None
+    from ..scene.blend_files import open_blend
+    from ..ui.properties import ensure_registered
+
+    ensure_registered()
+    if path is not None:
+        open_blend(path)
+    return bpy.context.scene
+
+
+def requested_cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
+    """Return the camera objects that the options name; None for the scene's active camera."""
+    from ..scene.cameras import scene_cameras
+
+    if options.all_cameras:
+        return scene_cameras(scene)
+    return None if options.camera is None else [find_camera(scene, options.camera)]
+
+
+def find_camera(scene: Any, name: str) -> Any:
+    """Return the camera object of a name."""
+    if name not in scene.objects:
+        names = ", ".join(f"'{obj.name}'" for obj in scene.objects if obj.type == "CAMERA")
+        raise RosyError(
+            f"there is no camera '{name}' in scene '{scene.name}', only {names or 'none'}"
+        )
+    return scene.objects[name]

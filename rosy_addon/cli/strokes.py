@@ -1,0 +1,153 @@
+"""The command `strokes`: evenly spaced streamlines as an .svg file."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..compositor.shading import lights_of
+from ..errors import RosyError
+from ..file_io import check_writable
+from ..frame_workers import parse_frames
+from ..projection.camera import orbit_camera
+from ..render.mesh_view import check_light, mesh_instance
+from ..strokes.pipeline import draw_bodies
+from ..strokes.style import StrokeStyle
+from ..strokes.svg import Pen, write_svg
+from .mesh_field import add_mesh_options, load_mesh_and_field
+from .options import add_subcommand
+from .scene import find_camera, open_scene
+from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
+from .view import DEFAULT_VIEW, add_view_options, requested_size, up_axis
+
+#: Default values of the options that are only for mesh files, and only for .blend files.
+MESH_ONLY_DEFAULTS = {
+    **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
+    **dict.fromkeys(("uv", "undefined", "ortho"), False),
+    "view": DEFAULT_VIEW,
+}
+SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
+
+
+def add_strokes_command(subparsers: Any) -> None:
+    """Add the command `strokes`."""
+    parser = add_subcommand(subparsers, "strokes", run_strokes)
+    parser.description += " For a .blend file, options that are not given are as in the scene."
+    add_mesh_options(parser, allow_scene=True)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
+    add_view_options(parser, None)
+    parser.add_argument(
+        "--object",
+        nargs="+",
+        metavar="NAME",
+        help="objects of a .blend file; by default all with a field",
+    )
+    parser.add_argument(
+        "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
+    )
+    parser.add_argument(
+        "--frames",
+        metavar="A-B[:STEP]",
+        help="frames of a .blend file, each in its own file; # in OUT stands for the frame number",
+    )
+    add_style_options(parser)
+    add_pen_options(parser)
+
+
+def run_strokes(options: argparse.Namespace) -> None:
+    """Draw evenly spaced strokes along the fields of meshes, as an .svg file."""
+    if options.output.suffix.lower() != ".svg":
+        raise RosyError(f"{options.output}: strokes are written to .svg files")
+    check_writable(options.output)
+    if options.mesh is None and "bpy" not in sys.modules:
+        raise RosyError("there is nothing to draw: give a mesh file, or SCENE.blend")
+    if options.mesh is None or options.mesh.suffix.lower() == ".blend":
+        _reject_options(options, MESH_ONLY_DEFAULTS, "mesh files")
+        _draw_scene_strokes(options)
+        return
+    _reject_options(options, SCENE_ONLY_DEFAULTS, ".blend files")
+    style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
+    check_light(style.light, str(options.mesh))
+    surface, field = load_mesh_and_field(options)
+    instance = mesh_instance(surface, field, up_axis(options))
+    size = requested_size(options)
+    camera = orbit_camera(
+        instance.world_points(), *options.view, *size, perspective=not options.ortho
+    )
+    drawing = draw_bodies([instance], camera, style, lights=lights_of(style, ()))
+    write_svg(options.output, drawing.strokes, camera, pen)
+
+
+def _draw_scene_strokes(options: argparse.Namespace) -> None:
+    """Draw the strokes of a Blender file, at one frame or several.
+
+    The settings of the scene apply unless an option overrides them.
+    """
+    frames = [None] if options.frames is None else list(parse_frames(options.frames))
+    if len(frames) > 1 and "#" not in options.output.name:
+        raise RosyError(
+            f"{options.output}: several frames need # in the file name for the frame number"
+        )
+    scene = open_scene("strokes", options.mesh)
+    for frame in frames:
+        if frame is None:
+            _draw_frame_strokes(options, scene, options.output)
+            continue
+        scene.frame_set(frame)
+        try:
+            _draw_frame_strokes(options, scene, _path_of_frame(options.output, frame))
+        except RosyError as error:
+            raise RosyError(f"frame {frame}: {error}") from None
+
+
+def _path_of_frame(path: Path, frame: int) -> Path:
+    """Return the path with each row of # in the file name replaced by the frame number."""
+    return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
+
+
+def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> None:
+    """Draw the strokes of the current frame, as the operator does."""
+    import bpy
+
+    from ..draw_strokes import draw_strokes
+    from ..scene.cameras import frame_camera
+    from ..scene.scene_reader import field_objects
+    from ..scene.stroke_objects import read_pen, read_stroke_style, target_objects
+
+    if options.camera is not None:
+        camera = find_camera(scene, options.camera)
+    else:
+        camera = None if options.frames is None else frame_camera(scene, scene.frame_current)
+    settings, layer = scene.rosy.strokes, bpy.context.view_layer
+    has_names = options.object is not None
+    result = draw_strokes(
+        scene,
+        kind="SVG",
+        path=path.resolve(),
+        objects=field_objects(layer, options.object) if has_names else target_objects(scene, layer),
+        camera=camera,
+        style=stroke_style_of(options, read_stroke_style(settings)),
+        pen=pen_of(options, read_pen(settings)),
+        size=options.size,
+    )
+    print(f"{result.camera}: {result.path}", flush=True)
+
+
+def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_kind: str) -> None:
+    """Raise an error if an option is set that is for another kind of file.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    defaults : dict
+        Default values of the options that are not allowed.
+    file_kind : str
+        The files that they are for.
+    """
+    for name, default in defaults.items():
+        if getattr(options, name) != default:
+            option = "FIELD" if name == "field" else "--" + name.replace("_", "-")
+            raise RosyError(f"{options.mesh or 'the open file'}: {option} is for {file_kind}")

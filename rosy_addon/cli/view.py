@@ -1,0 +1,47 @@
+"""Options of the view of a mesh file: direction, upward axis, size of the picture."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..projection.camera import check_size
+from ..render.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from .options import float_tuple, parse_size
+
+#: Azimuth and elevation in degrees: from the front left, looking slightly down.
+DEFAULT_VIEW = (-25.0, 20.0)
+
+#: Pixels: width and height of pictures, and of the pictures of a turntable.
+DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
+
+
+def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
+    """Add the options of the view. `size` is the default of --size."""
+    parser.add_argument(
+        "--view",
+        type=float_tuple(2, "AZ,EL"),
+        default=DEFAULT_VIEW,
+        metavar="AZ,EL",
+        help="view angles in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from above",
+    )
+    parser.add_argument(
+        "--up",
+        choices=list(UP_AXIS_MATRIX),
+        help="the axis of the file that points up; by default y for .obj and .off, otherwise z",
+    )
+    parser.add_argument(
+        "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
+    )
+    parser.add_argument(
+        "--ortho", action="store_true", help="orthographic projection instead of perspective"
+    )
+
+
+def requested_size(options: argparse.Namespace) -> tuple[int, int]:
+    """Return the size of the picture in pixels."""
+    return check_size(*(options.size or DEFAULT_SIZE))
+
+
+def up_axis(options: argparse.Namespace) -> str:
+    """Return the upward axis of the mesh file, "y" or "z"."""
+    return options.up or UP_AXIS_BY_SUFFIX[options.mesh.suffix.lower()]

@@ -1,0 +1,81 @@
+"""Color conversion: sRGB display values, linear light, luminance, hex codes and color maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+# Evenly spaced samples of each color map, as sRGB hex codes. Viridis and magma are by Nathaniel
+# Smith and Stefan van der Walt, from matplotlib, dedicated to the public domain (CC0).
+_COLOR_MAPS = {
+    "viridis": "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c 1fa088 28ae80 "
+    "3fbc73 5ec962 84d44b addc30 d8e219 fde725",
+    "magma": "000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 d0416f e75263 "
+    "f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf",
+    "grey": "111111 ffffff",
+}
+
+#: Luminance weights of linear red, green and blue (Rec. 709). Their sum is 1.
+REC709_LUMINANCE = (0.2126, 0.7152, 0.0722)
+LUMINANCE_WEIGHTS = np.array(REC709_LUMINANCE, dtype=np.float32)
+
+
+def map_colors(values: np.ndarray, name: str) -> np.ndarray:
+    """Map values from 0 to 1 to colors of a color map.
+
+    Parameters
+    ----------
+    values : (P,) ndarray
+        Clamped to 0 to 1.
+    name : {"viridis", "magma", "grey"}
+
+    Returns
+    -------
+    (P, 3) float32 ndarray
+        Display values (sRGB), 0 to 1.
+    """
+    stops = color_stops(name)
+    positions = np.linspace(0, 1, len(stops))
+    channels = [np.interp(values, positions, stops[:, channel]) for channel in range(3)]
+    return np.stack(channels, axis=1).astype(np.float32)
+
+
+def color_stops(name: str) -> np.ndarray:
+    """Return the (n, 3) float64 display values of a color map at evenly spaced values from 0 to 1.
+
+    Between them the map is linear.
+    """
+    return np.array([list(bytes.fromhex(code)) for code in _COLOR_MAPS[name].split()]) / 255
+
+
+def from_hex(code: str) -> np.ndarray:
+    """Return the (3,) float32 display values of a color ``#rrggbb``."""
+    return np.array(list(bytes.fromhex(code[1:])), dtype=np.float32) / 255
+
+
+def to_hex(display: Sequence[float]) -> str:
+    """Return the code ``#rrggbb`` of three display values, clamped to 0 to 1."""
+    return "#" + bytes(round(255 * min(max(value, 0), 1)) for value in display).hex()
+
+
+def to_linear(display: np.ndarray) -> np.ndarray:
+    """Convert sRGB display values, clipped to 0 to 1, to linear light (IEC 61966-2-1), float32."""
+    display = np.clip(display, 0, 1).astype(np.float32, copy=False)
+    curve = ((display + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    return np.where(display <= 0.04045, display / np.float32(12.92), curve)
+
+
+def to_display(linear: np.ndarray) -> np.ndarray:
+    """Convert linear light, clipped to 0 to 1, to sRGB display values (IEC 61966-2-1), float32."""
+    linear = np.clip(linear, 0, 1).astype(np.float32, copy=False)
+    curve = np.float32(1.055) * linear ** np.float32(1 / 2.4) - np.float32(0.055)
+    return np.where(linear <= 0.0031308, linear * np.float32(12.92), curve)
+
+
+def luminance(rgba: np.ndarray) -> np.ndarray:
+    """Return the (H, W) luminance of a linear (H, W, 4) picture over a white background.
+
+    Alpha is straight, not premultiplied.
+    """
+    return rgba[..., 3] * (rgba[..., :3] @ LUMINANCE_WEIGHTS - 1) + 1

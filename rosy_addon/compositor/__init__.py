@@ -1,0 +1,1 @@
+"""From G-buffer to picture: line integral convolution, hatching, color, light; numpy only."""

@@ -1,0 +1,107 @@
+"""Brute-force LIC: at each step, a streamline follows the best match among the N members.
+
+This is the reference that the paper compares its method with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Task
+from .lic_images import LicImages, LineTracer, convolve_members_task
+from .look import Look
+from .per_pixel_lic import DirectionSampler, direction_table, interpolate_direction
+from .pixel_field import PixelField, all_members
+
+
+def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+    """Compute one LIC image for each of the M lines.
+
+    There are no breaking points and no second set of images, but every step of every streamline
+    compares all N members.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray
+
+    Returns
+    -------
+    LicImages
+    """
+    member_directions = np.zeros((len(field.pixel) + 1, field.degree), dtype=np.complex64)
+    direction_tables = np.zeros((len(field.pixel) + 1, field.degree, 4), dtype=np.float32)
+    for index, member in enumerate(all_members(field, look.guiding_angle)):
+        member_directions[:-1, index] = member
+        screen_direction = field.to_screen(field.member_direction(member), look.foreshorten)
+        direction_tables[:, index] = direction_table(field, screen_direction, member)
+    tracers = [
+        _best_match_tracer(member_directions, direction_tables, member)
+        for member in range(field.line_count)
+    ]
+    return (yield from convolve_members_task(field, look, noise, tracers))
+
+
+def _best_match_tracer(
+    member_directions: np.ndarray, direction_tables: np.ndarray, member: int
+) -> LineTracer:
+    """Make a tracer that starts along one member and then follows the best match.
+
+    Parameters
+    ----------
+    member_directions : (P + 1, N) complex64 ndarray
+        Members in the view plane, where they are matched. Row P is 0.
+    direction_tables : (P + 1, N, 4) float32 ndarray
+        A `direction_table` of each member, on screen.
+    member : int
+    """
+
+    def trace(block: slice) -> tuple[DirectionSampler, DirectionSampler]:
+        start = member_directions[block, member]
+        return _best_match_sampler(
+            member_directions, direction_tables, start, 1
+        ), _best_match_sampler(member_directions, direction_tables, start, -1)
+
+    return trace
+
+
+def _best_match_sampler(
+    member_directions: np.ndarray, direction_tables: np.ndarray, start: np.ndarray, sign: int
+) -> DirectionSampler:
+    """Make a sampler that stores the current member of each streamline between calls.
+
+    Parameters
+    ----------
+    member_directions, direction_tables
+        As for `_best_match_tracer`.
+    start : (B,) complex64 ndarray
+        Members at the seeds, in the view plane.
+    sign : {1, -1}
+        Whether to trace forward or backward.
+    """
+    degree = member_directions.shape[1]
+    flat_members, flat_tables = member_directions.reshape(-1), direction_tables.reshape(-1, 4)
+    heading = start
+
+    def direction_at(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        nonlocal heading
+        candidates = member_directions.take(entry, axis=0)
+        # The maximum is taken member by member. numpy is slow at reducing many short rows.
+        x, y = heading.real.copy(), heading.imag.copy()
+        best_match = np.full(len(entry), -np.inf, dtype=np.float32)
+        best_index = np.zeros(len(entry), dtype=np.int32)
+        for index in range(degree):
+            match = candidates[:, index].real * x
+            match += candidates[:, index].imag * y
+            closer = match > best_match
+            np.maximum(match, best_match, out=best_match)
+            np.copyto(best_index, np.int32(index), where=closer)
+        best_entry = entry * degree + best_index
+        heading = flat_members.take(best_entry)
+        return np.float32(sign) * interpolate_direction(
+            flat_tables.take(best_entry, axis=0), offset
+        )
+
+    return direction_at

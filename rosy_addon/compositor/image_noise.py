@@ -1,0 +1,294 @@
+"""Image-space noise from an integer hash, and the variance of its mean along a streamline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+#: Mean and standard deviation of binary noise.
+NOISE_MEAN, NOISE_STD = 0.5, 0.5
+
+#: Rotation of the lattice of noise cells against the pixels, radians. It avoids moire patterns.
+LATTICE_ANGLE = 0.5
+
+#: Standard deviation of the blur that the high pass subtracts, as a fraction of `Look.high_pass`.
+BLUR_FACTOR = 0.5
+
+#: Noise is computed for whole tiles of the picture. Side of a tile in pixels.
+TILE_PIXELS = 256
+
+#: Maximum number of pixels of a noise image that is cached for the next picture.
+MAX_CACHED_PIXELS = 1 << 22
+
+#: Sample points along each side of a pixel. Noise is averaged over their square grid.
+TAPS_PER_SIDE = 3
+
+
+def hash_bits_2d(
+    x: np.ndarray, y: np.ndarray, seed: int, channel: int, density: float
+) -> np.ndarray:
+    """Hash the cells of an integer lattice to random bits.
+
+    Parameters
+    ----------
+    x, y : int ndarray
+        Cell indices.
+    seed, channel : int
+    density : float
+        Fraction of cells whose bit is set, to the nearest 2 ** -24.
+
+    Returns
+    -------
+    bool ndarray
+
+    References
+    ----------
+    The finalizer is `lowbias32` of Chris Wellons, "Prospecting for Hash Functions", 2018 (public
+    domain).
+    """
+    return hash_bits_nd((x, y), seed, channel, density)
+
+
+#: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
+HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
+SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
+FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
+
+
+def hash_bits_nd(
+    cell_index: Sequence[np.ndarray], seed: int, channel: int, density: float
+) -> np.ndarray:
+    """Hash cells with up to five indices to random bits; see `hash_bits_2d`."""
+    start = (seed * SEED_FACTOR + channel * CHANNEL_FACTOR) & 0xFFFFFFFF
+    h = cell_index[0].astype(np.uint32) * np.uint32(HASH_FACTORS[0])
+    for component, factor in zip(cell_index[1:], HASH_FACTORS[1:], strict=False):
+        h = h ^ component.astype(np.uint32) * np.uint32(factor)
+    h += np.uint32(start)
+    h ^= h >> np.uint32(16)
+    h *= np.uint32(FINALIZER_FACTORS[0])
+    h ^= h >> np.uint32(15)
+    h *= np.uint32(FINALIZER_FACTORS[1])
+    return h >> np.uint32(8) < np.uint32(round(density * 2**24))
+
+
+def image_noise(
+    pixel: np.ndarray,
+    width: int,
+    grain: float,
+    seed: int,
+    channels: int,
+    *,
+    density: float = 0.5,
+    high_pass: float = 0.0,
+) -> np.ndarray:
+    """Make noise that is anchored to the picture: random binary square cells, filtered to pixels.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixel indices, ascending.
+    width : int
+        Width of the frame in pixels.
+    grain : float
+        Side of a cell in pixels.
+    seed : int
+    channels : int
+        Number of independent channels.
+    density : float
+        Fraction of cells that are bright.
+    high_pass : float
+        Variations wider than about this many pixels are removed. 0 leaves the noise white.
+
+    Returns
+    -------
+    (P, channels) float32 ndarray
+        The mean is `NOISE_MEAN`. The standard deviation of cells, before they are filtered, is
+        `NOISE_STD`. With the density 0.5 and without a high pass, values are from 0 to 1.
+    """
+    row, column = np.divmod(pixel, np.int32(width))
+    # Whole tiles do not change while the visible region changes a little, so they stay cached.
+    left, right = tile_bounds(int(column.min()), int(column.max()) + 1)
+    bottom, top = tile_bounds(int(row[0]), int(row[-1]) + 1)
+    make = (
+        _noise_tiles
+        if (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
+        else _noise_tiles.__wrapped__
+    )
+    tile_index = (row - bottom) * np.int32(right - left) + (column - left)
+    noise = np.empty((channels, len(pixel)), dtype=np.float32)
+    for channel in range(channels):
+        tiles = make(left, right, bottom, top, grain, seed, channel, density, high_pass)
+        tiles.take(tile_index, out=noise[channel], mode="clip")
+    return np.ascontiguousarray(noise.T)
+
+
+def tile_bounds(start: int, stop: int) -> tuple[int, int]:
+    """Round a range of rows or columns outward to whole tiles."""
+    return start // TILE_PIXELS * TILE_PIXELS, -(-stop // TILE_PIXELS) * TILE_PIXELS
+
+
+@lru_cache(maxsize=6)
+def _noise_tiles(
+    left: int,
+    right: int,
+    bottom: int,
+    top: int,
+    grain: float,
+    seed: int,
+    channel: int,
+    density: float,
+    high_pass: float,
+) -> np.ndarray:
+    """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
+    margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
+    padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
+    cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
+    if high_pass:
+        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass)
+        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
+    return np.ascontiguousarray(cells).reshape(-1)
+
+
+def _lattice_noise(
+    left: int,
+    right: int,
+    bottom: int,
+    top: int,
+    grain: float,
+    seed: int,
+    channel: int,
+    density: float,
+) -> np.ndarray:
+    """(top - bottom, right - left) float32 noise without high pass, averaged over each pixel."""
+    cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
+    column = np.arange(left, right, dtype=np.float64)
+    row = np.arange(bottom, top, dtype=np.float64)[:, None]
+    taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
+    total = np.zeros((top - bottom, right - left), dtype=np.float32)
+    for y in taps:
+        for x in taps:
+            px, py = column + x, row + y
+            cell_x = np.floor(cos * px - sin * py).astype(np.int32)
+            cell_y = np.floor(sin * px + cos * py).astype(np.int32)
+            total += hash_bits_2d(cell_x, cell_y, seed, channel, density)
+    scale = NOISE_STD / np.sqrt(density * (1 - density))
+    return (
+        np.float32(NOISE_MEAN - density * scale)
+        + np.float32(scale / (TAPS_PER_SIDE * TAPS_PER_SIDE)) * total
+    )
+
+
+def box_radius(sigma: float) -> int:
+    """Radius in pixels of each of the three box filters of `gaussian_blur`."""
+    # A box filter of the width w has the variance (w^2 - 1) / 12.
+    return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
+
+
+def gaussian_blur(image: np.ndarray, sigma: float) -> np.ndarray:
+    """Approximate a Gaussian blur by three box filters.
+
+    Parameters
+    ----------
+    image : (H, W) ndarray
+        Its border pixels are repeated outside.
+    sigma : float
+        Standard deviation in pixels.
+
+    Returns
+    -------
+    (H, W) float32 ndarray
+    """
+    radius = box_radius(sigma)
+    for axis in (0, 1, 0, 1, 0, 1):
+        image = _box_filter(image, radius, axis)
+    return image
+
+
+def _box_filter(image: np.ndarray, radius: int, axis: int) -> np.ndarray:
+    """Mean over 2 * radius + 1 pixels along an axis. Border pixels are repeated outside."""
+    pads = [(0, 0), (0, 0)]
+    pads[axis] = (radius + 1, radius)
+    prefix_sum = np.cumsum(np.pad(image, pads, mode="edge"), axis=axis, dtype=np.float64)
+    size, window = image.shape[axis], 2 * radius + 1
+    after = prefix_sum.take(range(window, window + size), axis=axis)
+    before = prefix_sum.take(range(size), axis=axis)
+    return ((after - before) / window).astype(np.float32)
+
+
+@lru_cache(maxsize=64)
+def streak_moments(
+    length: float,
+    grain: float,
+    high_pass: float,
+    images: int = 1,
+    average: int = 1,
+    tapered: bool = False,
+) -> tuple[float, float]:
+    """Compute the standard deviation and correlation of noise averaged along straight streamlines.
+
+    The values are integrals over the power spectrum of the noise; nothing is sampled at random.
+
+    Parameters
+    ----------
+    length : float
+        Length of the streamlines in pixels.
+    grain, high_pass : float
+        Of the noise, in pixels.
+    images : int
+        M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
+    average : int
+        Side in pixels of the squares that are averaged when the picture is downsampled.
+    tapered : bool
+        Whether the weights of samples fall toward the ends (see `filter_kernel`).
+
+    Returns
+    -------
+    std : float
+        Standard deviation of the mean along one streamline.
+    correlation_sum : float
+        Sum of the correlations of one of the M means with each of the others. They are correlated
+        because the streamlines share the noise around the pixel where they cross.
+
+    Notes
+    -----
+    Let S(k) be the power spectrum of the noise. The covariance of the means along two lines of
+    length l through a point, in the directions u and v, is the integral of
+    S(k) sinc(l k.u) sinc(l k.v). For a lattice of bits with cells of side g, averaged over pixels,
+    minus a Gaussian blur with the standard deviation s, S is
+    g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
+    Here it is averaged over all directions, and the integral is taken in polar coordinates. Tapered
+    weights are a box filter of half the length applied twice: sinc(l k.u) becomes
+    sinc(l k.u / 2)^2.
+    """
+    k, dk = np.linspace(0, 4 / (1 + grain), 700, retstep=True)
+    angle = np.arange(1440) * np.pi / 1440
+    kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
+    cx, cy = (
+        np.cos(LATTICE_ANGLE) * kx - np.sin(LATTICE_ANGLE) * ky,
+        np.sin(LATTICE_ANGLE) * kx + np.cos(LATTICE_ANGLE) * ky,
+    )
+    amplitude = np.sinc(grain * cx) * np.sinc(grain * cy) * np.sinc(kx) * np.sinc(ky)
+    if average > 1:
+        amplitude *= np.sinc(average * kx) * np.sinc(average * ky)
+    power = (grain * NOISE_STD * amplitude) ** 2
+    high_pass_gain = (
+        1 - np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 1.0
+    )
+    weight = power.mean(axis=1) * high_pass_gain**2 * k * dk * (2 * np.pi / len(angle))
+    response = _line_response(length * kx, tapered)
+    variance = weight @ np.sum(response * response, axis=1)
+    correlation_sum = 0.0
+    for line in range(1, images):
+        line_angle = np.pi * line / images
+        projected = np.cos(line_angle) * kx + np.sin(line_angle) * ky
+        correlation_sum += weight @ np.sum(
+            response * _line_response(length * projected, tapered), axis=1
+        )
+    return float(np.sqrt(variance)), float(correlation_sum / variance)
+
+
+def _line_response(cycles: np.ndarray, tapered: bool) -> np.ndarray:
+    """Frequency response of the mean along a line, given the cycles of a wave along it."""
+    return np.sinc(cycles / 2) ** 2 if tapered else np.sinc(cycles)

@@ -1,0 +1,62 @@
+"""Choice of the LIC method by the settings of a look, and the noise that is convolved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..memory import raise_mmap_threshold
+from ..progress import Task
+from .brute_force import brute_force_task
+from .fast_lic import fast_lic_task
+from .image_noise import image_noise
+from .lic_images import LicImages
+from .look import Look
+from .member_decomposition import member_decomposition_task
+from .pixel_field import PixelField
+
+#: LIC methods by the value of `Look.method`.
+METHODS: dict[str, Callable[[PixelField, Look, np.ndarray], Task[LicImages]]] = {
+    "members": member_decomposition_task,
+    "brute": brute_force_task,
+    "sheets": fast_lic_task,
+}
+
+
+def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> Task[LicImages]:
+    """Average noise along the streamlines of each member, with the method of the look.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray, optional
+        By default `look_noise(field, look)`.
+
+    Returns
+    -------
+    LicImages
+    """
+    raise_mmap_threshold()
+    if noise is None:
+        noise = look_noise(field, look)
+    return (yield from METHODS[look.method](field, look, noise))
+
+
+def look_noise(field: PixelField, look: Look) -> np.ndarray:
+    """(P, K) float32 image-space noise of a look at the pixels of a field."""
+    return image_noise(field.pixel, field.width, **noise_args(look))
+
+
+def noise_args(look: Look) -> dict[str, Any]:
+    """Return the noise settings of a look as parameters of `image_noise` and `surface_noise`."""
+    return {
+        "grain": look.grain,
+        "seed": look.seed,
+        "channels": 3 if look.noise == "colour" else 1,
+        "density": look.density,
+        "high_pass": look.high_pass,
+    }

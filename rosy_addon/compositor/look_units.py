@@ -1,0 +1,139 @@
+"""Conversion of the lengths of a look to pixels of the frame that is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.shadow_maps import world_bounds
+from ..settings import Number, pixel_lengths, settings_of
+from .look import Look
+
+#: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a
+#: look can be reused while the camera moves.
+STEPS_PER_OCTAVE = 32
+
+#: Minimum distance from the camera to the center of the meshes, as a fraction of their size. It
+#: applies when the camera is among them.
+MIN_DISTANCE_FACTOR = 0.25
+
+
+@dataclass(frozen=True)
+class SupersampledLook(Look):
+    """A look with lengths in pixels of a supersampled frame, which may be out of range."""
+
+    def __post_init__(self) -> None:
+        """Check nothing: the original look was checked."""
+
+
+def supersampled_look(look: Look) -> SupersampledLook:
+    """Return the look with its lengths in pixels of the supersampled frame."""
+    settings = {name: getattr(look, name) for name in settings_of(Look)}
+    for setting in pixel_lengths(Look):
+        settings[setting.name] *= look.supersampling
+    settings["unit_size"] /= look.supersampling
+    return SupersampledLook(**settings)
+
+
+def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> Look:
+    """Return the look with its lengths converted from Blender units to pixels.
+
+    The scale is that of a pixel at the center of the meshes. A look whose unit is "pixels" is
+    returned unchanged.
+
+    Parameters
+    ----------
+    look : Look
+    camera : Camera
+        Its resolution is that of the picture times `look.supersampling`, in both directions.
+    instances : sequence of MeshInstance
+        All meshes in the scene. Only those with a field affect the scale.
+
+    Returns
+    -------
+    Look
+        Its `unit_size` is the size of a pixel at that center, in Blender units.
+    """
+    body_bounds = [world_bounds(instance) for instance in instances if instance.field is not None]
+    if look.unit == "pixels" or not body_bounds:
+        return look
+    exact_scale = look.unit_size / (
+        pixel_world_size(np.concatenate(body_bounds), camera) * look.supersampling
+    )
+    scale = float(
+        np.clip(
+            2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE),
+            *_scale_limits(look),
+        )
+    )
+    lengths = {
+        setting.name: _scaled_length(look, setting, scale) for setting in pixel_lengths(Look)
+    }
+    return replace(look, **lengths, unit_size=look.unit_size / scale)
+
+
+def preview_look(look: Look, downscale: int) -> Look:
+    """Return the look for a preview with fewer pixels, in which streaks appear in the same size.
+
+    Parameters
+    ----------
+    look : Look
+    downscale : int
+        Pixels of the view along each side of a pixel of the preview.
+    """
+    settings: dict[str, Any] = {"supersampling": 1}
+    if look.unit == "pixels":
+        for setting in pixel_lengths(Look):
+            value = getattr(look, setting.name)
+            value = value // downscale if setting.is_integer else value / downscale
+            settings[setting.name] = max(value, setting.low, setting.preview_low)
+    return replace(look, **settings)
+
+
+def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
+    """Return the width of a pixel, in Blender units, at the center of (n, 3) points in world space.
+
+    The center is that of their bounding box.
+    """
+    if not camera.is_perspective:
+        return 1 / camera.pixels_per_unit
+    low, high = points.min(axis=0), points.max(axis=0)
+    depth = -(camera.view[2, :3] @ (low + high) / 2 + camera.view[2, 3])
+    min_depth = max(MIN_DISTANCE_FACTOR * float(np.linalg.norm(high - low)), 1e-6)
+    return max(float(depth), min_depth) / camera.pixels_per_unit
+
+
+def cell_size_args(look: Look) -> dict[str, Any]:
+    """Return the parameters of `surface_noise` for the size of noise cells on the surface.
+
+    Parameters
+    ----------
+    look : Look
+        In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
+    """
+    if look.unit == "pixels":
+        return {"pixel": 0.0, "smallest": 0.0}
+    return {"pixel": look.unit_size, "smallest": float(look.supersampling)}
+
+
+def _scale_limits(look: Look) -> tuple[float, float]:
+    """Return the minimum and maximum factors by which the lengths of a look can be multiplied.
+
+    The maximum keeps all lengths within their ranges. The minimum keeps noise cells at least as
+    large as a pixel, as smaller ones are not visible.
+    """
+    max_scale = min(
+        setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
+    )
+    min_scale = max(1.0, settings_of(Look)["grain"].low) / look.grain
+    return min(min_scale, 1.0), max(max_scale, 1.0)
+
+
+def _scaled_length(look: Look, setting: Number, scale: float) -> float:
+    value = getattr(look, setting.name) * scale
+    return max(round(value), 1) if setting.is_integer else value

@@ -1,0 +1,105 @@
+"""The method of the paper: decompose the field into member vector fields, with an LIC image each.
+
+Palacios and Zhang, "Interactive Visualization of Rotational Symmetry Fields on Surfaces", IEEE
+TVCG 17(7), 2011, section 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Task, subtask
+from .lic_images import LicImages, LineTracer, convolve_members_task
+from .look import Look
+from .per_pixel_lic import direction_table, interpolate_direction
+from .pixel_field import PixelField, all_members, blend_weights
+
+
+def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+    """Compute two sets of member images, and blend them.
+
+    The first set follows V_i, the member nearest to the guiding angle phi + 2 pi i / N. Where two
+    members are equally near, V_i jumps. These breaking points are the same for all i. The second
+    set follows V'_i, the member nearest to phi + (2 i + 1) pi / N, which has other breaking points.
+    The blend shows each set away from its breaking points. A field of degree 1 has no second set.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray
+
+    Returns
+    -------
+    LicImages
+    """
+    angle = look.guiding_angle
+    first_task = convolve_members_task(field, look, noise, _tracers(field, look, angle))
+    if field.degree == 1 or look.weights == "none":
+        return (yield from first_task)
+    second_task = convolve_members_task(
+        field, look, noise, _tracers(field, look, angle + np.pi / field.degree)
+    )
+    first_images = yield from subtask(first_task, 0.0, 0.5)
+    second_images = yield from subtask(second_task, 0.5, 1.0)
+    return first_images.blended_with(second_images, _first_set_weight(field, look))
+
+
+def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
+    """(P,) float32 weight of the first set in the blend."""
+    if look.view_plane:
+        weight = blend_weights(field, look.guiding_angle)
+    else:
+        member = _screen_space_members(field, look.guiding_angle)[0]
+        angle_offset = np.angle(member * np.exp(-1j * look.guiding_angle))
+        weight = (0.5 + 0.5 * np.cos(field.degree * angle_offset)).astype(np.float32)
+    return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
+
+
+def _tracers(field: PixelField, look: Look, angle: float) -> list[LineTracer]:
+    """Make tracers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
+    if not look.view_plane:
+        screen_members = _screen_space_members(field, angle)
+        return [
+            _direction_tracer(direction_table(field, direction, direction))
+            for direction in screen_members
+        ]
+    members = all_members(field, angle)[: field.line_count]
+    directions = [
+        field.to_screen(field.member_direction(member), look.foreshorten) for member in members
+    ]
+    return [
+        _direction_tracer(direction_table(field, direction, member))
+        for direction, member in zip(directions, members, strict=True)
+    ]
+
+
+def _direction_tracer(table: np.ndarray) -> LineTracer:
+    """Make a tracer along one vector field on screen, given its `direction_table`."""
+
+    def forward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        return interpolate_direction(table.take(entry, axis=0), offset)
+
+    def backward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        return -forward(entry, offset)
+
+    return lambda block: (forward, backward)
+
+
+def _screen_space_members(field: PixelField, angle: float) -> list[np.ndarray]:
+    """M times (P,) complex64 directions, chosen among the members after projection to the screen.
+
+    This reproduces the error in Figure 8 of the paper. On a tilted surface the angles between
+    projected members are not 2 pi / N. The two sets of breaking points then come close to each
+    other, and the weights do not match them.
+    """
+    members = np.stack(
+        [field.to_screen(field.member_direction(member)) for member in all_members(field, 0.0)]
+    )
+    screen_members = []
+    for member in range(field.line_count):
+        rotation = np.exp(-1j * (angle + 2 * np.pi * member / field.degree))
+        best_index = np.argmax((members * rotation).real, axis=0)
+        screen_members.append(np.take_along_axis(members, best_index[None], axis=0)[0])
+    return screen_members

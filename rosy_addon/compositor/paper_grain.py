@@ -1,0 +1,162 @@
+"""Paper grain: band-pass noise that breaks up the ink as the texture of rough paper does.
+
+The grain is anchored like the streaks: to the picture, or to the surfaces. In an animation, grain
+that stays in place while the surfaces move would look like a dirty window (the "shower door"
+effect).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .image_noise import box_radius, gaussian_blur, hash_bits_2d, tile_bounds
+from .look import Look
+
+#: Standard deviation of the finest of the blurs between which the frequency bands lie, in grains,
+#: and its minimum in pixels.
+FINEST_SIGMA_GRAINS, MIN_SIGMA_PIXELS = 0.16, 0.7
+
+#: Combined with the seed of a look, so that the paper grain is independent of the streaks.
+SEED_SALT = 0x5EED
+
+#: Amplitudes of the frequency bands, one octave each, from fine to coarse.
+BAND_WEIGHTS = (1.0, 0.6, 0.4)
+
+#: Standard deviation of the paper grain added to the streaks at `Look.paper_grain` 1, in standard
+#: deviations of the streaks.
+PAPER_GRAIN_STRENGTH = 1.2
+
+#: Noise cells of the grain that is anchored to surfaces: size in grains of the streaks, minimum
+#: size in pixels of the picture, and width of the high pass in cells.
+SURFACE_CELL_GRAINS, MIN_SURFACE_CELL_PIXELS, HIGH_PASS_CELLS = 0.4, 1.5, 6.0
+
+#: Number of independent noise channels on surfaces. Lines use them in turn.
+PAPER_GRAIN_CHANNELS = 3
+
+#: Maximum number of pixels of a grain image that is cached for the next picture.
+MAX_CACHED_PIXELS = 1 << 22
+
+
+def picture_paper_grain(
+    pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
+) -> np.ndarray:
+    """Make paper grain that is anchored to the picture.
+
+    The grain of different lines must be independent. Otherwise the coverages of crossing lines
+    would be correlated, and the tone would be too light. So each line uses the same noise at a
+    different horizontal offset.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixel indices into a supersampled frame, ascending.
+    width : int
+        Width of that frame in pixels.
+    grain : float
+        Size of the noise cells of the streaks, in pixels of the picture. The paper grain scales
+        with it.
+    seed : int
+    subpixels : int
+        Subpixels along each side of a pixel. All subpixels of a pixel have the same height.
+    line_count : int
+
+    Returns
+    -------
+    (line_count, P) float32 ndarray
+        Heights with mean 0 and standard deviation 1. Ink adheres better where they are larger.
+    """
+    row, column = np.divmod(pixel, np.int32(width))
+    row, column = row // subpixels, column // subpixels
+    offset = line_offset(grain)
+    left, right = tile_bounds(int(column.min()), int(column.max()) + 1 + (line_count - 1) * offset)
+    bottom, top = tile_bounds(int(row[0]), int(row[-1]) + 1)
+    make = (
+        _grain_tiles
+        if (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
+        else _grain_tiles.__wrapped__
+    )
+    tiles = make(left, right, bottom, top, grain, seed)
+    tile_index = (row - bottom) * np.int32(right - left) + (column - left)
+    return np.stack([tiles.take(tile_index + line * offset) for line in range(line_count)])
+
+
+def surface_paper_grain_args(look: Look) -> dict[str, Any]:
+    """Return the parameters of `surface_noise` for paper grain that is anchored to surfaces.
+
+    The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
+    `StreakStatistics.paper_grain_std`.
+
+    Parameters
+    ----------
+    look : Look
+        In pixels of the frame.
+    """
+    grain = max(SURFACE_CELL_GRAINS * look.grain, MIN_SURFACE_CELL_PIXELS * look.supersampling)
+    return {
+        "grain": grain,
+        "seed": look.seed ^ SEED_SALT,
+        "channels": PAPER_GRAIN_CHANNELS,
+        "density": 0.5,
+        "high_pass": HIGH_PASS_CELLS * grain,
+    }
+
+
+def line_offset(grain: float) -> int:
+    """Pixels between the grain of successive lines, enough for it to be uncorrelated."""
+    return int(np.ceil(3 * _band_sigmas(grain)[-1]))
+
+
+def _band_sigmas(grain: float) -> list[float]:
+    """Standard deviations in pixels of the blurs between which the frequency bands lie."""
+    finest_sigma = max(FINEST_SIGMA_GRAINS * grain, MIN_SIGMA_PIXELS)
+    return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
+
+
+@lru_cache(maxsize=2)
+def _grain_tiles(
+    left: int, right: int, bottom: int, top: int, grain: float, seed: int
+) -> np.ndarray:
+    """Flat float32 heights in a rectangle of the picture, row by row."""
+    sigmas = _band_sigmas(grain)
+    margin = 4 * box_radius(sigmas[-1])
+    column = np.arange(left - margin, right + margin, dtype=np.int32)
+    row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
+    white = hash_bits_2d(column, row, seed ^ SEED_SALT, 0, 0.5).astype(np.float32) - np.float32(0.5)
+    heights = _band_noise(white, sigmas)[margin:-margin, margin:-margin]
+    return np.ascontiguousarray(heights / np.float32(_band_noise_std(*sigmas))).reshape(-1)
+
+
+def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
+    """Weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
+    total = np.zeros_like(white)
+    finer = _blur(white, sigmas[0])
+    for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
+        broader = _blur(white, broader_sigma)
+        # The standard deviation of blurred white noise is proportional to 1 / sigma.
+        total += np.float32(weight * finer_sigma / sigmas[0]) * (finer - broader)
+        finer = broader
+    return total
+
+
+def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
+    """Approximate a Gaussian blur, including small ones that `gaussian_blur` does not support."""
+    if sigma > 1.5:
+        return gaussian_blur(image, sigma)
+    for axis in (0, 1) * max(round(2 * sigma**2), 1):
+        # The kernel (1, 2, 1) / 4 has the variance 1 / 2.
+        forward, backward = (np.roll(image, shift, axis=axis) for shift in (1, -1))
+        image = np.float32(0.5) * image + np.float32(0.25) * (forward + backward)
+    return image
+
+
+@lru_cache(maxsize=16)
+def _band_noise_std(*sigmas: float) -> float:
+    """Standard deviation of `_band_noise` of binary noise, from its impulse response."""
+    radius = 4 * box_radius(sigmas[-1])
+    impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
+    impulse[radius, radius] = 1
+    return float(np.linalg.norm(_band_noise(impulse, sigmas)) / 2)

@@ -1,0 +1,332 @@
+"""`PixelField`: the field at a list of pixels, and the neighbors that streamlines may step to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from functools import cached_property
+
+import numpy as np
+
+from ..deterministic_trig import unit_phasor
+from ..field.directional_field import evaluate_harmonics
+from ..field.rosy_field import check_degree
+from ..field.symmetry import FieldSymmetry
+from ..projection.corner_field import FieldChannel
+from ..projection.gbuffer import GBuffer
+from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
+
+#: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
+NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class PixelField:
+    """A field of one degree on a list of P pixels. It does not refer to meshes.
+
+    Attributes
+    ----------
+    degree : int
+    width, height : int
+        Of the frame, in pixels.
+    pixel : (P,) int32 ndarray
+        Flat indices into the frame, ascending, from the lower left.
+    representation : (P,) complex64 ndarray
+        z = rho exp(i N t), where t is the angle of a member in the view plane. 0 is undefined.
+    screen_jacobian : (P, 2) complex64 ndarray or None
+        The axes of the frame of the view plane, projected to the screen along the surface. Pixels,
+        x + i y. None in the plane, where they are 1 and i.
+    neighbor_mask : (P,) uint16 ndarray
+        Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
+        set where the field is undefined.
+    channels : dict of FieldChannel to (P,) complex64 ndarray
+        Further channels of the field, in the view plane: the harmonics by which its directions
+        deviate from the RoSy, and the representation of the line of the stored member.
+    gbuffer_index : slice or (P,) intp ndarray
+        Indices of the pixels in the arrays of the G-buffer that they were taken from. A slice if
+        all were taken.
+    """
+
+    degree: int
+    width: int
+    height: int
+    pixel: np.ndarray
+    representation: np.ndarray
+    screen_jacobian: np.ndarray | None
+    neighbor_mask: np.ndarray
+    channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
+    gbuffer_index: slice | np.ndarray = dataclass_field(default_factory=lambda: slice(None))
+
+    @cached_property
+    def harmonics(self) -> list[tuple[int, np.ndarray]]:
+        """Pairs of j and (P,) complex64 C_j (see `field.directional_field`). Empty for a RoSy."""
+        return [
+            (number, values)
+            for (kind, number), values in self.channels.items()
+            if kind == "deviation"
+        ]
+
+    @cached_property
+    def symmetry(self) -> FieldSymmetry:
+        """Which directions share a line."""
+        return FieldSymmetry(self.degree, tuple(j for j, _ in self.harmonics))
+
+    @property
+    def line_count(self) -> int:
+        """M, the number of lines through a pixel. It is also the number of member images."""
+        return self.symmetry.line_count
+
+    @property
+    def family_count(self) -> int:
+        """Number of families of lines. 1 if the field does not distinguish its lines."""
+        return next((number for kind, number in self.channels if kind == "family"), 1)
+
+    def member_direction(self, member: np.ndarray) -> np.ndarray:
+        """Compute the directions of the field that belong to members of the RoSy.
+
+        Parameters
+        ----------
+        member : (P,) complex ndarray
+            Unit vectors in the frame of the view plane.
+
+        Returns
+        -------
+        (P,) complex ndarray
+            Unit vectors in the same frame. For a RoSy, the members themselves.
+        """
+        if not self.harmonics:
+            return member
+        member = member.astype(np.complex128)
+        return normalized(member * evaluate_harmonics(self.harmonics, member))
+
+    @cached_property
+    def neighbors(self) -> np.ndarray:
+        """(9, P + 1) int32 entries of the list after a step to each of `NEIGHBOR_OFFSETS`.
+
+        The entry is P where streamlines end, and in column P. There is one row per offset, because
+        a streamline mostly steps in one direction and then reads adjacent entries.
+        """
+        count = len(self.pixel)
+        entry = np.full(self.height * self.width, count, dtype=np.int32)
+        entry[self.pixel] = np.arange(count, dtype=np.int32)
+        table = np.full((9, count + 1), count, dtype=np.int32)
+        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
+            linked = np.flatnonzero(self.neighbor_mask >> bit & 1)
+            table[bit, linked] = entry[self.pixel[linked] + (dy * self.width + dx)]
+        return table
+
+    def to_screen(self, member: np.ndarray, foreshorten: bool = False) -> np.ndarray:
+        """Project directions from the view plane to the screen.
+
+        Parameters
+        ----------
+        member : (P,) complex ndarray
+            Unit vectors in the frame of the view plane.
+        foreshorten : bool
+            Keep the projected length instead of scaling it to 1.
+
+        Returns
+        -------
+        (P,) complex64 ndarray
+            Pixels.
+        """
+        if self.screen_jacobian is None:
+            return member.astype(np.complex64)
+        # Double precision makes the float32 result the same with all versions of numpy.
+        x, y = (
+            self.screen_jacobian[:, 0].astype(np.complex128),
+            self.screen_jacobian[:, 1].astype(np.complex128),
+        )
+        direction = x * member.real + y * member.imag
+        return direction.astype(np.complex64) if foreshorten else normalized(direction)
+
+    def angle_gradient(self, direction: np.ndarray, member: np.ndarray) -> np.ndarray:
+        """Compute the gradient of the angle of directions from differences of linked neighbors.
+
+        Parameters
+        ----------
+        direction : (P,) complex64 ndarray
+            Directions on screen.
+        member : (P,) complex64 ndarray
+            The same directions in the view plane. A neighbor that differs by more than half the
+            angle between members is on another member, and is ignored.
+
+        Returns
+        -------
+        (P,) complex64 ndarray
+            d angle / dx + i d angle / dy, radians per pixel.
+        """
+        direction, member = (np.append(normalized(a), np.complex64(0)) for a in (direction, member))
+        conjugate, member_conjugate = direction[:-1].conj(), member[:-1].conj()
+        min_cosine = np.cos(np.pi / max(self.degree, 2))
+        gradient_sines = []
+        for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            neighbor = self.neighbors[NEIGHBOR_OFFSETS.index(offset), :-1]
+            rotation = direction.take(neighbor) * conjugate
+            same_member = (member.take(neighbor) * member_conjugate).real > min_cosine
+            gradient_sines.append(np.where(same_member & (rotation.real > 0), rotation.imag, 0))
+        left, right, below, above = gradient_sines
+        return 0.5 * ((right - left) + 1j * (above - below)).astype(np.complex64)
+
+
+def normalized(values: np.ndarray) -> np.ndarray:
+    """Scale complex numbers to the modulus 1, as complex64. 0 stays 0."""
+    values = values.astype(np.complex128)
+    norm = np.sqrt(values.real**2 + values.imag**2)
+    return np.divide(values, norm, out=values, where=norm > 0).astype(np.complex64)
+
+
+def surface_pixel_field(
+    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
+) -> PixelField:
+    """Extract the field of one degree from a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    degree : int
+    crease_angle : float
+        Streamlines end where the normals of neighboring pixels differ by more than this angle,
+        in radians.
+    cross_creases : bool
+        Whether streamlines cross creases. If so, `crease_angle` is ignored.
+
+    Returns
+    -------
+    PixelField
+        The pixels whose mesh instances have a field of that degree.
+    """
+    mask = neighbor_masks(gbuffer, crease_angle, cross_creases)
+    axes = screen_jacobians(gbuffer)
+    selected = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id] == degree
+    selected = slice(None) if selected.all() else np.flatnonzero(selected)
+    z = gbuffer.representation[selected]
+    pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
+    if not z.all():
+        mask = _mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+    return PixelField(
+        degree=degree,
+        width=camera.width,
+        height=camera.height,
+        pixel=pixel,
+        representation=z,
+        screen_jacobian=axes[selected],
+        neighbor_mask=mask,
+        channels=_channels_of_degree(
+            {channel: values[selected] for channel, values in gbuffer.channels.items()}
+        ),
+        gbuffer_index=selected,
+    )
+
+
+def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldChannel, np.ndarray]:
+    """Return the channels that are present in the fields of one degree.
+
+    A channel that only fields of other degrees have contains the values of a RoSy, 1 for C_0 and 0
+    otherwise, and is left out.
+    """
+    constant = ("deviation", 0)
+    present = {
+        channel for channel, values in channels.items() if channel != constant and values.any()
+    }
+    has_deviations = any(kind == "deviation" for kind, _ in present)
+    if constant in channels and (has_deviations or (channels[constant] != 1).any()):
+        present.add(constant)
+    return {channel: values for channel, values in channels.items() if channel in present}
+
+
+def planar_pixel_field(
+    angles: np.ndarray, degree: int, magnitude: np.ndarray | float | None = None
+) -> PixelField:
+    """Make the pixel field of a field in the plane, given the angle of a member at each pixel.
+
+    Parameters
+    ----------
+    angles : (H, W) ndarray
+        Radians, counter-clockwise from the direction of the rows. Rows from the bottom. The field
+        is undefined where the angle is not finite or the magnitude is not above 0.
+    degree : int
+    magnitude : (H, W) ndarray or float, optional
+        rho, by default 1.
+
+    Returns
+    -------
+    PixelField
+        All pixels of the image.
+    """
+    degree = check_degree(degree)
+    angles = np.asarray(angles, dtype=np.float64)
+    height, width = angles.shape
+    rho = np.broadcast_to(np.float32(1) if magnitude is None else magnitude, angles.shape)
+    defined = np.isfinite(angles) & (rho > 0)
+    z = unit_phasor(np.where(defined, degree * angles, 0.0).ravel())
+    z *= np.where(defined, rho, 0).astype(np.float32).ravel()
+    pixel = np.arange(height * width, dtype=np.int32)
+    all_neighbors = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
+    return PixelField(
+        degree=degree,
+        width=width,
+        height=height,
+        pixel=pixel,
+        representation=z,
+        screen_jacobian=None,
+        neighbor_mask=_mask_undefined(all_neighbors, pixel, width, height, z != 0),
+    )
+
+
+def _mask_undefined(
+    mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
+) -> np.ndarray:
+    """Clear the bits of neighbor masks that lead from or to undefined pixels.
+
+    Parameters
+    ----------
+    mask : (P,) uint16 ndarray
+    pixel : (P,) int ndarray
+    width, height : int
+        Of the frame. Pixels beyond it are undefined.
+    defined : (P,) bool ndarray
+    """
+    is_defined = np.zeros(height * width, dtype=bool)
+    is_defined[pixel] = defined
+    is_defined = is_defined.reshape(height, width)
+    padded = np.pad(is_defined, 1).astype(np.uint16)
+    # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
+    row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
+    open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
+    open_bits *= is_defined
+    return mask & open_bits.ravel()[pixel]
+
+
+def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
+    """(P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
+
+    phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
+    of the first set and 1 at the breaking points of the second.
+    """
+    relative = rotated(normalized(field.representation), -field.degree * guiding_angle)
+    return (0.5 + 0.5 * relative.real).astype(np.float32)
+
+
+def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
+    """(P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
+
+    If two members are equally near, the one on the counter-clockwise side is returned, as in the
+    paper.
+    """
+    relative = field.representation.astype(np.complex128)
+    relative *= np.exp(-1j * field.degree * guiding_angle)
+    member = np.exp(1j * (np.angle(relative) / field.degree + guiding_angle))
+    member[field.representation == 0] = 0
+    return member.astype(np.complex64)
+
+
+def rotated(values: np.ndarray, angle: float) -> np.ndarray:
+    """Rotate complex numbers by an angle. Rounded once, so all versions of numpy agree."""
+    return (values.astype(np.complex128) * np.complex128(np.exp(1j * angle))).astype(np.complex64)
+
+
+def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:
+    """N times (P,) complex64: the member nearest to a guiding angle, then its N - 1 rotations."""
+    nearest = nearest_member(field, guiding_angle)
+    return [rotated(nearest, 2 * np.pi * k / field.degree) for k in range(field.degree)]

@@ -1,0 +1,95 @@
+"""The cached stages between a G-buffer and a picture: pixel field, noise, LIC images, outline."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..cache import Cache
+from ..progress import Task
+from ..projection.gbuffer import GBuffer
+from .lic import lic_task, noise_args
+from .lic_images import LicImages
+from .look import Look, lic_key
+from .look_units import cell_size_args
+from .outline import outline_coverage
+from .paper_grain import surface_paper_grain_args
+from .pixel_field import PixelField, surface_pixel_field
+from .surface_noise import surface_noise
+from .wobble import has_wobble, rotate_pixel_field, wobble_angle
+
+
+class ComposeStages:
+    """The intermediate results of one G-buffer, computed once and stored in a cache.
+
+    The key of a result contains the G-buffer and the settings that it depends on. A look that
+    differs only in other settings reuses it. All looks have lengths in pixels of the G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    cache : Cache
+        May be shared with other G-buffers.
+    """
+
+    def __init__(self, gbuffer: GBuffer, cache: Cache) -> None:
+        self._gbuffer = gbuffer
+        self._cache = cache
+
+    def pixel_field(self, degree: int, look: Look) -> PixelField:
+        """Pixel field of one degree, rotated by the wobble of the look."""
+        settings = look.crease_angle, look.cross_creases
+        field = self._cache.get_or_create(
+            ("pixel field", self._gbuffer, degree, *settings),
+            lambda: surface_pixel_field(self._gbuffer, degree, *settings),
+        )
+        if not has_wobble(look):
+            return field
+        angle = self._wobble_angle(look)[field.gbuffer_index]
+        return rotate_pixel_field(field, np.float32(look.wobble) * angle)
+
+    def lic_task(self, field: PixelField, look: Look) -> Task[LicImages]:
+        """Compute the LIC images of the members of a field, or find them in the cache."""
+        return (
+            yield from self._cache.get_or_create_task(
+                ("LIC images", self._gbuffer, field.degree, lic_key(look)),
+                lambda: lic_task(field, look, self._noise(field, look)),
+            )
+        )
+
+    def outline(self, field: PixelField, look: Look) -> np.ndarray:
+        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
+        coverage = self._cache.get_or_create(
+            ("outline", self._gbuffer, look.outline, look.crease_angle, look.cross_creases),
+            lambda: outline_coverage(self._gbuffer, look),
+        )
+        return coverage[field.gbuffer_index]
+
+    def surface_paper_grain(self, field: PixelField, look: Look) -> np.ndarray:
+        """(P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
+
+        They are not normalized: the mean is `NOISE_MEAN`.
+        """
+        return self._surface_noise(field, surface_paper_grain_args(look) | cell_size_args(look))
+
+    def _noise(self, field: PixelField, look: Look) -> np.ndarray | None:
+        """(P, K) float32 noise anchored to the surface. None if the look uses image-space noise."""
+        if look.anchor == "picture":
+            return None
+        return self._surface_noise(field, noise_args(look) | cell_size_args(look))
+
+    def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
+        """(P, K) float32 noise at the pixels of a field; see `surface_noise`."""
+        noise = self._cache.get_or_create(
+            ("surface noise", self._gbuffer, *sorted(args.items())),
+            lambda: surface_noise(self._gbuffer, **args),
+        )
+        return noise[field.gbuffer_index]
+
+    def _wobble_angle(self, look: Look) -> np.ndarray:
+        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
+        return self._cache.get_or_create(
+            ("wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()),
+            lambda: wobble_angle(self._gbuffer, look),
+        )

@@ -1,0 +1,272 @@
+"""Statistics of streaks: their standard deviation, and the ink threshold for each coverage.
+
+The streaks of an LIC image are means of noise along streamlines. Their distribution does not depend
+on the picture, so it is measured once for a look, in a sample of noise that is averaged along
+straight lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from .image_noise import image_noise
+from .look import Look
+from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
+from .surface_noise import OCTAVES, octave_weights
+
+#: Half the width of the step from paper to ink, in standard deviations of the streaks, for the
+#: crispness 0 and 1.
+MAX_SOFTNESS, MIN_SOFTNESS = 1.6, 0.2
+
+#: Break amount that the wobble 1 adds everywhere.
+WOBBLE_BREAKS = 0.5
+
+#: Half the length of the pieces of broken lines, in grains, and its upper bound, as a fraction of
+#: the length of the streamlines.
+BREAK_LENGTH_GRAINS, MAX_BREAK_FRACTION = 4.0, 0.4
+
+#: Entries of tables of thresholds, by coverage, and the number of break amounts that are sampled.
+COVERAGE_STEPS, BREAK_LEVELS = 256, 17
+
+#: Side of the sample of noise: in grains, and its bounds in pixels.
+SAMPLE_GRAINS, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS = 64, 320, 768
+
+#: Bins of the histogram of a sample.
+HISTOGRAM_BINS = 1600
+
+
+class NoiseSettings(NamedTuple):
+    """Settings of noise on surfaces; see `surface_noise`."""
+
+    grain: float
+    density: float
+    high_pass: float
+
+
+@dataclass(frozen=True)
+class StreakSettings:
+    """The settings that the statistics of streaks depend on. Lengths are in pixels of the frame.
+
+    Attributes
+    ----------
+    length : float
+        Length of the streamlines.
+    grain, density, high_pass : float
+        Settings of the noise; see `image_noise`.
+    crispness, breaks, wobble : float
+        Settings of the look, 0 to 1.
+    tapered : bool
+        Whether the weights of samples fall toward the ends (see `filter_kernel`).
+    anchored : bool
+        Whether the noise is anchored to surfaces.
+    break_length : float
+        Length of the pieces of broken lines.
+    paper_grain_amplitude : float
+        Standard deviation of the paper grain that is added to the streaks, in standard deviations
+        of the streaks.
+    surface_paper_grain : NoiseSettings or None
+        Noise of a paper grain that is anchored to surfaces.
+    """
+
+    length: float
+    grain: float
+    density: float
+    high_pass: float
+    crispness: float
+    tapered: bool = False
+    anchored: bool = False
+    break_length: float = 1.0
+    breaks: float = 0.0
+    wobble: float = 0.0
+    paper_grain_amplitude: float = 0.0
+    surface_paper_grain: NoiseSettings | None = None
+
+
+class StreakStatistics(NamedTuple):
+    """Statistics of streaks.
+
+    Attributes
+    ----------
+    threshold : (COVERAGE_STEPS,) float64 ndarray
+        Thresholds for coverages from 0 to 1, in even steps: the streaks above a threshold cover
+        that fraction of the paper. In standard deviations of the streaks, from their mean.
+    std : float
+        Standard deviation of the streaks.
+    break_std : float
+        Standard deviation of streaks as long as the pieces of broken lines.
+    paper_grain_std : float
+        Standard deviation of the noise of a paper grain that is anchored to surfaces. 1 if there
+        is none.
+    """
+
+    threshold: np.ndarray
+    std: float
+    break_std: float
+    paper_grain_std: float = 1.0
+
+
+def look_streak_statistics(look: Look) -> StreakStatistics:
+    """Return the statistics of the streaks of a look that is in pixels of the frame."""
+    surface_paper_grain = None
+    if look.anchor != "picture":
+        args = surface_paper_grain_args(look)
+        surface_paper_grain = NoiseSettings(args["grain"], args["density"], args["high_pass"])
+    return streak_statistics(
+        StreakSettings(
+            length=(2 * look.length + 1) * look.step,
+            grain=look.grain,
+            density=look.density,
+            high_pass=look.high_pass,
+            crispness=look.crispness,
+            tapered=look.taper,
+            anchored=look.anchor == "surface",
+            break_length=(2 * break_steps(look) + 1) * look.step,
+            breaks=look.breaks,
+            wobble=look.wobble,
+            paper_grain_amplitude=PAPER_GRAIN_STRENGTH * look.paper_grain,
+            surface_paper_grain=surface_paper_grain,
+        )
+    )
+
+
+@lru_cache(maxsize=16)
+def streak_statistics(settings: StreakSettings) -> StreakStatistics:
+    """Measure the statistics of streaks in a sample of noise."""
+    side = int(np.clip(SAMPLE_GRAINS * settings.grain, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS))
+    length_pixels = max(round(settings.length), 1)
+    width = side + length_pixels
+    noise = _noise_sample(
+        (side, width), settings.grain, settings.density, settings.high_pass, settings.anchored
+    )
+    streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.tapered))
+    break_pixels = min(max(round(settings.break_length), 1), length_pixels)
+    break_streaks, break_std = _standardized(
+        _line_means(noise, break_pixels, side, settings.tapered)
+    )
+    paper_relief, paper_grain_std = 0.0, 1.0
+    if settings.paper_grain_amplitude and settings.surface_paper_grain is not None:
+        heights = _noise_sample(streaks.shape, *settings.surface_paper_grain, anchored=True)
+        paper_grain_std = float(heights.std())
+        paper_relief = settings.paper_grain_amplitude / paper_grain_std * (heights - heights.mean())
+    elif settings.paper_grain_amplitude:
+        heights = picture_paper_grain(
+            np.arange(streaks.size, dtype=np.int32), len(streaks[0]), settings.grain, 1
+        )
+        paper_relief = settings.paper_grain_amplitude * heights[0].reshape(streaks.shape)
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+    break_amounts = break_amount(coverages, settings.breaks, settings.wobble)
+    break_levels = np.linspace(
+        break_amounts.min(), break_amounts.max(), BREAK_LEVELS if settings.breaks else 1
+    )
+    samples = [
+        streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
+    ]
+    threshold_tables = _threshold_tables(samples, softness(settings.crispness))
+    if len(break_levels) == 1:
+        return StreakStatistics(threshold_tables[0], streak_std, break_std, paper_grain_std)
+    level = (
+        (break_amounts - break_levels[0])
+        / (break_levels[-1] - break_levels[0])
+        * (BREAK_LEVELS - 1)
+    )
+    lower = np.minimum(level.astype(int), BREAK_LEVELS - 2)
+    low, high = (threshold_tables[row, np.arange(COVERAGE_STEPS)] for row in (lower, lower + 1))
+    return StreakStatistics(
+        low + (level - lower) * (high - low), streak_std, break_std, paper_grain_std
+    )
+
+
+def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:
+    """Compute the weight of the short streaks, which break lines into pieces, at coverages.
+
+    Lines break first where the coverage is low. Wobble adds the same amount everywhere, which makes
+    lines vary in width.
+
+    Parameters
+    ----------
+    target_coverage : ndarray
+        0 to 1.
+    breaks, wobble : float
+        Settings of the look, 0 to 1.
+
+    Returns
+    -------
+    ndarray
+        0 to 1, of the shape of `target_coverage`.
+    """
+    min_amount = WOBBLE_BREAKS * wobble
+    return min_amount + (1 - min_amount) * breaks * (1 - target_coverage) ** 2
+
+
+def break_steps(look: Look) -> int:
+    """Steps in each direction of the short streaks that break lines into pieces."""
+    steps = min(BREAK_LENGTH_GRAINS * look.grain / look.step, MAX_BREAK_FRACTION * look.length)
+    return max(round(steps), 1)
+
+
+def softness(crispness: float) -> float:
+    """Half the width of the step from paper to ink, in standard deviations of the streaks."""
+    return MAX_SOFTNESS * (MIN_SOFTNESS / MAX_SOFTNESS) ** crispness
+
+
+def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
+    """(S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
+
+    `half_width` is half the width of the step from paper to ink, in the unit of the samples.
+    """
+    lowest, highest = min(map(np.min, samples)), max(map(np.max, samples))
+    edges = np.linspace(lowest, highest, HISTOGRAM_BINS + 1)
+    thresholds = np.linspace(highest + half_width, lowest - half_width, 4 * COVERAGE_STEPS)
+    ink_fraction = smoothstep(
+        ((edges[:-1] + edges[1:]) / 2 - thresholds[:, None]) / (2 * half_width) + 0.5
+    )
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+    histograms = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
+    return np.array(
+        [np.interp(coverages, ink_fraction @ share, thresholds) for share in histograms]
+    )
+
+
+def _noise_sample(
+    shape: tuple[int, int], grain: float, density: float, high_pass: float, anchored: bool
+) -> np.ndarray:
+    """Make an image of noise in image space or, if `anchored`, as on a surface.
+
+    On the surface, the cells of the middle octave have the size `grain` on screen.
+    """
+    pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
+    octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
+    noise = np.zeros(shape, dtype=np.float32)
+    for octave_offset, weight in zip(
+        octave_offsets, octave_weights(octave_offsets) if anchored else (1.0,), strict=True
+    ):
+        cell_size = grain * 2.0**octave_offset
+        cells = image_noise(pixel, shape[1], cell_size, 1, 1, density=density, high_pass=high_pass)
+        noise += np.float32(weight) * cells.reshape(shape)
+    return noise
+
+
+def _line_means(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:
+    """(n, side) means over `length` pixels of the rows of (n, width) noise, from its middle."""
+    # Tapered weights are a box filter of half the length, applied twice.
+    for window in [max(length // 2, 1)] * 2 if tapered else [length]:
+        sums = np.cumsum(np.pad(noise, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
+        noise = (sums[:, window:] - sums[:, :-window]) / window
+    start = (noise.shape[1] - side) // 2
+    return noise[:, start : start + side]
+
+
+def _standardized(means: np.ndarray) -> tuple[np.ndarray, float]:
+    """Subtract the mean and divide by the standard deviation; return that deviation as well."""
+    std = float(means.std())
+    return (means - means.mean()) / std, std
+
+
+def smoothstep(x: np.ndarray) -> np.ndarray:
+    """Smooth step: 0 below 0, 1 above 1, and 3 x^2 - 2 x^3 between."""
+    x = np.clip(x, 0, 1)
+    return x * x * (3 - 2 * x)

@@ -1,0 +1,328 @@
+"""Batches of streamlines on a covering, traced together in both directions from their seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
+from .filter_kernel import kernel_weights
+from .look import Look
+
+#: Steps between compactions, which remove streamlines that have ended.
+COMPACT_INTERVAL = 8
+
+#: Factor of the derivative of noise across a streamline. A central difference over two pixels
+#: predicts the change over half a pixel only in part. This value gives streaks the width that they
+#: have with the method "brute".
+LATERAL_GAIN = 0.7
+
+#: Distance from the center of a pixel within which the average of a streamline is preferred,
+#: pixels.
+MAX_LATERAL_OFFSET = 0.25
+
+
+class StreamlineBatch:
+    """A batch of streamlines of equal length, traced together, with preallocated buffers.
+
+    Parameters
+    ----------
+    covering : Covering
+    look : Look
+        In pixels of the frame. Its `length`, `taper` and `step` are used.
+    step_limit : (C,) intp ndarray or None
+        Steps in each direction that the average of a cell covers. None for `look.length`.
+    half_window : int
+        Steps in each direction whose states take their average from the streamline. Further steps
+        only contribute noise to these averages.
+    max_streamlines : int
+        Size of the batch.
+    """
+
+    def __init__(
+        self,
+        covering: Covering,
+        look: Look,
+        step_limit: np.ndarray | None,
+        half_window: int,
+        max_streamlines: int,
+    ) -> None:
+        self._covering = covering
+        self._half_window, self._max_steps = half_window, half_window + look.length
+        self._length, self._tapered = look.length, look.taper
+        step, tone, slope = covering.state_scales
+        self._step, self._tone = np.float32(1.5 * step), np.float32(tone)
+        self._lateral_gain = np.float32(LATERAL_GAIN * slope / look.step * step)
+        self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step)
+        self._step_limit = None if step_limit is None else np.tile(step_limit, covering.line_count)
+        lanes, channels = 2 * max_streamlines, covering.noise_channels
+        self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
+        self._totals = np.empty((lanes, channels), dtype=np.complex64)
+        self._states = np.empty((half_window + 1, lanes), dtype=np.int32)
+        self._lateral_offset = np.empty((half_window + 1, lanes), dtype=np.float32)
+        #: Steps of the last traced streamlines before their end, within the half window.
+        self.covered_steps = 0
+
+    def trace(self, seeds: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Trace streamlines and yield, step by step, the averages of the lines that they pass.
+
+        Parameters
+        ----------
+        seeds : (n,) intp ndarray
+            Indices of lines.
+
+        Yields
+        ------
+        line : (2 n,) int32 ndarray
+            Indices of lines, of the cell `SINK_CELL` where streamlines have ended.
+        values : (2 n, K + 1) float32 ndarray
+            The average of each noise channel times the effective samples, then the effective
+            samples. Overwritten by the next step.
+        centered : (m,) intp ndarray
+            Indices of the streamlines that pass close to the center of the pixel.
+        """
+        step_counts, last_step = self._trace_steps(seeds)
+        self.covered_steps = int(np.minimum(step_counts, self._half_window).sum())
+        lanes, channels = 2 * len(seeds), self._covering.noise_channels
+        step_counts = step_counts.astype(np.float32)
+        opposite_counts = np.roll(step_counts, lanes // 2)
+        values = np.empty((lanes, channels + 1), dtype=np.float32)
+        for step in range(min(last_step, self._half_window) + 1):
+            line = self._covering.fold_to_line(self._states[step, :lanes])
+            length = self._length if self._step_limit is None else self._step_limit.take(line)
+            forward = np.clip(step_counts - np.float32(step), 0, length)
+            backward = np.minimum(opposite_counts + np.float32(step), length)
+            weights = kernel_weights(forward, backward, length, self._tapered)
+            if self._tapered:
+                noise_sum = self._tapered_sums(step, length, lanes)
+                noise_sum *= (weights.effective_samples / weights.total)[:, None]
+            else:
+                last = np.minimum(step + length, last_step)
+                first = np.maximum(step - length, -last_step)
+                noise_sum = self._prefix_sums_through(last, lanes) - self._prefix_sums_before(
+                    first, lanes
+                )
+            # A streamline passes up to half a pixel beside the center of a pixel. The sum is
+            # corrected to the center by its derivative across the streamline.
+            lateral = self._lateral_offset[step, :lanes]
+            np.multiply(noise_sum.real, self._tone, out=values[:, :-1])
+            values[:, :-1] -= (lateral * self._lateral_gain)[:, None] * noise_sum.imag
+            values[:, -1] = weights.effective_samples
+            yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
+
+    def _trace_steps(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
+        """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
+
+        Each row holds n forward halves of streamlines, then n backward halves. `_states` are their
+        states, `_lateral_offset` their distances to the left of the centers of pixels. `_sums` are
+        prefix sums of the noise, including the seed, with the derivative to the left as imaginary
+        part. For tapered weights `_sums` are prefix sums of these, in all rows.
+
+        Returns
+        -------
+        step_counts : (2 n,) intp ndarray
+            Steps before the streamlines ended.
+        last_step : int
+            Last row that is filled.
+        """
+        covering, lanes = self._covering, 2 * len(seeds)
+        record_type = np.float64 if covering.noise_channels == 1 else np.complex128
+        state_table = covering.state_table.view(record_type)[:, 0]
+        # A streamline makes at most one full turn in four steps.
+        max_winding = self._max_steps // 4 + 2
+        sheet_offset, backward_offset = covering.sheet_offsets(max_winding)
+        sheet, cell = np.divmod(seeds, covering.cell_count)
+        cell = np.concatenate([cell, cell])
+        sheet = (
+            np.concatenate([sheet, sheet + backward_offset])
+            + max_winding * covering.sheets_per_turn
+        )
+        packed_phase = covering.packed_phase.take(cell)
+        target_phase = packed_phase + sheet.astype(np.float32)
+        seed_offsets = _r2_offsets(len(seeds))
+        position = np.concatenate([seed_offsets, seed_offsets])
+        previous_direction = None
+        total = np.zeros((lanes, covering.noise_channels), dtype=np.complex64)
+        # Indices of the streamlines that go on, after the first compaction.
+        active, step_counts = None, np.full(lanes, self._max_steps)
+        active_counts = step_counts
+        for step in range(self._max_steps + 1):
+            state = sheet_offset.take(sheet, mode="clip")
+            state += cell
+            record = state_table.take(state, mode="clip").view(np.int16).astype(np.float32)
+            record = record.view(np.complex64).reshape(len(cell), -1)
+            direction = record[:, 0].copy()
+            total += record[:, 1:]
+            self._record_step(step, active, lanes, state, position, direction, total)
+            if step == self._max_steps:
+                break
+            # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
+            displacement = direction.copy() if previous_direction is None else previous_direction
+            flat_displacement, offset = displacement.view(np.float32), position.view(np.float32)
+            flat_displacement *= np.float32(-1 / 3)
+            displacement += direction
+            flat_displacement *= self._step
+            position += displacement
+            previous_direction = direction
+            np.rint(offset, out=flat_displacement)
+            np.maximum(flat_displacement, np.float32(-1), out=flat_displacement)
+            np.minimum(flat_displacement, np.float32(1), out=flat_displacement)
+            position -= displacement
+            active_counts[
+                self._step_cells(
+                    cell,
+                    unpack_neighbor_mask(packed_phase),
+                    flat_displacement[::2],
+                    flat_displacement[1::2],
+                )
+            ] = step
+            packed_phase = covering.packed_phase.take(cell, mode="clip")
+            target_phase -= packed_phase
+            np.rint(target_phase, out=target_phase)
+            sheet = target_phase.astype(np.intp)
+            target_phase += packed_phase
+            if step % COMPACT_INTERVAL == COMPACT_INTERVAL - 1:
+                remaining = np.flatnonzero(cell)
+                if len(remaining) < 0.9 * len(cell):
+                    active = np.arange(lanes) if active is None else active
+                    step_counts[active] = active_counts
+                    if not len(remaining):
+                        self._extend_sums(step, lanes)
+                        return step_counts, step
+                    active, active_counts, cell, sheet = (
+                        active[remaining],
+                        active_counts[remaining],
+                        cell[remaining],
+                        sheet[remaining],
+                    )
+                    packed_phase, target_phase, position = (
+                        packed_phase[remaining],
+                        target_phase[remaining],
+                        position[remaining],
+                    )
+                    previous_direction, total = previous_direction[remaining], total[remaining]
+        if active is not None:
+            step_counts[active] = active_counts
+        return step_counts, self._max_steps
+
+    def _step_cells(
+        self, cell: np.ndarray, mask: np.ndarray, column: np.ndarray, row: np.ndarray
+    ) -> np.ndarray:
+        """Step cells by -1 to 1 columns and rows, in place; return the streamlines that end."""
+        blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
+        if len(blocked):
+            bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
+            blocked = blocked[mask[blocked] >> bit & 1 == 0]
+        ended = blocked[cell[blocked] != SINK_CELL]
+        cell_offset = row * np.float32(self._covering.width)
+        cell_offset += column
+        cell += cell_offset.astype(np.intp)
+        cell[blocked] = SINK_CELL
+        return ended
+
+    def _record_step(
+        self,
+        step: int,
+        active: np.ndarray | None,
+        lanes: int,
+        state: np.ndarray,
+        position: np.ndarray,
+        direction: np.ndarray,
+        total: np.ndarray,
+    ) -> None:
+        """Write row `step` of the buffers, for all streamlines or the active ones."""
+        self._totals[slice(lanes) if active is None else active] = total
+        self._sums[step, :lanes] = self._totals[:lanes]
+        if self._tapered and step:
+            self._sums[step, :lanes] += self._sums[step - 1, :lanes]
+        if step > self._half_window:
+            return
+        lateral = position.imag * direction.real
+        lateral -= position.real * direction.imag
+        if active is None:
+            self._states[step, :lanes] = state
+            self._lateral_offset[step, :lanes] = lateral
+        else:
+            self._states[step, :lanes] = SINK_CELL
+            self._states[step, active] = state
+            self._lateral_offset[step, :lanes] = 0
+            self._lateral_offset[step, active] = lateral
+
+    def _extend_sums(self, last_step: int, lanes: int) -> None:
+        """Fill the rows after the end of the last streamline. Sums of sums still grow there."""
+        if self._tapered:
+            for step in range(last_step, self._max_steps):
+                np.add(
+                    self._sums[step, :lanes], self._totals[:lanes], out=self._sums[step + 1, :lanes]
+                )
+
+    def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64 tapered sums of the noise, `half_width` r steps in each direction.
+
+        With the sums of prefix sums E, this is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1). A
+        triangular kernel is the mean of r + 1 box kernels of r + 1 steps, one step apart.
+        """
+        total = self._second_prefix_sums(step + half_width, lanes)
+        total = total - 2 * self._second_prefix_sums(step - 1, lanes)
+        total += self._second_prefix_sums(step - half_width - 2, lanes)
+        total *= 1 / np.asarray(half_width + 1, dtype=np.float32)[..., None]
+        return total
+
+    def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
+        half, seed = lanes // 2, self._sums[0, :lanes]
+        if np.ndim(step) == 0:
+            if step >= 0:
+                return self._sums[step, :lanes]
+            if step == -1:
+                return np.zeros_like(seed)
+            opposite_sums = self._sums[-step - 2, :lanes]
+            return (step + 1) * seed + np.concatenate(
+                [opposite_sums[half:], opposite_sums[:half]]
+            ).conj()
+        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        lane, same_side = np.arange(lanes), (step >= 0)[:, None]
+        row = np.where(step >= 0, step, np.maximum(-step - 2, 0)) * stride
+        gathered = flat.take(row + np.where(same_side[:, 0], lane, (lane + half) % lanes), axis=0)
+        mirrored = (step + 1)[:, None] * seed + gathered.conj()
+        return np.where(
+            same_side, gathered, np.where((step == -1)[:, None], np.complex64(0), mirrored)
+        )
+
+    def _prefix_sums_through(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64 prefix sums up to a step, including it."""
+        if np.ndim(step) == 0:
+            return self._sums[step, :lanes]
+        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        return flat.take(step * stride + np.arange(lanes), axis=0)
+
+    def _prefix_sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
+        """(2 n, K) complex64 prefix sums up to a step, excluding it.
+
+        Negative steps are on the opposite half of the streamline. Its sums run away from the seed,
+        and its derivatives to the left have the opposite sign.
+        """
+        half, seed = lanes // 2, self._sums[0, :lanes]
+        if np.ndim(step) == 0:
+            if step > 0:
+                return self._sums[step - 1, :lanes]
+            opposite_sums = self._sums[-step, :lanes]
+            return seed - np.concatenate([opposite_sums[half:], opposite_sums[:half]]).conj()
+        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
+        lane = np.arange(lanes)
+        same_side = step > 0
+        row = np.where(same_side, step - 1, -step) * stride
+        gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
+        return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+
+def _r2_offsets(count: int) -> np.ndarray:
+    """(count,) complex64 offsets from the center of a pixel, spread evenly (R2 sequence, Roberts).
+
+    If all streamlines started at the centers, they would step to the next row of pixels at the same
+    time, which is visible.
+    """
+    index, plastic_number = np.arange(count) + 0.5, 1.3247179572447460
+    position = index / plastic_number % 1 + 1j * (index / plastic_number**2 % 1)
+    return (position - (0.5 + 0.5j)).astype(np.complex64)

@@ -1,0 +1,224 @@
+"""Noise anchored to surfaces: a solid texture of white noise whose cells keep their size on screen.
+
+A cell of the noise is a cube in the rest space of a mesh instance, so streaks do not slide over the
+surface when the surface or the camera moves. The cells come in octaves of size. At each pixel three
+octaves are blended around the one that matches the size of a pixel there, so that streaks also keep
+their width on screen when the view zooms. The method is that of Benard, Bousseau and Thollot,
+"Dynamic Solid Textures for Real-Time Coherent Stylization" (I3D 2009), with white noise and with
+weights that keep the variance constant.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..projection.gbuffer import GBuffer
+from ..projection.rest_coordinates import matrix_scale, rest_coordinates
+from .image_noise import BLUR_FACTOR, NOISE_MEAN, NOISE_STD, box_radius, gaussian_blur, hash_bits_nd
+from .per_pixel_lic import pixel_blocks
+
+#: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
+SUBPIXEL_OFFSETS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
+
+#: Side of a cube relative to the side of a cell on the surface. A plane cuts a lattice of unit
+#: cubes into pieces with the mean area 2 / 3.
+LATTICE_SCALE = 1.5**0.5
+
+#: Rotation of the lattice about x, y and z, radians. Many models have faces that are parallel to
+#: the axes, on which an unrotated lattice would be visible.
+LATTICE_ANGLES = (0.61, 1.13, 0.37)
+
+#: Number of octaves that are blended. With two, lines are a quarter thinner halfway between
+#: octaves, and the noise changes more from one picture to the next. More than three improve
+#: neither.
+OCTAVES = 3
+
+#: Range of the ratio of the size of cells to `grain` in which the contrast is corrected for it.
+CONTRAST_SCALE_RANGE = (0.25, 4.0)
+
+#: Added to the numbers of octaves, so that positive integers are hashed.
+OCTAVE_OFFSET = 64
+
+
+def surface_noise(
+    gbuffer: GBuffer,
+    grain: float,
+    seed: int,
+    channels: int,
+    *,
+    density: float,
+    high_pass: float,
+    pixel: float = 0.0,
+    smallest: float = 0.0,
+) -> np.ndarray:
+    """Make noise that is anchored to the surfaces of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its mesh instances.
+    grain : float
+        Approximate side of a cell on screen, in pixels.
+    seed : int
+    channels : int
+        Number of independent channels.
+    density : float
+        Fraction of cells that are bright.
+    high_pass : float
+        Variations wider than about this many pixels are removed. 0 leaves the noise white.
+    pixel : float
+        Size in Blender units that replaces a pixel as the unit of `grain`: cells then have a fixed
+        size on the surface. 0 gives cells of a fixed size on screen.
+    smallest : float
+        Minimum side of a cell on screen, in pixels. Only used if `pixel` is not 0.
+
+    Returns
+    -------
+    (P, channels) float32 ndarray
+        With the mean `NOISE_MEAN`, as for `image_noise`.
+    """
+    rest = rest_coordinates(gbuffer)
+    scale = cell_scale(gbuffer, rest.pixel_size, pixel, smallest / grain)
+    level = np.log2(np.maximum(rest.pixel_size * scale, 1e-30) * np.float32(grain * LATTICE_SCALE))
+    instance_hash = instance_hashes(gbuffer.instance_names)[gbuffer.instance_id]
+    total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
+    for block in pixel_blocks(len(gbuffer.pixel)):
+        block_rest = rest.block(block)
+        lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+        _accumulate_octaves(
+            total[:, block], lattice, level[block], instance_hash[block], seed, density
+        )
+    # The variance of a mean along a streamline is proportional to the size of cells. The factor
+    # keeps it at that of cells of the size `grain`.
+    normalization = np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
+    total *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
+    if high_pass:
+        for channel_noise in total:
+            channel_noise -= _low_frequencies(gbuffer, channel_noise, BLUR_FACTOR * high_pass)
+    return np.ascontiguousarray(total.T) + np.float32(NOISE_MEAN)
+
+
+def cell_scale(
+    gbuffer: GBuffer, size: np.ndarray, pixel_size: float, min_scale: float
+) -> np.ndarray | np.float32:
+    """Compute the factor by which lengths on screen differ from their values in pixels.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its mesh instances.
+    size : (P,) float32 ndarray
+        `RestCoordinates.pixel_size`.
+    pixel_size : float
+        Size in Blender units that replaces a pixel as the unit of lengths. 0 keeps pixels.
+    min_scale : float
+        Lower bound of the factor.
+
+    Returns
+    -------
+    (P,) float32 ndarray, or 1 if `pixel_size` is 0
+    """
+    if not pixel_size:
+        return np.float32(1)
+    body_scale = np.array(
+        [pixel_size / matrix_scale(instance.matrix) for instance in gbuffer.instances],
+        dtype=np.float32,
+    )
+    return np.maximum(
+        body_scale[gbuffer.instance_id] / np.maximum(size, 1e-30), np.float32(min_scale)
+    )
+
+
+def _accumulate_octaves(
+    total: np.ndarray,
+    lattice: Sequence[np.ndarray],
+    level: np.ndarray,
+    instance_hash: np.ndarray,
+    seed: int,
+    density: float,
+) -> None:
+    """Add the weighted bits of the cells of all octaves to `total`.
+
+    Parameters
+    ----------
+    total : (K, n) float32 ndarray
+        Modified in place.
+    lattice : sequence of (3, n) float32 ndarray
+        Sample positions in the space of the lattice.
+    level : (n,) float32 ndarray
+        Base-2 logarithm of the size of cells at each pixel, in the units of that space.
+    instance_hash : (n,) uint32 ndarray
+        Hashes of the mesh instances.
+    seed, density
+        As for `surface_noise`.
+    """
+    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
+    for index in range(OCTAVES):
+        octave = finest + np.float32(index)
+        weight = octave_weights(octave - level)
+        scale = np.exp2(-octave)
+        octave_index = (octave + OCTAVE_OFFSET).astype(np.int32)
+        for position in lattice:
+            cell = np.floor(position * scale).astype(np.int32)
+            for channel, out in enumerate(total):
+                bits = hash_bits_nd((*cell, octave_index, instance_hash), seed, channel, density)
+                out += weight * (bits - np.float32(density))
+
+
+def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
+    """Compute the weights of octaves, given their distance from the octave of a pixel's level.
+
+    The squares of the weights of the `OCTAVES` octaves sum to 1, so the variance of the blend is
+    that of a single octave.
+    """
+    return np.cos(octave_offset * np.float32(np.pi / OCTAVES)) * np.float32(np.sqrt(2 / OCTAVES))
+
+
+def instance_hashes(names: Sequence[str]) -> np.ndarray:
+    """(B,) uint32 hashes of mesh instances, stable from picture to picture.
+
+    A hash depends on the name of an instance and, if several instances have that name, on its
+    position among them.
+    """
+    counts: Counter[str] = Counter()
+    hashes = []
+    for name in names:
+        hashes.append(zlib.crc32(f"{name} {counts[name]}".encode()))
+        counts[name] += 1
+    return np.array(hashes, dtype=np.uint32)
+
+
+def lattice_axes() -> np.ndarray:
+    """(3, 3) float32: the axes of the lattice in the rest space of a mesh instance, as rows."""
+    rotation = np.eye(3)
+    for axis, angle in enumerate(LATTICE_ANGLES):
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        axis_rotation = np.eye(3)
+        axis_rotation[first, first] = axis_rotation[second, second] = np.cos(angle)
+        axis_rotation[first, second], axis_rotation[second, first] = -np.sin(angle), np.sin(angle)
+        rotation = axis_rotation @ rotation
+    return rotation.astype(np.float32)
+
+
+def _to_lattice_space(position: np.ndarray) -> np.ndarray:
+    """(3, P) positions in the space of the lattice, given (3, P) positions in rest space."""
+    x, y, z = position
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
+
+
+def _low_frequencies(gbuffer: GBuffer, values: np.ndarray, sigma: float) -> np.ndarray:
+    """(P,) values after a Gaussian blur that ignores pixels outside the G-buffer."""
+    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    # The empty margin is as wide as the reach of the blur.
+    margin = 3 * box_radius(sigma)
+    bottom, left = int(row[0]) - margin, int(column.min()) - margin
+    shape = int(row[-1]) - bottom + 1 + margin, int(column.max()) - left + 1 + margin
+    index = (row - bottom) * np.int32(shape[1]) + (column - left)
+    sums, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    sums.reshape(-1)[index], weights.reshape(-1)[index] = values, 1
+    sums, weights = gaussian_blur(sums, sigma), gaussian_blur(weights, sigma)
+    return sums.reshape(-1).take(index) / np.maximum(weights.reshape(-1).take(index), 1e-3)

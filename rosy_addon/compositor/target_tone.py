@@ -1,0 +1,182 @@
+"""The target tone of each pixel, from light, an attribute, an image, or a reference render."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..projection.camera import Camera
+from ..projection.gbuffer import GBuffer
+from ..projection.mip_map import MipMap
+from ..projection.tone_sampling import surface_tones
+from .look import Look
+from .shading import Light, diffuse
+
+#: Minimum difference between the tones that become white and black.
+MIN_TONE_RANGE = 1e-3
+
+#: Maximum relative difference between the aspect ratios of a reference render and its camera.
+ASPECT_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceRender:
+    """A picture of the scene made by another renderer, used as the source of the tone.
+
+    Attributes
+    ----------
+    luminance : (H, W) float32 ndarray
+        Linear, rows from the bottom.
+    camera : Camera
+        Camera of the picture. It may have another resolution, with the same aspect ratio.
+    name : str
+        Name of the picture in error messages.
+
+    Raises
+    ------
+    RosyError
+        If the aspect ratios of the picture and of the camera differ.
+    """
+
+    luminance: np.ndarray
+    camera: Camera
+    name: str = "picture"
+
+    def __post_init__(self) -> None:
+        height, width = self.luminance.shape
+        ratio = width / height * self.camera.height / self.camera.width
+        if not 1 - ASPECT_TOLERANCE <= ratio <= 1 + ASPECT_TOLERANCE:
+            raise RosyError(
+                f"{self.name}: is {width} x {height} pixels, which is not the shape of the frame of "
+                f"camera '{self.camera.name}', {self.camera.width} x {self.camera.height}"
+            )
+
+    @cached_property
+    def mip_map(self) -> MipMap:
+        """Mip map of the luminance."""
+        return MipMap(self.luminance)
+
+    def mip_level(self, camera: Camera) -> float:
+        """Level of the mip map at which pixels are as large as those of a camera; not rounded."""
+        height, width = self.luminance.shape
+        pixels_per_unit = self.camera.resized(width, height).pixels_per_unit
+        return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
+
+    def sample(self, gbuffer: GBuffer) -> np.ndarray:
+        """(P,) float32 luminance at the surface points of a G-buffer."""
+        reprojection = self.reprojection(gbuffer.camera)
+        clip = gbuffer.position @ reprojection[[0, 1, 3], :3].T + reprojection[[0, 1, 3], 3]
+        u, v = clip[:, :2].T / np.maximum(clip[:, 2], 1e-12) * 0.5 + 0.5
+        level = np.full(len(clip), self.mip_level(gbuffer.camera))
+        return self.mip_map.sample(u, v, level, repeat=False)
+
+    def reprojection(self, camera: Camera) -> np.ndarray:
+        """(4, 4) float64 matrix from the view space of `camera` to clip space of the picture."""
+        rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
+        camera_to_world = np.eye(4)
+        camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
+        return self.camera.projection @ self.camera.view @ camera_to_world
+
+
+def target_tone(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    reference: ReferenceRender | None = None,
+    cache: Cache | None = None,
+) -> np.ndarray:
+    """Compute the target tone of each pixel.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    look : Look
+        Its settings of light, and those whose names begin with `tone`, are used.
+    lights : sequence of Light
+        Lights of the scene in the space of the camera. Used if the light of the look is "scene".
+    reference : ReferenceRender, optional
+        Required if the tone of the look is "picture".
+    cache : Cache, optional
+        Stores the shadows of lights.
+
+    Returns
+    -------
+    (P, 3) float32 ndarray
+        Linear factors, at least 0. Where the source has no value, the diffuse light is used.
+
+    Raises
+    ------
+    RosyError
+        If the source of the tone does not exist; see `check_tone`.
+    """
+    if look.tone == "light":
+        return apply_tone_curve(diffuse(gbuffer, look, lights, cache), look)
+    check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
+    source_tone = reference.sample(gbuffer) if look.tone == "picture" else surface_tones(gbuffer)
+    missing = np.isnan(source_tone)
+    tone = np.repeat(apply_tone_curve(source_tone, look)[:, None], 3, axis=1)
+    if look.tone_lit or missing.any():
+        light = diffuse(gbuffer, look, lights, cache)
+        tone = tone * light if look.tone_lit else tone
+        tone[missing] = light[missing]
+    return tone
+
+
+def check_tone(look: Look, body_tones: Sequence[object], reference: ReferenceRender | None) -> None:
+    """Check that the source of a look's tone exists.
+
+    Parameters
+    ----------
+    look : Look
+    body_tones : sequence of SurfaceTone or None
+        Tones of the mesh instances.
+    reference : ReferenceRender or None
+
+    Raises
+    ------
+    RosyError
+        If the tone is "picture" and there is no reference render, or if it is "attribute" or
+        "image" and no mesh instance has a tone.
+    """
+    if look.tone == "picture" and reference is None:
+        raise RosyError("the tone is to come from a picture, but none is given")
+    if look.tone in ("attribute", "image") and all(tone is None for tone in body_tones):
+        source_name = {"attribute": "such an attribute", "image": "an image"}[look.tone]
+        raise RosyError(
+            f"the tone is to come from the {look.tone}, but no object has {source_name}"
+        )
+
+
+def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
+    """Apply the black point, white point and gamma of a look to tones.
+
+    Parameters
+    ----------
+    tone : ndarray
+        Of any shape.
+    look : Look
+        Its `tone_black` becomes 0 and its `tone_white` becomes 1. The gamma is applied after that.
+
+    Returns
+    -------
+    float32 ndarray
+        Of the same shape. At least 0; values beyond the white point are above 1.
+    """
+    scale, black = tone_curve(look)
+    stretched = np.maximum((tone - np.float32(black)) * np.float32(scale), 0)
+    if look.tone_gamma != 1:
+        stretched = stretched ** np.float32(1 / look.tone_gamma)
+    return stretched.astype(np.float32, copy=False)
+
+
+def tone_curve(look: Look) -> tuple[float, float]:
+    """(scale, black) of a look: tones are mapped to (tone - black) * scale before the gamma."""
+    tone_range = look.tone_white - look.tone_black
+    if abs(tone_range) < MIN_TONE_RANGE:
+        tone_range = MIN_TONE_RANGE if tone_range >= 0 else -MIN_TONE_RANGE
+    return 1 / tone_range, look.tone_black

@@ -1,0 +1,138 @@
+"""Wobble: slow, smooth variations of the direction of lines, as if drawn by hand.
+
+The angle is a sum of a few plane waves. They are anchored like the noise: to the picture, or to the
+rest space of the mesh instances. In rest space the wavelengths come in octaves that follow the size
+of a pixel, and two octaves are blended, similar to `surface_noise`. So the waves stay with the
+surface and keep their wavelength on screen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..deterministic_trig import cos_sin, unit_phasor
+from ..projection.gbuffer import GBuffer
+from ..projection.rest_coordinates import rest_coordinates
+from .look import Look, is_hatched
+from .look_units import cell_size_args
+from .pixel_field import PixelField
+from .surface_noise import cell_scale
+
+#: Number of plane waves in the sum.
+WAVE_COUNT = 7
+
+#: Mean wavelength, in grains.
+MEAN_WAVELENGTH_GRAINS = 40.0
+
+#: Standard deviation of the angle between lines and field at `Look.wobble` 1, radians.
+WOBBLE_STD = 0.09
+
+#: Factor that gives the sum of waves the standard deviation 1. A wave is 4 v (1 - |v|) for v from
+#: -1 to 1: a sine approximated by two parabolas, with the variance 16 / 30. Unlike `sin`, it has
+#: the same bits on all platforms.
+UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
+
+#: Number of pixels that are processed at once.
+_BLOCK_PIXELS = 1 << 15
+
+
+def has_wobble(look: Look) -> bool:
+    """Whether lines wobble as if drawn by hand."""
+    return is_hatched(look) and look.wobble > 0
+
+
+def wave_table() -> np.ndarray:
+    """(WAVE_COUNT, 4) float32: frequency vector and phase of each wave.
+
+    Frequencies are in cycles per unit of length along x, y and z, phases in cycles. The directions
+    form a spiral that covers a hemisphere evenly. The wavelengths are spread over one octave.
+    """
+    golden = (5**0.5 - 1) / 2
+    index = np.arange(WAVE_COUNT)
+    height = 1 - (index + 0.5) / WAVE_COUNT
+    azimuth = 2 * np.pi * golden * index
+    radius = np.sqrt(1 - height**2)
+    frequency = 2.0 ** ((index * 3 % WAVE_COUNT + 0.5) / WAVE_COUNT - 0.5)
+    axes = [radius * np.cos(azimuth), radius * np.sin(azimuth), height]
+    table = np.stack([*(frequency * axis for axis in axes), index * golden * 5 % 1], axis=1)
+    return table.astype(np.float32)
+
+
+def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
+    """Compute the angle between lines and field at `Look.wobble` 1.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its mesh instances, if the look is anchored to the surface.
+    look : Look
+        In pixels of the frame. Its `anchor`, `grain` and unit of lengths are used.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        Radians, with a mean of about 0 and a standard deviation of about `WOBBLE_STD`.
+    """
+    if look.anchor == "surface":
+        rest = rest_coordinates(gbuffer)
+        cell_size = cell_size_args(look)
+        min_scale = cell_size["smallest"] / look.grain
+        scale = cell_scale(gbuffer, rest.pixel_size, cell_size["pixel"], min_scale)
+        position, size = rest.at_offset(0, 0), rest.pixel_size * scale
+    else:
+        row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+        position = np.stack([column, row, 0 * row]).astype(np.float32)
+        size = np.ones(len(row), dtype=np.float32)
+    level = np.log2(np.maximum(size, 1e-30) * np.float32(look.grain * MEAN_WAVELENGTH_GRAINS))
+    angle = np.empty(len(level), dtype=np.float32)
+    for start in range(0, len(level), _BLOCK_PIXELS):
+        block = slice(start, start + _BLOCK_PIXELS)
+        angle[block] = _wave_sum(position[:, block], level[block])
+    return np.float32(WOBBLE_STD) * angle
+
+
+def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
+    """Return the pixel field with its directions rotated in the view plane.
+
+    Parameters
+    ----------
+    field : PixelField
+    angle : (P,) ndarray
+        Radians, counter-clockwise.
+    """
+    angle = angle.astype(np.float64)
+    channels = {
+        # A harmonic is a function of the member. The factor keeps its value for rotated members.
+        (kind, number): values * unit_phasor(-number * angle) if kind == "deviation" else values
+        for (kind, number), values in field.channels.items()
+    }
+    representation = field.representation * unit_phasor(field.degree * angle)
+    return replace(field, representation=representation, channels=channels)
+
+
+def _wave_sum(position: np.ndarray, level: np.ndarray) -> np.ndarray:
+    """Sum the waves at positions, with a standard deviation of about 1.
+
+    Parameters
+    ----------
+    position : (3, n) float32 ndarray
+    level : (n,) ndarray
+        Base-2 logarithm of the mean wavelength, in the units of `position`.
+
+    Returns
+    -------
+    (n,) float32 ndarray
+    """
+    octave = np.floor(level)
+    blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
+    total = np.zeros(len(level), dtype=np.float32)
+    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
+    for index, weight in enumerate(cos_sin(blend_angle)):
+        x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
+        for frequency_x, frequency_y, frequency_z, phase in wave_table():
+            cycle = frequency_x * x + frequency_y * y + frequency_z * z + phase
+            cycle = 2 * (cycle - np.floor(cycle)) - 1
+            total += weight * (4 * cycle * (1 - np.abs(cycle)))
+    return total * np.float32(UNIT_VARIANCE_SCALE)

@@ -1,0 +1,167 @@
+"""Draw strokes along the fields of a scene, and store them as an object or an SVG file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from .cache import BAKE_CACHE
+from .compositor.shading import lights_of
+from .errors import RosyError
+from .file_io import check_writable
+from .progress import Progress, Task, run_to_completion, subtask
+from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
+from .scene.lights import read_lights
+from .scene.read_view import nonfinite_policy, scene_depsgraph
+from .scene.scene_reader import SceneData, read_scene
+from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
+from .strokes.pipeline import StrokeDrawing, draw_bodies_task
+from .strokes.style import StrokeStyle
+from .strokes.svg import Pen, write_svg
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeResult:
+    """The result of drawing strokes.
+
+    Attributes
+    ----------
+    camera : str
+        Name of the camera.
+    drawing : StrokeDrawing
+    obj : bpy.types.Object or None
+        The object with the strokes, or None for a file.
+    path : Path or None
+        The file, or None for an object.
+    notes : tuple of str
+        Warnings to the user.
+    """
+
+    camera: str
+    drawing: StrokeDrawing
+    obj: bpy.types.Object | None = None
+    path: Path | None = None
+    notes: tuple[str, ...] = ()
+
+
+def draw_strokes_task(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph | None = None,
+    *,
+    kind: str | None = None,
+    path: Path | str | None = None,
+    objects: Sequence[bpy.types.Object] | None = None,
+    camera: CameraSource | None = None,
+    style: StrokeStyle | None = None,
+    pen: Pen | None = None,
+    size: tuple[int, int] | None = None,
+) -> Task[StrokeResult]:
+    """Cover the objects of a scene with strokes along their fields.
+
+    The scene is changed in the last step. Closing the generator earlier leaves it unchanged.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph, optional
+        By default `scene_depsgraph`.
+    kind : {"PENCIL", "CURVES", "SVG"}, optional
+        Grease Pencil object, curves object or SVG file. By default ``scene.rosy.strokes.kind``.
+    path : Path or str, optional
+        Path of the SVG file. ``//`` is the folder of the .blend file. By default
+        ``scene.rosy.strokes.filepath``.
+    objects : sequence of bpy.types.Object, optional
+        Objects whose fields are drawn. By default all that have one. Other objects only occlude.
+    camera : bpy.types.Object or Camera, optional
+        By default the camera of renders.
+    style : StrokeStyle, optional
+        By default the settings of the scene.
+    pen : Pen, optional
+        By default the settings of the scene.
+    size : (int, int), optional
+        Resolution of the picture that lengths in pixels refer to. By default that of renders.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    StrokeResult
+
+    Raises
+    ------
+    RosyError
+        If there is nothing to draw, or it cannot be drawn; see `read_scene`, `resolve_camera` and
+        `draw_bodies_task`. Also if the file cannot be written.
+    """
+    settings = scene.rosy.strokes
+    kind = settings.kind if kind is None else kind
+    style = read_stroke_style(settings) if style is None else style
+    pen = read_pen(settings) if pen is None else pen
+    if kind == "SVG":
+        path = svg_path(settings.filepath if path is None else path)
+    yield Progress(0.0, "reading the scene")
+    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    source = render_camera(scene) if camera is None else camera
+    view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
+    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    lights = lights_of(style, read_lights(depsgraph, view.view))
+    clip_to_frame = kind == "SVG"
+    work = draw_bodies_task(
+        scene_data.instances,
+        view,
+        style,
+        lights=lights,
+        clip_to_frame=clip_to_frame,
+        cache=BAKE_CACHE,
+    )
+    drawing = yield from subtask(work, 0.05, 0.95)
+    BAKE_CACHE.evict_over_limit()
+    yield Progress(0.97, "putting the strokes there")
+    if kind == "SVG":
+        write_svg(path, drawing.strokes, view, pen)
+        return StrokeResult(view.name, drawing, path=path)
+    obj = store_strokes(scene, kind, drawing, view, pen, _parent_object(scene_data))
+    return StrokeResult(view.name, drawing, obj, notes=tuple(_notes(scene, obj, style)))
+
+
+def draw_strokes(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None, **options
+) -> StrokeResult:
+    """Run `draw_strokes_task` to its end."""
+    return run_to_completion(draw_strokes_task(scene, depsgraph, **options))
+
+
+def svg_path(path: Path | str) -> Path:
+    """Return the absolute path of an SVG file. ``//`` is the folder of the .blend file.
+
+    Raises
+    ------
+    RosyError
+        If the path starts with ``//`` and the .blend file is not saved, if the extension is not
+        .svg, or if the file cannot be written.
+    """
+    if str(path).startswith("//") and not bpy.data.filepath:
+        raise RosyError(f"{path}: save the .blend file first, or choose a folder")
+    path = Path(bpy.path.abspath(str(path)))
+    if path.suffix.lower() != ".svg":
+        raise RosyError(f"{path}: strokes are written to .svg files")
+    check_writable(path)
+    return path
+
+
+def _parent_object(scene_data: SceneData) -> bpy.types.Object | None:
+    """Return the object that the strokes move with: the drawn one, if there is only one."""
+    return scene_data.objects[0] if len(scene_data.objects) == 1 else None
+
+
+def _notes(scene: bpy.types.Scene, obj: bpy.types.Object, style: StrokeStyle) -> list[str]:
+    """Return warnings to the user about the new object."""
+    has_depth_pass = any(layer.use_pass_z for layer in scene.view_layers)
+    if not style.hidden or obj.type == "CURVES" or has_depth_pass:
+        return []
+    return ["renders show Grease Pencil through surfaces, unless the view layer has the pass Z"]

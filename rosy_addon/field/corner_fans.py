@@ -1,0 +1,116 @@
+"""Transport of face values to corners, averaging over smooth fans, and transport back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .frames import dot, tangent_frame, transport
+from .representation import complex_bincount, power
+from .surface import Surface
+
+
+def corner_rotations(
+    face_normal: np.ndarray, face_x: np.ndarray, corner_face: np.ndarray, corner_normal: np.ndarray
+) -> np.ndarray:
+    """The rotation from the frame of each face to the frame of each of its corners.
+
+    Transport is the minimal rotation from the face normal to the corner normal. A tangent vector
+    with the complex coordinate w in the frame of the face has the coordinate ``w * rotation`` in
+    ``tangent_frame(corner_normal)``. A representation z of degree N becomes ``z * rotation ** N``.
+
+    Parameters
+    ----------
+    face_normal, face_x : (F, 3) ndarray
+        Unit normals of the faces, and the x axes of their frames.
+    corner_face : (C,) int ndarray
+        Face of each corner.
+    corner_normal : (C, 3) ndarray
+        Unit normals of the corners.
+
+    Returns
+    -------
+    (C,) complex ndarray
+        Of modulus 1; 0 for the corners of faces without a frame.
+    """
+    transported_x = transport(face_x[corner_face], face_normal[corner_face], corner_normal)
+    x, y = tangent_frame(corner_normal)
+    rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
+    modulus = np.abs(rotation)
+    return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
+
+
+def average_over_fans(
+    values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray
+) -> np.ndarray:
+    """The weighted mean of corner values over the fan of each corner.
+
+    The corners of a fan must have the same normal, and so the same frame.
+
+    Parameters
+    ----------
+    values : (C,) complex ndarray
+    weights : (C,) float ndarray
+    corner_fan : (C,) int ndarray
+        As in `Surface`.
+
+    Returns
+    -------
+    (C,) complex ndarray
+        0 in fans whose weights sum to 0.
+    """
+    fan_count = int(corner_fan.max()) + 1
+    weight_sum = np.bincount(corner_fan, weights, fan_count)
+    mean = complex_bincount(corner_fan, weights * values, fan_count) / np.where(
+        weight_sum > 0, weight_sum, 1
+    )
+    return mean[corner_fan]
+
+
+def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndarray:
+    """The angle between the two edges at each corner of the faces.
+
+    Parameters
+    ----------
+    surface : Surface
+    points : (V, 3) ndarray, optional
+        Vertex positions; those of the surface if not given.
+
+    Returns
+    -------
+    (C,) float64 ndarray
+        Radians, 0 to pi.
+    """
+    positions = (surface.vertices if points is None else points)[surface.corner_vertex]
+    to_next = positions[surface.next_corner] - positions
+    to_previous = np.empty_like(to_next)
+    to_previous[surface.next_corner] = -to_next
+    cross = np.cross(to_next, to_previous)
+    return np.arctan2(np.sqrt(dot(cross, cross)), dot(to_next, to_previous))
+
+
+def smooth_face_values(
+    surface: Surface, z: np.ndarray, rotation: np.ndarray, degree: int, weights: np.ndarray
+) -> np.ndarray:
+    """Smooth face values once: transport to corners, average over fans, transport back, average.
+
+    Parameters
+    ----------
+    surface : Surface
+        Its corner normals must agree within each fan.
+    z : (F,) complex ndarray
+        Representations in the face frames that `rotation` was computed from.
+    rotation : (C,) complex ndarray
+        From `corner_rotations`.
+    degree : int
+        N of the representations.
+    weights : (C,) float ndarray
+        Weights of the corners in the fan averages, for example their angles.
+
+    Returns
+    -------
+    (F,) complex ndarray
+    """
+    corner_phase = power(rotation, degree)
+    averaged = average_over_fans(z[surface.corner_face] * corner_phase, weights, surface.corner_fan)
+    face_values = averaged * corner_phase.conj()
+    return np.add.reduceat(face_values, surface.face_start[:-1]) / np.diff(surface.face_start)

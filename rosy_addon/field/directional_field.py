@@ -1,0 +1,289 @@
+"""Fields of N arbitrary directions, as RoSy fields with deviations.
+
+The directions of polyvector, frame and conjugate fields may have any angles and lengths, so these
+fields are not RoSys. But N directions, sorted around the normal, have a nearest RoSy: the
+differences in angle between direction k and member k average to zero. Its representation is, up to
+sign and length, the product of all directions. This is the constant coefficient of the polynomial
+whose roots are the directions (Diamanti, Vaxman, Panozzo and Sorkine-Hornung 2014). So it does not
+depend on the order of the directions, and it is smooth where they are.
+
+Direction k is member k times a complex number delta_k. These numbers are the values of a
+trigonometric polynomial at the angles of the members,
+
+    delta_k = sum_j C_j exp(i j theta_k),   theta_k = t + 2 pi k / N,
+
+where t is the angle of the stored member. The coefficients C_j do not depend on which member is the
+first. Like z, they can be transported between frames, averaged and interpolated. For a RoSy C_0 is
+1 and the others are 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .frames import dot
+from .representation import face_frames, matching_angles, signed_power, to_representation
+from .rosy_field import RosyField, check_degree
+from .surface import Surface, build_edges
+from .symmetry import FieldSymmetry
+
+#: Directions within these tolerances count as a RoSy: the error of the angle between neighboring
+#: directions, in degrees, and the relative difference of lengths. Rounding to six digits, as in
+#: text files, gives errors about 100 times smaller.
+ANGLE_TOLERANCE_DEG, LENGTH_TOLERANCE = 1.0, 0.01
+
+#: Smallest modulus of a harmonic C_j that is kept (C_0 is about 1). Smaller ones are rounding
+#: errors of text files.
+MIN_HARMONIC = 1e-4
+
+#: Smallest fraction of the edges across which the stored member must match one on the same line,
+#: for the lines to count as separate families.
+MIN_FAMILY_AGREEMENT = 0.98
+
+
+def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField:
+    """Make a field from N directions on each face.
+
+    Parameters
+    ----------
+    surface : Surface
+        In the shape that the directions belong to: its rest shape, if it is deformed.
+    directions : (F, N, 3) float64 ndarray
+        In the planes of the faces, in any order. The field is undefined on faces where one of them
+        is zero.
+
+    Returns
+    -------
+    RosyField
+        With `direction_ratios`, unless the directions are a RoSy within `ANGLE_TOLERANCE_DEG` and
+        `LENGTH_TOLERANCE`; then the first direction is stored unchanged. `family_count` is the
+        number of lines if the first direction is on the same line over the whole surface.
+
+    See Also
+    --------
+    rosy_addon.field.validate.validated_directions : Check directions from outside first.
+    """
+    x, y = face_frames(surface)
+    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    within_tolerance = is_rosy(w)
+    first_angle, rho, direction_ratios = closest_rosy(w)
+    if within_tolerance:
+        vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
+    else:
+        vectors = rho[:, None] * (
+            np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
+        )
+    return detect_families(surface, RosyField(directions.shape[1], vectors, direction_ratios))
+
+
+def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Find the nearest RoSy of N directions, and the ratios of the directions to its members.
+
+    Parameters
+    ----------
+    w : (n, N) complex ndarray
+        Directions as complex numbers in tangent frames, in any order.
+
+    Returns
+    -------
+    first_angle : (n,) float64 ndarray
+        Angle of the member that corresponds to the first direction, radians.
+    rho : (n,) float64 ndarray
+        Mean length of the directions; 0 where one of them is zero.
+    direction_ratios : (n, N) complex128 ndarray
+        Ratios of directions to members, in counter-clockwise order from the first direction.
+    """
+    degree = check_degree(w.shape[1])
+    member_angles = 2 * np.pi * np.arange(degree) / degree
+    defined = (w != 0).all(axis=1)
+    w = np.where(defined[:, None], w, np.exp(1j * member_angles))
+    relative_angles = _relative_angles(w)
+    order = np.argsort(relative_angles, axis=1, kind="stable")
+    relative_angles, w = (
+        np.take_along_axis(relative_angles, order, 1),
+        np.take_along_axis(w, order, 1),
+    )
+    first_angle = np.angle(w[:, 0]) + (relative_angles - member_angles).mean(axis=1)
+    rho = np.abs(w).mean(axis=1)
+    direction_ratios = w / (rho[:, None] * np.exp(1j * (first_angle[:, None] + member_angles)))
+    return first_angle, rho * defined, direction_ratios
+
+
+def is_rosy(w: np.ndarray) -> bool:
+    """Whether all rows of (n, N) directions are RoSys within the tolerances.
+
+    Rows that contain a zero are ignored.
+    """
+    w = w[(w != 0).all(axis=1)]
+    if not len(w):
+        return True
+    length = np.abs(w)
+    gap_error = (
+        np.diff(np.sort(_relative_angles(w), axis=1), axis=1, append=2 * np.pi)
+        - 2 * np.pi / w.shape[1]
+    )
+    length_error = 1 - length.min(axis=1) / length.max(axis=1)
+    angle_error = np.degrees(np.abs(gap_error).max(initial=0.0))
+    return bool(
+        angle_error <= ANGLE_TOLERANCE_DEG and length_error.max(initial=0.0) <= LENGTH_TOLERANCE
+    )
+
+
+def _relative_angles(w: np.ndarray) -> np.ndarray:
+    """(n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
+    angle = np.angle(w)
+    relative = (angle - angle[:, :1]) % (2 * np.pi)
+    relative[:, 0] = 0
+    return relative
+
+
+def detect_families(surface: Surface, field: RosyField) -> RosyField:
+    """Set the `family_count` of a field.
+
+    It becomes the number of lines if the stored members are on matching lines across at least
+    `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
+    """
+    line_count = field_symmetry(field).line_count
+    if line_count == 1:
+        return field
+    faces, matching = field_matching(surface, field)
+    defined = field.vectors.any(axis=1)[faces].all(axis=1)
+    if not defined.any() or np.mean(matching[defined] % line_count == 0) < MIN_FAMILY_AGREEMENT:
+        return field
+    return replace(field, family_count=line_count)
+
+
+def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
+    """Compute all directions of a field on each face.
+
+    Returns
+    -------
+    (F, N, 3) float64 ndarray
+        In object space, counter-clockwise about the normal. The first corresponds to the stored
+        member; for a RoSy it is that member.
+    """
+    perpendicular = np.cross(surface.face_normal, field.vectors)
+    factor = np.exp(2j * np.pi * np.arange(field.degree) / field.degree)
+    if field.direction_ratios is not None:
+        factor = factor * field.direction_ratios
+    factor = np.broadcast_to(factor, (len(field.vectors), field.degree))[..., None]
+    return factor.real * field.vectors[:, None] + factor.imag * perpendicular[:, None]
+
+
+def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
+    """Compute the harmonics of a field relative to its stored members.
+
+    Returns
+    -------
+    dict of int to (F,) complex128 ndarray
+        C_j exp(i j t) by the order j, from -((N - 1) // 2) to N // 2. Orders other than 0 are left
+        out if no face exceeds `MIN_HARMONIC`. Empty for a RoSy.
+    """
+    return {} if field.direction_ratios is None else ratio_harmonics(field.direction_ratios)
+
+
+def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
+    """The same harmonics as `field_harmonics`, from (n, N) `direction_ratios`."""
+    degree = direction_ratios.shape[1]
+    member_angles = 2 * np.pi * np.arange(degree) / degree
+    coefficients = {}
+    for j in range(-((degree - 1) // 2), degree // 2 + 1):
+        values = (direction_ratios * np.exp(-1j * j * member_angles)).mean(axis=1)
+        if j == 0 or np.abs(values).max(initial=0.0) > MIN_HARMONIC:
+            coefficients[j] = values
+    return coefficients
+
+
+def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> np.ndarray:
+    """(n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
+    member = np.exp(2j * np.pi * np.arange(degree) / degree)
+    return sum(values[:, None] * signed_power(member, j) for j, values in coefficients.items())
+
+
+def field_symmetry(field: RosyField) -> FieldSymmetry:
+    """The `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
+    return FieldSymmetry(field.degree, tuple(field_harmonics(field)))
+
+
+def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
+    """Make a field of degree 4 from the eigenvectors of tensors restricted to the faces.
+
+    Parameters
+    ----------
+    surface : Surface
+    tensors : (F, 3, 3) float64 ndarray
+        Symmetric, object space.
+
+    Returns
+    -------
+    RosyField
+        The stored member lies along the major eigenvector, that of the greater signed eigenvalue.
+        The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
+        zero where the two eigenvalues are equal.
+    """
+    x, y = face_frames(surface)
+    a = np.einsum("fi,fij,fj->f", x, tensors, x)
+    b = np.einsum("fi,fij,fj->f", x, tensors, y)
+    c = np.einsum("fi,fij,fj->f", y, tensors, y)
+    mean, deviator = (a + c) / 2, (a - c) / 2 + 1j * b
+    deviator_norm = np.abs(deviator)
+    angle = np.angle(deviator) / 2
+    # A lower bound of the lengths keeps the directions of eigenvalues near 0.
+    max_eigenvalue = np.maximum(np.abs(mean) + deviator_norm, 1e-300)
+    major = np.maximum(np.abs(mean + deviator_norm), 1e-3 * max_eigenvalue)
+    minor = np.maximum(np.abs(mean - deviator_norm), 1e-3 * max_eigenvalue)
+    rho = np.where(deviator_norm > 1e-9 * max_eigenvalue, (major + minor) / 2, 0)
+    vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
+    major_ratio = np.where(rho > 0, major / np.where(rho > 0, rho, 1), 1)
+    direction_ratios = np.stack(
+        [major_ratio, 2 - major_ratio, major_ratio, 2 - major_ratio], axis=1
+    ).astype(np.complex128)
+    return RosyField(4, vectors, direction_ratios, 2)
+
+
+def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
+    """Match the members of neighboring faces across each interior edge.
+
+    Returns
+    -------
+    faces : (I, 2) int32 ndarray
+        The two faces of each interior edge.
+    matching : (I,) int32 ndarray
+        Member k of the first face matches member (k + matching) modulo N of the second, the nearest
+        one when the two faces are unfolded into a plane. Members are counted counter-clockwise from
+        the stored ones. The same holds for directions.
+    """
+    x, y = face_frames(surface)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    z_stored = to_representation(field.vectors, x, y, 1)
+    z = to_representation(field.vectors, x, y, field.degree)
+    closest_angle = matching_angles(surface, x, y, z, field.degree, a, b)
+    stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b)
+    matching = (
+        np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
+        % field.degree
+    )
+    return np.stack([surface.corner_face[a], surface.corner_face[b]], axis=1), matching
+
+
+def evaluate_harmonics(
+    coefficients: Sequence[tuple[int, np.ndarray]], member: np.ndarray
+) -> np.ndarray:
+    """Evaluate delta, the ratio of direction to member, from harmonics.
+
+    Parameters
+    ----------
+    coefficients : sequence of (int, (...) complex ndarray)
+        Pairs of an order j and C_j.
+    member : (...) complex ndarray
+        Members as complex numbers of modulus 1, in the same frames as the C_j.
+
+    Returns
+    -------
+    (...) complex ndarray
+    """
+    return sum(values * signed_power(member, j) for j, values in coefficients)

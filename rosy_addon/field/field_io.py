@@ -1,0 +1,248 @@
+"""Read and write fields in the file formats of other programs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import RosyError
+from ..file_io import write_bytes
+from .directional_field import field_directions, tensor_field
+from .formats.fieldgen import fieldgen_text, read_fieldgen
+from .formats.plain import directions_text, npy_bytes, read_npy, read_text
+from .formats.raw_field import RawField
+from .formats.rosy_rawfield import rawfield_text, read_rawfield, read_rosy, rosy_text
+from .formats.sings import SINGULARITY_SUFFIXES, sings_text
+from .mesh_io import READERS as MESH_READERS
+from .mesh_io import SHARP_ANGLE, read_mesh
+from .rosy_field import RosyField
+from .singularities import find_singularities
+from .surface import Surface, build_surface
+from .transfer import transfer_field
+from .validate import has_finite_square, infer_domain, validated_directions, validated_field
+
+#: The reader of each file name extension.
+_READERS: dict[str, Callable[[Path], RawField]] = {
+    ".rosy": read_rosy,
+    ".rawfield": read_rawfield,
+    ".obj": read_fieldgen,
+    ".txt": read_text,
+    ".npy": read_npy,
+}
+READ_SUFFIXES = tuple(_READERS)
+WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
+
+#: Degree of files that do not state one, if the caller gives none.
+DEFAULT_DEGREE = 4
+
+
+class LoadedField(NamedTuple):
+    """A field read from a file, and a note for the user on how it was read (may be empty)."""
+
+    field: RosyField
+    note: str
+
+
+def read_field(
+    path: str | os.PathLike[str],
+    surface: Surface,
+    degree: int | None = None,
+    nonfinite: str = "error",
+    mesh: str | os.PathLike[str] | None = None,
+) -> RosyField:
+    """Read a field from a file; `load_field` without the note."""
+    return load_field(path, surface, degree, nonfinite, mesh).field
+
+
+def load_field(
+    path: str | os.PathLike[str],
+    surface: Surface,
+    degree: int | None = None,
+    nonfinite: str = "error",
+    mesh: str | os.PathLike[str] | None = None,
+) -> LoadedField:
+    """Read a field from a file and fit it to a mesh.
+
+    ============  ==================================================================
+    `.rosy`       a count, N, and rows x y z with one member each
+    `.rawfield`   N, a count, and rows of all N directions, a RoSy or not
+    `.obj`        a mesh with the field in comments, as the program fieldgen writes it
+    `.txt`        rows of 3 numbers (a member each), of 3 N (all directions), or of 9
+                  that are symmetric 3 x 3 tensors
+    `.npy`        the same as an array, (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
+    ============  ==================================================================
+
+    Any white space separates numbers. Rows belong to faces or to vertices. Vertex values are
+    averaged onto the faces. Tensors must be on faces.
+
+    Parameters
+    ----------
+    path : path-like
+    surface : Surface
+        The mesh of the field.
+    degree : int, optional
+        The required degree N; any if not given. Plain files with one member a row do not state a
+        degree. They get this one, or `DEFAULT_DEGREE`.
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    mesh : path-like, optional
+        The mesh file that the rows refer to, if its faces differ from those of `surface`, for
+        example because one of them was triangulated or reordered. The field is then transferred by
+        position. If not given, and the counts differ, a mesh file of the same name in the same
+        folder is used.
+
+    Returns
+    -------
+    LoadedField
+
+    Raises
+    ------
+    RosyError
+        If the file is missing, has another extension, is malformed, has another degree or belongs
+        to another mesh, or its vectors are not tangent to the surface.
+    """
+    path = Path(path)
+    reader = _READERS.get(path.suffix.lower())
+    if path.suffix.lower() in SINGULARITY_SUFFIXES:
+        raise RosyError(f"{path}: holds singularities, and no directions")
+    if reader is None:
+        raise RosyError(
+            f"{path}: fields are read from {_join_names(READ_SUFFIXES)}, not from '{path.suffix}' files"
+        )
+    raw = reader(path)
+    if degree is not None and raw.degree is not None and raw.degree != degree:
+        raise RosyError(f"{path}: holds a field of degree {raw.degree}, not {degree}")
+    source_surface = _source_surface(path, raw, surface, mesh)
+    if source_surface is None:
+        return LoadedField(_field_from_raw(raw, surface, degree, str(path), nonfinite), "")
+    field = transfer_field(
+        source_surface,
+        _field_from_raw(raw, source_surface, degree, str(path), nonfinite),
+        surface,
+        str(path),
+    )
+    return LoadedField(
+        field,
+        f"{path.name}: its {source_surface.face_count:,} faces are not the {surface.face_count:,} of the mesh; "
+        f"the field followed by position, from {Path(source_surface.name).name}",
+    )
+
+
+def _field_from_raw(
+    raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
+) -> RosyField:
+    """Make a field from raw rows, on the surface that the rows refer to."""
+    _check_count(raw, surface, source)
+    values = raw.values
+    if raw.tensors:
+        if not has_finite_square(values).all():
+            raise RosyError(f"{source}: holds tensors that are not finite")
+        if len(values) != surface.face_count:
+            raise RosyError(f"{source}: holds tensors on vertices; they are read on faces alone")
+        return tensor_field(surface, values)
+    if raw.degree is None or values.shape[1] == 1:
+        known_degree = raw.degree or degree or DEFAULT_DEGREE
+        return validated_field(surface, values[:, 0], known_degree, source, nonfinite, raw.domain)
+    return validated_directions(surface, values, source, nonfinite, raw.domain)
+
+
+def _check_count(raw: RawField, surface: Surface, source: str) -> None:
+    """Raise an error if the number of rows fits neither the header nor the surface.
+
+    Some programs write the number of vertices in the header of a field on faces. This is accepted.
+    """
+    row_count = len(raw.values)
+    vertices_over_faces = (
+        raw.header_count == len(surface.vertices) and row_count == surface.face_count
+    )
+    if raw.header_count not in (None, row_count) and not vertices_over_faces:
+        raise RosyError(
+            f"{source}: says {raw.header_count} rows of {raw.columns} numbers, but holds {row_count}"
+        )
+    if raw.domain is None and infer_domain(surface, row_count) is None:
+        raise RosyError(
+            f"{source}: holds {row_count} rows, but the mesh {surface.name} has "
+            f"{surface.face_count} faces and {len(surface.vertices)} vertices"
+        )
+
+
+def _source_surface(
+    path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
+) -> Surface | None:
+    """The surface that the rows of a file refer to, if it is not `surface`; None if it is."""
+    if mesh is not None:
+        return read_mesh(mesh)
+    count = len(raw.values)
+    if raw.polygons is not None:
+        source = len(raw.polygons.vertices), raw.polygons.face_count
+        if source == (len(surface.vertices), surface.face_count):
+            return None
+        return build_surface(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    if count == surface.face_count:
+        return None
+    candidates = [
+        path.with_suffix(suffix) for suffix in MESH_READERS if suffix != path.suffix.lower()
+    ]
+    mesh_path = next((other for other in candidates if other.is_file()), None)
+    if mesh_path is None:
+        return None
+    source = read_mesh(mesh_path)
+    # The rows may match the vertices of `surface`, but belong to the faces of the mesh file.
+    return source if count == source.face_count or infer_domain(surface, count) is None else None
+
+
+def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
+    """Write a field to a file, with one row for each face.
+
+    `.obj` files contain the mesh and one row for each vertex. `.sings` and `.sing` files contain
+    only the singularities of the field.
+
+    Numbers are written so that reading gives exactly the same float64; the field in an `.obj` file
+    differs, because it is averaged onto the vertices. Fields made from directions are written with
+    their `source_directions`, where the format has all directions.
+
+    Raises
+    ------
+    RosyError
+        If the extension is not in `WRITE_SUFFIXES`, the format cannot store such a field, or the
+        file cannot be written.
+
+    See Also
+    --------
+    load_field : The formats.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in WRITE_SUFFIXES:
+        raise RosyError(
+            f"{path}: fields are written to {_join_names(WRITE_SUFFIXES)}, not to '{path.suffix}' files"
+        )
+    if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
+        raise RosyError(
+            f"{path}: a {suffix} file has room for one member a row, but the directions of this "
+            "field are no RoSy: write a .rawfield, .txt or .npy file"
+        )
+    if suffix == ".rosy":
+        data = rosy_text(field)
+    elif suffix == ".obj":
+        data = fieldgen_text(surface, field)
+    elif suffix in SINGULARITY_SUFFIXES:
+        data = sings_text(field.degree, *find_singularities(surface, field))
+    else:
+        rows = (
+            field.source_directions
+            if field.source_directions is not None
+            else field_directions(surface, field)
+        )
+        if suffix == ".npy":
+            write_bytes(path, npy_bytes(rows))
+            return
+        data = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)
+    write_bytes(path, data.encode("ascii"))
+
+
+def _join_names(names: tuple[str, ...]) -> str:
+    """Join names as in "a, b and c"."""
+    return f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,95 @@
+"""Read and write `.rosy` (one member vector a row) and `.rawfield` (all N directions a row) files.
+
+`.rawfield` is a format of the library Directional.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RosyError
+from ..rosy_field import RosyField, check_degree
+from .raw_field import RawField
+from .text_rows import TextRows, abbreviate, format_rows, read_rows
+
+
+def read_rosy(path: Path) -> RawField:
+    """Read a `.rosy` file: a count, N, and rows x y z.
+
+    Count and N may be on one line or on two.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, or is malformed.
+    """
+    rows = read_rows(path, comment=None)
+    count, degree = _read_header(rows, "count", "degree")
+    return RawField(
+        _vector_table(rows, 3, count).reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count
+    )
+
+
+def read_rawfield(path: Path) -> RawField:
+    """Read a `.rawfield` file: N, a count, and rows of N vectors.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, or is malformed.
+    """
+    rows = read_rows(path, comment=None)
+    degree, count = _read_header(rows, "degree", "count")
+    degree = _validated_degree(rows, 0, degree)
+    return RawField(_vector_table(rows, 3 * degree, count).reshape(-1, degree, 3), degree, count)
+
+
+def rosy_text(field: RosyField) -> str:
+    """Format the member vectors of a field as a `.rosy` file."""
+    return "\n".join([str(len(field.vectors)), str(field.degree), *format_rows(field.vectors), ""])
+
+
+def rawfield_text(directions: np.ndarray) -> str:
+    """Format (F, N, 3) directions as a `.rawfield` file."""
+    count, degree = directions.shape[:2]
+    return "\n".join([f"{degree} {count}", *format_rows(directions.reshape(count, -1)), ""])
+
+
+def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
+    """The first two integers of the file, on one line or on two; `names` are for messages."""
+    words = [word for line in rows.words[:2] for word in line][:2]
+    values = []
+    for number, name in enumerate(names):
+        try:
+            values.append(int(words[number]))
+        except IndexError:
+            raise RosyError(f"{rows.path}: ends before the {name}") from None
+        except ValueError:
+            row = rows.row_of_word(number)
+            found = abbreviate(words[number])
+            raise rows.error(row, f"found {found}, wanted the {name}, a whole number") from None
+    return values[0], values[1]
+
+
+def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
+    """`check_degree`, with the file and the line of the word in its error."""
+    try:
+        return check_degree(degree)
+    except RosyError as reason:
+        raise rows.error(rows.row_of_word(word), str(reason)) from None
+
+
+def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
+    """(n, columns) float64 numbers after the header; line breaks have no meaning.
+
+    `count` is the number of rows that the header declares, for the message.
+    """
+    row_count, remainder = divmod(sum(map(len, rows.words)) - 2, columns)
+    if remainder:
+        raise RosyError(
+            f"{rows.path}: says {count} rows of {columns} numbers, but holds {row_count} and a part of "
+            "one"
+        )
+    return rows.floats("part of a vector")[2:].reshape(row_count, columns)

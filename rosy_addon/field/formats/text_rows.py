@@ -1,0 +1,135 @@
+"""Parse text files as rows of numbers, with errors that name the file and the line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import accumulate, chain
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import RosyError
+from ...file_io import read_bytes
+
+
+@dataclass(frozen=True, eq=False)
+class TextRows:
+    """The rows of a text file that are not empty, split at white space.
+
+    Attributes
+    ----------
+    path : Path
+    words : list of list of bytes
+        The words of each row; at least one, unless a caller selects words.
+    line_numbers : list of int
+        The line of each row in the file, counted from 1.
+    """
+
+    path: Path
+    words: list[list[bytes]]
+    line_numbers: list[int]
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    def __getitem__(self, rows: slice) -> TextRows:
+        return TextRows(self.path, self.words[rows], self.line_numbers[rows])
+
+    def error(self, row: int, message: str) -> RosyError:
+        """The error to raise for a row: names the file and, if the row exists, its line."""
+        if row < len(self.line_numbers):
+            return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
+        return RosyError(f"{self.path}: {message}")
+
+    def floats(self, label: str) -> np.ndarray:
+        """Parse all words of all rows as one float64 array; `label` is for messages."""
+        return self._parse(float, np.float64, f"a number ({label})")
+
+    def ints(self, label: str) -> np.ndarray:
+        """Parse all words of all rows as one int64 array; `label` is for messages."""
+        return self._parse(int, np.int64, f"a whole number ({label})")
+
+    def points(self, label: str) -> np.ndarray:
+        """Parse the first three words of each row as a point.
+
+        Returns
+        -------
+        (rows, 3) float64 ndarray
+
+        Raises
+        ------
+        RosyError
+            If a row has fewer than three words, or a coordinate is not a finite number.
+        """
+        for row, words in enumerate(self.words):
+            if len(words) < 3:
+                raise self.error(row, f"{label} has {len(words)} coordinates, 3 are wanted")
+        points = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers).floats(
+            label
+        )
+        points = points.reshape(-1, 3)
+        finite = np.isfinite(points).all(axis=1)
+        if not finite.all():
+            row = int(np.argmin(finite))
+            raise self.error(row, f"{label} {row} has a coordinate that is not finite")
+        return points
+
+    def row_of_word(self, word: int) -> int:
+        """The row that holds a word, which is counted from 0 over all rows."""
+        ends = list(accumulate(map(len, self.words)))
+        return int(np.searchsorted(ends, word, side="right"))
+
+    def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
+        """Convert all words of all rows, or raise an error that names the first bad one."""
+        try:
+            return np.array(list(map(convert, chain.from_iterable(self.words))), dtype=dtype)
+        except (ValueError, OverflowError):
+            raise self._parse_error(convert, expected) from None
+
+    def _parse_error(self, convert: Callable, expected: str) -> RosyError:
+        """The error for the first word that cannot be converted."""
+        for row, words in enumerate(self.words):
+            for word in words:
+                try:
+                    if abs(convert(word)) >= 2**63 and convert is int:
+                        return self.error(row, f"{abbreviate(word)} is too large")
+                except ValueError:
+                    return self.error(row, f"found {abbreviate(word)}, wanted {expected}")
+        raise AssertionError("every word is a number")
+
+
+def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = None) -> TextRows:
+    """Read the rows of a text file; empty lines are left out.
+
+    Parameters
+    ----------
+    path : Path
+    comment : bytes, optional
+        Characters that start a comment, which runs to the end of the line; None for no comments.
+    data : bytes, optional
+        The contents of the file, if they have already been read.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read or is not text.
+    """
+    data = read_bytes(path, reject_binary=True) if data is None else data
+    # Also accept a lone CR, but not the other separators of `splitlines`.
+    lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    if comment is not None and comment in data:
+        lines = [line.partition(comment)[0] for line in lines]
+    numbered = [(words, number) for number, line in enumerate(lines, 1) if (words := line.split())]
+    return TextRows(path, [words for words, _ in numbered], [number for _, number in numbered])
+
+
+def abbreviate(word: bytes) -> str:
+    """Quote a word for a message: printable characters only, at most 24 of its bytes."""
+    text = word[:24].decode("ascii", "backslashreplace")
+    return repr("".join(c if c.isprintable() else "?" for c in text) + "..." * (len(word) > 24))
+
+
+def format_rows(rows: np.ndarray) -> list[str]:
+    """Format each row of (n, k) numbers as text that reads back as exactly the same float64."""
+    return [" ".join(map(repr, row)) for row in rows.tolist()]

@@ -1,0 +1,65 @@
+"""Read meshes from .obj, .off, .ply and .stl files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import RosyError
+from .formats.obj import read_obj
+from .formats.off import read_off
+from .formats.ply import read_ply
+from .formats.polygons import Polygons
+from .formats.stl import read_stl
+from .surface import Surface, build_surface
+
+#: The reader of each file name extension.
+READERS: dict[str, Callable[[Path], Polygons]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+
+#: Angle between face normals in radians above which an edge counts as sharp, because files do not
+#: mark sharp edges. Curved regions rarely exceed 60 degrees even in coarse meshes (an octagonal
+#: prism has 45), and most intended edges have 90.
+SHARP_ANGLE = np.radians(60)
+
+
+def read_mesh(path: str | os.PathLike[str]) -> Surface:
+    """Read a mesh from an .obj, .off, .ply or .stl file.
+
+    Vertices and faces keep the order of the file, because field files refer to them by number.
+    Equal corners of an .stl file are merged into one vertex. Edges with an angle above
+    `SHARP_ANGLE` are sharp.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    Surface
+        Its name is the path of the file.
+
+    Raises
+    ------
+    RosyError
+        If the file is missing, has another extension, is malformed or truncated, or is not a mesh
+        with faces. The message names the file and, in text files, the line.
+
+    Examples
+    --------
+    >>> surface = read_mesh("bunny.obj")
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        suffixes = ", ".join(READERS)
+        raise RosyError(f"{path}: meshes are read from {suffixes}, not from '{path.suffix}' files")
+    polygons = reader(path)
+    return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)

@@ -1,0 +1,341 @@
+"""Sparse Hermitian matrices in numpy, and algebraic multigrid for connection Laplacians.
+
+The smooth vectors of a connection Laplacian are parallel, not constant: between neighboring
+unknowns their phase changes by the phase of the matrix entry. So each aggregate stores the phases
+along a tree within it. The prolongation is then smoothed by a Jacobi step (smoothed aggregation:
+Vanek, Mandel and Brezina 1996).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..progress import Progress, Task
+
+#: Largest number of unknowns of the coarsest level; it is solved with a dense inverse.
+DIRECT_SOLVE_SIZE = 400
+
+#: Rows processed at once, so that their entries fit in the cache of a core.
+BLOCK_ROWS = 1 << 12
+
+#: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
+#: connect unknowns to an aggregate.
+STRENGTH_THRESHOLD = 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class CSRMatrix:
+    """A sparse matrix in compressed row storage (CSR), without empty rows.
+
+    n is the number of rows, m of entries. ``len(matrix)`` is n, ``matrix @ vector`` the product.
+
+    Attributes
+    ----------
+    indptr : (n + 1,) intp ndarray
+        The entries of row i are ``indptr[i] .. indptr[i + 1] - 1``.
+    indices : (m,) intp ndarray
+        Column of each entry.
+    data : (m,) complex ndarray
+        Values of the entries.
+    column_count : int
+    """
+
+    indptr: np.ndarray
+    indices: np.ndarray
+    data: np.ndarray
+    column_count: int
+
+    def __len__(self) -> int:
+        return len(self.indptr) - 1
+
+    def __matmul__(self, vector: np.ndarray) -> np.ndarray:
+        result = np.empty(len(self), dtype=np.result_type(self.data, vector))
+        for first in range(0, len(self), BLOCK_ROWS):
+            starts = self.indptr[first : first + BLOCK_ROWS + 1]
+            block = slice(starts[0], starts[-1])
+            terms = vector.take(self.indices[block])
+            terms *= self.data[block]
+            np.add.reduceat(terms, starts[:-1] - starts[0], out=result[first : first + BLOCK_ROWS])
+        return result
+
+    @cached_property
+    def row_indices(self) -> np.ndarray:
+        """(m,) intp: the row of each entry."""
+        return np.repeat(np.arange(len(self)), np.diff(self.indptr))
+
+    @cached_property
+    def diagonal(self) -> np.ndarray:
+        """(n,) float64: the real part of the diagonal."""
+        on_diagonal = self.indices == self.row_indices
+        return np.bincount(self.row_indices[on_diagonal], self.data[on_diagonal].real, len(self))
+
+    @cached_property
+    def adjoint(self) -> CSRMatrix:
+        """The conjugate transpose."""
+        return from_coo(
+            self.indices, self.row_indices, self.data.conj(), self.column_count, len(self)
+        )
+
+
+def from_coo(
+    row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
+) -> CSRMatrix:
+    """Make a matrix from entries in any order.
+
+    Entries with the same row and column add up. No row may be empty.
+
+    Parameters
+    ----------
+    row, column : (m,) intp ndarray
+    value : (m,) complex ndarray
+    row_count, column_count : int
+    """
+    # A radix sort by digits of 16 bits, the low digit first: numpy's stable sort takes linear time
+    # only for integers of at most 16 bits.
+    order = np.argsort(row.astype(np.uint16), kind="stable")
+    if row_count > 1 << 16:
+        order = order.take(np.argsort((row >> 16).astype(np.uint16).take(order), kind="stable"))
+    indptr = np.zeros(row_count + 1, dtype=np.intp)
+    np.cumsum(np.bincount(row, minlength=row_count), out=indptr[1:])
+    return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
+
+
+def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
+    """The matrix product a b."""
+    return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
+
+
+def _product_terms(
+    a: CSRMatrix, b: CSRMatrix, block: slice
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows, columns and values of the terms that a block of entries of `a` adds to a b."""
+    inner = a.indices[block]
+    first = b.indptr.take(inner)
+    count = b.indptr.take(inner + 1) - first
+    entry = np.repeat(np.arange(len(inner)), count)
+    first -= np.cumsum(count) - count
+    source = first.take(entry)
+    source += np.arange(len(entry))
+    value = a.data[block].take(entry)
+    value *= b.data.take(source)
+    return a.row_indices[block].take(entry), b.indices.take(source), value
+
+
+def _assemble_by_rows(
+    matrix: CSRMatrix,
+    column_count: int,
+    entries: Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]],
+) -> CSRMatrix:
+    """Build a matrix block by block of the rows of another one, so that sorting stays in the cache.
+
+    Parameters
+    ----------
+    matrix : CSRMatrix
+        The result has the same number of rows.
+    column_count : int
+        Of the result.
+    entries : callable
+        Takes a slice of the entries of `matrix` and returns the rows, columns and values of the
+        result that come from them. Entries at the same position are summed.
+    """
+    bits = int(column_count).bit_length()
+    row_counts, index_blocks, value_blocks = [], [], []
+    for first in range(0, len(matrix), BLOCK_ROWS):
+        last = min(first + BLOCK_ROWS, len(matrix))
+        row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))
+        key, value = _sum_duplicates((row - first) << bits | column, value)
+        row_counts.append(np.bincount(key >> bits, minlength=last - first))
+        index_blocks.append(key & ((1 << bits) - 1))
+        value_blocks.append(value)
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate(row_counts))])
+    return CSRMatrix(
+        indptr, np.concatenate(index_blocks), np.concatenate(value_blocks), column_count
+    )
+
+
+def _sum_duplicates(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The distinct keys in ascending order, and the sum of the values of each."""
+    order = np.argsort(key, kind="stable")
+    key = key.take(order)
+    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
+    return key.take(first), np.add.reduceat(value.take(order), first)
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A level of the multigrid hierarchy.
+
+    Attributes
+    ----------
+    matrix : CSRMatrix
+        (n, n), Hermitian and positive definite.
+    prolongation : CSRMatrix or None
+        (n, n_coarse) interpolation from the next coarser level; None on the coarsest level.
+    jacobi_weight : (n,) float64 ndarray
+        Factors of the residual in a Jacobi smoothing step.
+    inverse : (n, n) complex128 ndarray or None
+        Dense inverse of the matrix on the coarsest level, if that is small enough.
+    """
+
+    matrix: CSRMatrix
+    prolongation: CSRMatrix | None
+    jacobi_weight: np.ndarray
+    inverse: np.ndarray | None
+
+
+def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
+    """Build the multigrid levels of a positive definite matrix.
+
+    Coarsening stops when a level is small enough for a dense inverse, or when aggregation no longer
+    reduces the number of unknowns by at least a fifth.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    list of Level
+        From the finest level to the coarsest.
+    """
+    levels = []
+    unknown_count = len(matrix)
+    while True:
+        yield Progress(1 - len(matrix) / (unknown_count + 1), "building levels")
+        jacobi_weight = _jacobi_weights(matrix)
+        aggregation = _build_aggregates(matrix) if len(matrix) > DIRECT_SOLVE_SIZE else None
+        if aggregation is None or aggregation[1] > 0.8 * len(matrix):
+            inverse = _dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
+            levels.append(Level(matrix, None, jacobi_weight, inverse))
+            return levels
+        prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
+        levels.append(Level(matrix, prolongation, jacobi_weight, None))
+        yield Progress(1 - len(matrix) / (unknown_count + 1), "building levels")
+        matrix = matrix_product(prolongation.adjoint, matrix_product(matrix, prolongation))
+
+
+def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
+    """Approximate the solution of ``levels[0].matrix @ solution = rhs`` by one W-cycle.
+
+    Each coarser level is visited twice. This costs little, because a level has about a ninth of the
+    unknowns of the next finer one. It makes the convergence rate independent of the number of
+    levels.
+
+    Parameters
+    ----------
+    levels : list of Level
+        From `hierarchy_task`.
+    rhs : (n,) complex ndarray
+
+    Returns
+    -------
+    (n,) complex ndarray
+    """
+    level = levels[0]
+    if level.inverse is not None:
+        return level.inverse @ rhs
+    solution = level.jacobi_weight * rhs
+    if level.prolongation is None:
+        for _ in range(20):
+            solution += level.jacobi_weight * (rhs - level.matrix @ solution)
+        return solution
+    residual = level.prolongation.adjoint @ (rhs - level.matrix @ solution)
+    correction = w_cycle(levels[1:], residual)
+    if levels[1].inverse is None:
+        correction += w_cycle(levels[1:], residual - levels[1].matrix @ correction)
+    solution += level.prolongation @ correction
+    solution += level.jacobi_weight * (rhs - level.matrix @ solution)
+    return solution
+
+
+def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
+    """(n,) weights of a Jacobi step that damps the upper part of the spectrum."""
+    diagonal = matrix.diagonal
+    scaled_row_sum = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1]) / diagonal
+    return 4 / (3 * scaled_row_sum.max() * diagonal)
+
+
+def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
+    """The inverse of a sparse matrix as a dense array."""
+    dense = np.zeros((len(matrix), len(matrix)), dtype=np.complex128)
+    np.add.at(dense, (matrix.row_indices, matrix.indices), matrix.data)
+    return np.linalg.inv(dense)
+
+
+def _smoothed_prolongation(
+    matrix: CSRMatrix,
+    jacobi_weight: np.ndarray,
+    aggregate: np.ndarray,
+    count: int,
+    phase: np.ndarray,
+) -> CSRMatrix:
+    """The prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
+    unknowns = np.arange(len(matrix))
+
+    def entries(block: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        row, column = matrix.row_indices[block], matrix.indices[block]
+        value = matrix.data[block] * phase.take(column)
+        value *= -jacobi_weight.take(row)
+        block_rows = unknowns[row[0] : row[-1] + 1]
+        return (
+            np.concatenate([row, block_rows]),
+            np.concatenate([aggregate.take(column), aggregate.take(block_rows)]),
+            np.concatenate([value, phase.take(block_rows)]),
+        )
+
+    return _assemble_by_rows(matrix, count, entries)
+
+
+def _build_aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
+    """Group the unknowns into aggregates of strongly connected neighbors.
+
+    Returns
+    -------
+    aggregate : (n,) int64 ndarray
+        Aggregate of each unknown.
+    count : int
+        Number of aggregates.
+    phase : (n,) complex128 ndarray
+        Numbers of modulus 1; a smooth vector is nearly proportional to them in each aggregate.
+    """
+    count = len(matrix)
+    row, column = matrix.row_indices, matrix.indices
+    strength = np.where(row == column, 0, np.abs(matrix.data))
+    largest = np.maximum.reduceat(strength, matrix.indptr[:-1])
+    strength[strength < STRENGTH_THRESHOLD * np.minimum(largest[row], largest[column])] = 0
+    strong = strength > 0
+
+    def max_over_neighbors(values: np.ndarray) -> np.ndarray:
+        return np.maximum.reduceat(
+            np.where(strong | (row == column), values.take(column), -1), matrix.indptr[:-1]
+        )
+
+    # Roots are the free unknowns with the largest random priority among those within two steps.
+    priority = np.random.default_rng(0).permutation(count)
+    free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+    while free.any():
+        free_priority = np.where(free, priority, -1)
+        new_roots = free & (max_over_neighbors(max_over_neighbors(free_priority)) == priority)
+        root |= new_roots
+        free &= max_over_neighbors(max_over_neighbors(new_roots.astype(np.intp))) < 1
+    aggregate = np.full(count, -1)
+    aggregate[root] = np.arange(np.count_nonzero(root))
+    phase = np.ones(count, dtype=np.complex128)
+    for _ in range(2):
+        # A free unknown joins the aggregate of the neighbor with the strongest connection.
+        weight = np.where(aggregate[column] >= 0, strength, 0)
+        strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])
+        joins = (weight == strongest[row]) & (strongest[row] > 0) & (aggregate[row] < 0)
+        entry = np.flatnonzero(joins)
+        unknown, neighbor = row[entry], column[entry]
+        phase_step = -matrix.data[entry] / np.abs(matrix.data[entry])
+        neighbor_aggregate = aggregate[neighbor]
+        phase[unknown] = phase_step * phase[neighbor]
+        aggregate[unknown] = neighbor_aggregate
+    singleton = aggregate < 0
+    aggregate[singleton] = np.count_nonzero(root) + np.arange(np.count_nonzero(singleton))
+    return aggregate, int(aggregate.max()) + 1, phase

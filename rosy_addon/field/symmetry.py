@@ -1,0 +1,48 @@
+"""The symmetry of a field: how many lines and covering sheets its N directions form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class FieldSymmetry:
+    """The symmetry of a field of N directions.
+
+    A direction and its opposite have the same streamlines, so they form one line. The members of a
+    RoSy have opposites if N is even. Directions that deviate from a RoSy have opposites if N is
+    even and all their harmonics have even order.
+
+    Attributes
+    ----------
+    degree : int
+        N.
+    harmonic_orders : tuple of int
+        Orders j of the harmonics C_j by which the directions deviate from a RoSy (see
+        `field.directional_field`). Empty for a RoSy.
+    """
+
+    degree: int
+    harmonic_orders: tuple[int, ...] = ()
+
+    @property
+    def has_opposites(self) -> bool:
+        """Whether the opposite of each direction is also a direction of the field."""
+        return self.degree % 2 == 0 and not any(j % 2 for j in self.harmonic_orders)
+
+    @property
+    def line_count(self) -> int:
+        """M, the number of lines through a point: N / 2 with opposites, N otherwise."""
+        return self.degree // 2 if self.has_opposites else self.degree
+
+    @property
+    def sheets_per_turn(self) -> int:
+        """Number of covering sheets in a full turn of 2 pi.
+
+        It is 2 M for a RoSy. With odd N, the opposite of a member lies halfway between two members,
+        so both orientations of the lines are evenly spaced. It is N for directions that have no
+        opposites and are not a RoSy, because their opposites are not evenly spaced.
+        """
+        if self.harmonic_orders and not self.has_opposites:
+            return self.degree
+        return 2 * self.line_count

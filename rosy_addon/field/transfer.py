@@ -1,0 +1,77 @@
+"""Transfer of a field between two meshes of the same shape, by position."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from .closest_point import closest_triangles
+from .frames import dot, normalize, transport
+from .rosy_field import RosyField
+from .surface import Surface
+
+#: Limits for a target face to get the field of the closest source face: the distance relative to
+#: `Surface.extent` of the source, and the angle between the normals in radians.
+MAX_DISTANCE, MAX_NORMAL_ANGLE = 0.02, np.radians(60)
+
+#: Largest fraction of the target faces that may exceed these limits. The field is undefined on
+#: them.
+MAX_UNMATCHED_FRACTION = 0.05
+
+
+def transfer_field(
+    source: Surface, field: RosyField, target: Surface, field_name: str
+) -> RosyField:
+    """Transfer a field to another mesh: each face takes the value of the closest source face.
+
+    Parameters
+    ----------
+    source : Surface
+    field : RosyField
+        The field on the faces of `source`.
+    target : Surface
+        The same shape in the same space with different faces, for example triangulated or
+        reordered.
+    field_name : str
+        Name of the field in messages.
+
+    Returns
+    -------
+    RosyField
+        On the faces of `target`; zero on faces beyond `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`, and on
+        faces without area.
+
+    Raises
+    ------
+    RosyError
+        If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
+    """
+    points = _face_points(target)
+    triangle, distance = closest_triangles(source, points)
+    face = source.triangle_face[triangle]
+    extent = max(source.extent, 1e-300)
+    normal = target.face_normal
+    normal_cosine = dot(normal, source.face_normal[face])
+    is_far = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
+    is_far |= ~normal.any(axis=1)
+    unmatched = is_far & normal.any(axis=1)
+    if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(is_far):
+        raise RosyError(
+            f"{field_name}: {unmatched.sum()} of {len(is_far)} faces of {target.name} are away from "
+            f"{source.name} by up to {distance.max():.3g}: it is another shape, or in another place"
+        )
+    vectors = field.vectors[face]
+    length = np.sqrt(dot(vectors, vectors))[:, None]
+    vectors = normalize(transport(vectors, source.face_normal[face], normal)) * length
+    vectors[is_far] = 0
+    direction_ratios = None if field.direction_ratios is None else field.direction_ratios[face]
+    return RosyField(field.degree, vectors, direction_ratios, field.family_count)
+
+
+def _face_points(surface: Surface) -> np.ndarray:
+    """(F, 3) a point on each face: the centroid of its largest triangle."""
+    corners = surface.vertices[surface.triangle_vertex]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    order = np.lexsort((dot(cross, cross), surface.triangle_face))
+    last = np.searchsorted(surface.triangle_face[order], np.arange(surface.face_count), "right") - 1
+    return corners[order[last]].mean(axis=1)

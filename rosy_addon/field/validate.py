@@ -1,0 +1,347 @@
+"""Validate vectors and directions from files or attributes, and make fields from them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import RosyError
+from .corner_fans import corner_angles, corner_rotations
+from .directional_field import (
+    closest_rosy,
+    detect_families,
+    field_from_directions,
+    is_rosy,
+    ratio_harmonics,
+    ratios_from_harmonics,
+)
+from .frames import dot, normalize, tangent_frame
+from .representation import (
+    face_frames,
+    from_representation,
+    power,
+    signed_power,
+    to_representation,
+)
+from .rosy_field import RosyField, check_degree
+from .surface import Surface, mean_per_face
+
+#: Largest angle in degrees between a vector and the plane of its face. Larger angles mean that the
+#: field belongs to another mesh or another space. Rounding in text files causes about a thousandth
+#: of this.
+FACE_TOLERANCE_DEG = 5.0
+
+#: The same for vectors on vertices. Definitions of vertex normals differ: on coarse meshes,
+#: angle-weighted and area-weighted normals are this far apart.
+VERTEX_TOLERANCE_DEG = 20.0
+
+#: Largest fraction of the nonzero vectors that may exceed the tolerance, for example on needle
+#: faces whose normals are inaccurate.
+MAX_OUTLIER_FRACTION = 0.01
+
+#: Numbers of this modulus or more count as infinite, because the length of a vector would overflow.
+MAX_COMPONENT = 5e153
+
+#: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
+#: rounding error of float32, which Blender stores, so such vectors survive a round trip through
+#: files.
+ROUNDING_SINE = 3e-7
+
+
+def validated_field(
+    surface: Surface,
+    vectors: np.ndarray,
+    degree: int,
+    source: str,
+    nonfinite: str = "error",
+    domain: str | None = None,
+) -> RosyField:
+    """Make a field from one member vector for each face or vertex, after checking them.
+
+    Vectors slightly off the tangent plane are rotated into it and keep their length. Vertex values
+    are averaged onto the faces as RoSys (by their representations, not their member vectors).
+
+    Parameters
+    ----------
+    surface : Surface
+        If it is deformed, the vectors belong to its rest shape.
+    vectors : (F, 3) or (V, 3) array_like
+        Member vectors in object space. The field is undefined where they are zero, and on faces
+        without area.
+    degree : int
+        N.
+    source : str
+        Name of the file or attribute, for messages.
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    domain : {"face", "vertex"}, optional
+        The mesh elements of the vectors. If not given, it follows from their number; faces take
+        precedence.
+
+    Returns
+    -------
+    RosyField
+
+    Raises
+    ------
+    RosyError
+        If the number of vectors fits neither faces nor vertices, a vector is not finite, or more
+        than `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
+    """
+    degree = check_degree(degree)
+    vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
+    faces, vertices = surface.face_count, len(surface.vertices)
+    domain = infer_domain(surface, len(vectors)) if domain is None else domain
+    if len(vectors) != {"face": faces, "vertex": vertices}.get(domain):
+        raise RosyError(
+            f"{source}: holds {len(vectors)} vectors, "
+            f"but the mesh {surface.name} has {faces} faces and {vertices} vertices"
+        )
+    apply_nonfinite_policy(vectors, source, domain, nonfinite)
+    normal = tangent_normals(surface, domain)
+    if domain == "face":
+        return RosyField(
+            degree, project_to_tangent(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
+        )
+    vectors = project_to_tangent(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
+    return RosyField(degree, _average_to_faces(_rest_surface(surface), vectors, normal, degree))
+
+
+def validated_directions(
+    surface: Surface,
+    directions: np.ndarray,
+    source: str,
+    nonfinite: str = "error",
+    domain: str | None = None,
+) -> RosyField:
+    """Make a field from N directions for each face or vertex, after checking them.
+
+    The directions need not be a RoSy.
+
+    Parameters
+    ----------
+    surface : Surface
+    directions : (n, N, 3) array_like
+        In object space, in any order. Where one of them is zero, the field is undefined.
+    source, nonfinite, domain
+        As for `validated_field`.
+
+    Returns
+    -------
+    RosyField
+        With `direction_ratios` if they are not a RoSy; see `field_from_directions`.
+
+    Raises
+    ------
+    RosyError
+        As for `validated_field`.
+    """
+    directions = np.array(directions, dtype=np.float64)
+    count, degree = directions.shape[:2]
+    domain = infer_domain(surface, count) if domain is None else domain
+    source_directions = directions.copy() if domain == "face" else None
+    unusable = ~has_finite_square(directions).all(axis=(1, 2))
+    directions[unusable] = np.nan
+    count_matches = domain is not None and count == _element_count(surface, domain)
+    if count_matches:
+        normal = tangent_normals(surface, domain)
+        x, y = tangent_frame(normal)
+        usable_directions = np.where(unusable[:, None, None], 0.0, directions)
+        w = dot(usable_directions, x[:, None]) + 1j * dot(usable_directions, y[:, None])
+    if not count_matches or is_rosy(w):
+        vectors = directions[:, 0].copy()
+        vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
+        field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        return replace(
+            detect_families(_rest_surface(surface), field), source_directions=source_directions
+        )
+    apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
+    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
+    flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
+    directions = project_to_tangent(
+        flat_directions, normals, tolerance_deg, source, domain
+    ).reshape(count, degree, 3)
+    surface = _rest_surface(surface)
+    if domain == "face":
+        return replace(
+            field_from_directions(surface, directions), source_directions=source_directions
+        )
+    return detect_families(surface, _average_directions_to_faces(surface, directions, normal))
+
+
+def _average_directions_to_faces(
+    surface: Surface, directions: np.ndarray, normal: np.ndarray
+) -> RosyField:
+    """Average (V, N, 3) directions onto the faces, as means of z and of each harmonic.
+
+    (V, 3) `normal` are the vertex normals.
+    """
+    degree = directions.shape[1]
+    x, y = tangent_frame(normal)
+    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    first_angle, rho, direction_ratios = closest_rosy(w)
+    face_x, face_y = face_frames(surface)
+    corner_normal = normal[surface.corner_vertex]
+    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+
+    def corner_mean(values: np.ndarray, order: int) -> np.ndarray:
+        face_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
+        return mean_per_face(face_values, surface.face_start)
+
+    z = corner_mean(rho * np.exp(1j * degree * first_angle), degree)
+    member = np.exp(1j * np.angle(z) / degree)
+    coefficients = {
+        j: corner_mean(values * np.exp(-1j * j * first_angle), -j) * signed_power(member, j)
+        for j, values in ratio_harmonics(direction_ratios).items()
+    }
+    vectors = from_representation(z, face_x, face_y, degree)
+    return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
+
+
+def _element_count(surface: Surface, domain: str) -> int:
+    """The number of faces or vertices."""
+    return surface.face_count if domain == "face" else len(surface.vertices)
+
+
+def infer_domain(surface: Surface, count: int) -> str | None:
+    """The domain, "face" or "vertex", with `count` elements; None for neither.
+
+    Faces take precedence.
+    """
+    if count == surface.face_count:
+        return "face"
+    return "vertex" if count == len(surface.vertices) else None
+
+
+def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
+    """The normals of the tangent planes of faces or vertices, in the rest shape.
+
+    Returns
+    -------
+    (F, 3) or (V, 3) float64 ndarray
+        Unit normals; see `Surface.face_normal` and `vertex_normals`. Zero on faces without area and
+        on vertices without a face.
+    """
+    surface = _rest_surface(surface)
+    return surface.face_normal if domain == "face" else vertex_normals(surface)
+
+
+def vertex_normals(surface: Surface) -> np.ndarray:
+    """Average the face normals around each vertex, weighted by corner angle.
+
+    Sharp edges are ignored. The normals are those of `Surface.vertices`, the deformed shape.
+
+    Returns
+    -------
+    (V, 3) float64 ndarray
+        Unit normals; zero on vertices without a face.
+    """
+    count = len(surface.vertices)
+    weighted = surface.face_normal[surface.corner_face] * corner_angles(surface)[:, None]
+    columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
+    return normalize(np.stack(columns, axis=1))
+
+
+def project_to_tangent(
+    vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
+) -> np.ndarray:
+    """Project vectors to tangent planes and restore their length.
+
+    Parameters
+    ----------
+    vectors, normal : (n, 3) float64 ndarray
+        Vectors, and the unit normals of their planes.
+    tolerance_deg : float
+        Largest angle between a vector and its plane, degrees.
+    source, domain : str
+        Names of the source and the mesh elements, for messages.
+
+    Returns
+    -------
+    (n, 3) float64 ndarray
+        Zero where the normal is zero or parallel to the vector.
+
+    Raises
+    ------
+    RosyError
+        If more than `MAX_OUTLIER_FRACTION` of them are off by more than `tolerance_deg` degrees.
+    """
+    length = np.sqrt(dot(vectors, vectors))
+    normal_component = dot(vectors, normal)
+    sine = np.divide(
+        np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
+    )
+    angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
+    outlier = angle > tolerance_deg
+    if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(length):
+        worst = int(np.argmax(angle))
+        raise RosyError(
+            f"{source}: {outlier.sum()} of {len(vectors)} vectors are more than {tolerance_deg:g} degrees "
+            f"off the surface, worst on {domain} {worst} by {angle[worst]:.1f} degrees; "
+            "is it the field of another mesh, or in another space?"
+        )
+    # The projection of a vector parallel to the normal is only rounding error.
+    tangent = np.where(
+        (sine < 1 - 1e-12)[:, None], vectors - normal_component[:, None] * normal, 0.0
+    )
+    tangent = np.where(
+        (sine > ROUNDING_SINE)[:, None], normalize(tangent) * length[:, None], vectors
+    )
+    return np.where(normal.any(axis=1)[:, None], tangent, 0.0)
+
+
+def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
+    """Raise an error if values are not finite, or set them to zero in place.
+
+    Parameters
+    ----------
+    values : (n,) or (n, 3) float ndarray
+        Angles or vectors.
+    source, domain : str
+        Names of the source and the mesh elements, for the message.
+    nonfinite : {"error", "zero"}
+
+    Raises
+    ------
+    RosyError
+        If `nonfinite` is "error" and a value is not finite.
+    """
+    unusable = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    if not unusable.any():
+        return
+    if nonfinite == "error":
+        kind = "vectors" if values.ndim > 1 else "angles"
+        raise RosyError(
+            f"{source}: {unusable.sum()} of {len(values)} {kind} are not finite, the first on "
+            f"{domain} {int(np.argmax(unusable))}; ask for them to be undefined, or mend them"
+        )
+    values[unusable] = 0.0
+
+
+def has_finite_square(values: np.ndarray) -> np.ndarray:
+    """Whether numbers and their squares are finite, element by element."""
+    with np.errstate(invalid="ignore"):
+        return np.abs(values) < MAX_COMPONENT
+
+
+def _average_to_faces(
+    surface: Surface, vectors: np.ndarray, normal: np.ndarray, degree: int
+) -> np.ndarray:
+    """(F, 3) members of the mean RoSy of the vertices of each face, transported to its plane.
+
+    (V, 3) `vectors` are members at the vertices, (V, 3) `normal` the vertex normals.
+    """
+    z = to_representation(vectors, *tangent_frame(normal), degree)[surface.corner_vertex]
+    x, y = face_frames(surface)
+    corner_normal = normal[surface.corner_vertex]
+    rotation = corner_rotations(surface.face_normal, x, surface.corner_face, corner_normal)
+    mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)
+    return from_representation(mean, x, y, degree)
+
+
+def _rest_surface(surface: Surface) -> Surface:
+    """The surface in its rest shape, to which field vectors refer."""
+    if surface.rest_vertices is None:
+        return surface
+    return replace(surface, vertices=surface.rest_vertices, rest_vertices=None)

@@ -1,0 +1,259 @@
+"""Frame ranges, and running a command for many frames in processes or on a Dask cluster.
+
+Each worker runs the same command that a user would run for some of the frames. The command may be
+run again, or twice at the same time, without harm. This module does not depend on what the command
+does.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from .errors import RosyError
+
+#: Frames of one task of the Dask cluster. Several, because starting Blender takes as long as
+#: several frames.
+FRAMES_PER_TASK = 8
+
+#: How many times Dask may run a task again that failed on a worker.
+MAX_RETRIES = 3
+
+
+def parse_frames(text: str) -> Sequence[int]:
+    """Parse frames written as ``A``, ``A-B`` or ``A-B:STEP``, or several of these with commas.
+
+    Returns
+    -------
+    sequence of int
+        In ascending order, without duplicates.
+
+    Raises
+    ------
+    RosyError
+        If the text has another form, or a range is empty.
+
+    Examples
+    --------
+    >>> parse_frames("1-3")
+    range(1, 4)
+    >>> parse_frames("1-9:4,2")
+    [1, 2, 5, 9]
+    """
+    parts = [_parse_range(part.strip(), text) for part in text.split(",")]
+    return parts[0] if len(parts) == 1 else sorted(set().union(*parts))
+
+
+def _parse_range(part: str, text: str) -> range:
+    """Parse one ``A``, ``A-B`` or ``A-B:STEP``; `text` is the whole option, for the message."""
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", part)
+    first = int(match[1]) if match else 0
+    last = int(match[2]) if match and match[2] else first
+    step = int(match[3]) if match and match[3] else 1
+    if match is None or last < first or not step:
+        raise RosyError(f"frames '{text}': A, A-B or A-B:STEP is wanted, such as 1-250 or 1-250:10")
+    return range(first, last + 1, step)
+
+
+def worker_command(blender: str, scene: Path) -> list[str]:
+    """Return the command that bakes a Blender file, in Blender or in plain Python.
+
+    Parameters
+    ----------
+    blender : str
+        Path of the Blender executable. If empty, the command runs in this Python.
+    scene : Path
+        The .blend file.
+    """
+    if blender:
+        return [blender, "-b", str(scene), "--command", "rosy", "bake"]
+    return [sys.executable, "-m", "rosy_addon", "bake", str(scene)]
+
+
+def worker_environment() -> dict[str, str]:
+    """Return the environment variables of worker processes.
+
+    The package is on the import path, and OpenMP uses one thread.
+    """
+    package_root = str(Path(__file__).resolve().parents[1])
+    paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
+
+
+def run_local(command: Sequence[str], frames: Sequence[int], process_count: int) -> Iterator[str]:
+    """Run a command for all frames, in several processes of this machine.
+
+    Process i of n gets the frames i, i + n, i + 2 n and so on, so that slow parts of an animation
+    are shared evenly. If the generator is closed, the processes are terminated.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Without ``--frames``, which is added.
+    frames : sequence of int
+    process_count : int
+        Clamped to 1 to the number of frames.
+
+    Yields
+    ------
+    str
+        Lines of the output of all processes, as they come.
+
+    Raises
+    ------
+    RosyError
+        If a process failed. It is raised after all processes have ended, with the error of each.
+    """
+    process_count = max(min(process_count, len(frames)), 1)
+    workers = []
+    for index in range(process_count):
+        share = frames[index::process_count]
+        workers.append((share, _start_worker([*command, "--frames", format_frames(share)])))
+    # Read the output of all processes at the same time: a process whose pipe is full would block.
+    messages: queue.Queue[tuple[int, str | None]] = queue.Queue()
+    for index, (_, process) in enumerate(workers):
+        threading.Thread(target=_read_output, args=(index, process, messages), daemon=True).start()
+    output: list[list[str]] = [[] for _ in workers]
+    running_count = len(workers)
+    try:
+        while running_count:
+            index, line = messages.get()
+            if line is None:
+                running_count -= 1
+            else:
+                output[index].append(line)
+                yield line
+        failures = [
+            f"frames {format_frames(share)}: {_error_line(output[index])}"
+            for index, (share, process) in enumerate(workers)
+            if process.wait()
+        ]
+    finally:
+        for _, process in workers:
+            if process.poll() is None:
+                process.terminate()
+    if failures:
+        raise RosyError("; ".join(failures))
+
+
+def _read_output(index: int, process: subprocess.Popen, messages: queue.Queue) -> None:
+    """Put the output lines of a process into a queue, and None at the end of the output."""
+    for line in process.stdout:
+        messages.put((index, line.rstrip("\n")))
+    messages.put((index, None))
+
+
+def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
+    """Run a command for all frames on the workers of a Dask cluster.
+
+    Workers need the same program and files under the same paths. If a worker is lost, its frames
+    are given to another one. If a task of several frames fails, its frames are run again one by
+    one.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Without ``--frames``, which is added.
+    frames : sequence of int
+    address : str
+        Address of the scheduler.
+
+    Yields
+    ------
+    str
+        Lines of the output of each task that succeeded.
+
+    Raises
+    ------
+    RosyError
+        If Dask is not installed, the scheduler does not answer, or frames failed. Failed frames are
+        reported after all others have ended, each with its number and its error.
+    """
+    try:
+        from distributed import Client, as_completed
+    except ImportError:
+        raise RosyError("--scheduler needs Dask: pip install distributed") from None
+    try:
+        client = Client(address, timeout="20s")
+    except (OSError, ValueError) as reason:
+        raise RosyError(f"--scheduler {address}: no answer: {reason}") from None
+    failures = []
+    with client:
+        frames = list(frames)
+        pending = {}
+
+        def submit(chunk: list[int]) -> Any:
+            text = format_frames(chunk)
+            future = client.submit(
+                subprocess.run,
+                [*command, "--frames", text],
+                capture_output=True,
+                text=True,
+                key=f"rosy-{text}-{time.time_ns()}",
+                retries=MAX_RETRIES,
+                pure=False,
+            )
+            pending[future] = chunk
+            return future
+
+        chunks = [
+            frames[start : start + FRAMES_PER_TASK]
+            for start in range(0, len(frames), FRAMES_PER_TASK)
+        ]
+        futures = as_completed([submit(chunk) for chunk in chunks])
+        for future in futures:
+            chunk = pending.pop(future)
+            worker_lost = future.status == "error"
+            if not worker_lost and not future.result().returncode:
+                yield from future.result().stdout.splitlines()
+            elif len(chunk) > 1:
+                # Run the frames one by one, to find the one that fails and to complete the others.
+                for frame in chunk:
+                    futures.add(submit([frame]))
+            else:
+                cause = (
+                    repr(future.exception())
+                    if worker_lost
+                    else _error_line(future.result().stderr.splitlines())
+                )
+                failures.append((chunk[0], cause))
+    if failures:
+        raise RosyError("; ".join(f"frame {frame}: {cause}" for frame, cause in sorted(failures)))
+
+
+def format_frames(frames: Sequence[int]) -> str:
+    """Write frames in the form that `parse_frames` reads."""
+    if len(frames) == 1 or not isinstance(frames, range):
+        return ",".join(map(str, frames))
+    return f"{frames[0]}-{frames[-1]}" + (f":{frames.step}" if frames.step > 1 else "")
+
+
+def _start_worker(command: list[str]) -> subprocess.Popen:
+    """Start a process whose output and errors are read as one stream of text."""
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=worker_environment(),
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def _error_line(output: Sequence[str]) -> str:
+    """Return the error message in the output of a failed process.
+
+    It is the last line that begins with ``rosy:``, else the last line that is not empty.
+    """
+    lines = [line for line in output if line.strip()]
+    output = [line for line in lines if line.startswith("rosy: ")]
+    message = (output or lines or ["ended without a word"])[-1].removeprefix("rosy: ")
+    return re.sub(r"^frame -?\d+: ", "", message)

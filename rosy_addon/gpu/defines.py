@@ -1,0 +1,139 @@
+"""Constants that shaders share with the numpy rooms, as preprocessor definitions.
+
+Each constant is written once, in Python. `shader_defines` precedes the source of every shader.
+"""
+
+from __future__ import annotations
+
+import operator
+from functools import lru_cache
+
+import numpy as np
+
+from ..color import REC709_LUMINANCE
+from ..compositor.compose import COLOR_CONTRAST
+from ..compositor.covering import ALL_NEIGHBORS
+from ..compositor.hatching import (
+    MIN_COVERAGE,
+    RANK_BLEND,
+)
+from ..compositor.image_noise import (
+    CHANNEL_FACTOR,
+    FINALIZER_FACTORS,
+    HASH_FACTORS,
+    NOISE_MEAN,
+    SEED_FACTOR,
+)
+from ..compositor.outline import DEPTH_JUMP
+from ..compositor.streak_statistics import WOBBLE_BREAKS
+from ..compositor.surface_noise import (
+    CONTRAST_SCALE_RANGE,
+    OCTAVE_OFFSET,
+    OCTAVES,
+    SUBPIXEL_OFFSETS,
+)
+from ..compositor.wobble import UNIT_VARIANCE_SCALE, WAVE_COUNT, WOBBLE_STD
+from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLERANCE
+from ..projection.rest_coordinates import BARYCENTRIC_RANGE
+from ..projection.shadow_maps import PCF_WIDTH
+from ..projection.tone_sampling import MIN_FACING_COSINE
+from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
+
+#: What the magnitude of the field drives: bit 0 is the color, bit 1 the length of streamlines.
+MAGNITUDE_COLOR, MAGNITUDE_LENGTH = 1, 2
+MAGNITUDE_MODES = {
+    "none": 0,
+    "colour": MAGNITUDE_COLOR,
+    "length": MAGNITUDE_LENGTH,
+    "both": MAGNITUDE_COLOR | MAGNITUDE_LENGTH,
+}
+
+#: `Look.tone` in shaders.
+TONE_LIGHT, TONE_ATTRIBUTE, TONE_IMAGE, TONE_PICTURE = range(4)
+TONE_SOURCES = {
+    "light": TONE_LIGHT,
+    "attribute": TONE_ATTRIBUTE,
+    "image": TONE_IMAGE,
+    "picture": TONE_PICTURE,
+}
+
+#: Kinds of lights in shaders.
+SUN_LIGHT, POINT_LIGHT, HEADLIGHT = range(3)
+
+#: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
+REDUCE_BLOCK = 16
+
+FLOAT_CONSTANTS = {
+    "NOISE_MEAN": NOISE_MEAN,
+    "COLOR_CONTRAST": COLOR_CONTRAST,
+    "MIN_CONTRAST_SCALE": CONTRAST_SCALE_RANGE[0],
+    "MAX_CONTRAST_SCALE": CONTRAST_SCALE_RANGE[1],
+    "MIN_BARYCENTRIC": BARYCENTRIC_RANGE[0],
+    "MAX_BARYCENTRIC": BARYCENTRIC_RANGE[1],
+    "WOBBLE_AMPLITUDE": UNIT_VARIANCE_SCALE * WOBBLE_STD,
+    "WOBBLE_BREAKS": WOBBLE_BREAKS,
+    "RANK_BLEND": RANK_BLEND,
+    "MIN_COVERAGE": MIN_COVERAGE,
+    "DEPTH_JUMP": DEPTH_JUMP,
+    "MAX_SLOPE": MAX_SLOPE,
+    "DEPTH_TOLERANCE": DEPTH_TOLERANCE,
+    "SLOPE_TOLERANCE": SLOPE_TOLERANCE,
+    "MIN_FACING_COSINE": MIN_FACING_COSINE,
+}
+
+VECTOR_CONSTANTS = {
+    "LUMINANCE_WEIGHTS": REC709_LUMINANCE,
+    **{f"SUBPIXEL_OFFSET_{index}": offset for index, offset in enumerate(SUBPIXEL_OFFSETS)},
+}
+
+INT_CONSTANTS = {
+    "OCTAVES": OCTAVES,
+    "OCTAVE_OFFSET": OCTAVE_OFFSET,
+    "SUBPIXEL_COUNT": len(SUBPIXEL_OFFSETS),
+    "WAVE_COUNT": WAVE_COUNT,
+    "ALL_NEIGHBORS": ALL_NEIGHBORS,
+    "PCF_WIDTH": PCF_WIDTH,
+    "REDUCE_BLOCK": REDUCE_BLOCK,
+    "ROW_BITS": ROW_BITS,
+    "POSITION_TEXEL": POSITION_TEXEL,
+    "NORMAL_TEXEL": NORMAL_TEXEL,
+    "VALUE_TEXEL": VALUE_TEXEL,
+    "MAGNITUDE_COLOR": MAGNITUDE_COLOR,
+    "MAGNITUDE_LENGTH": MAGNITUDE_LENGTH,
+    "TONE_LIGHT": TONE_LIGHT,
+    "TONE_IMAGE": TONE_IMAGE,
+    "TONE_PICTURE": TONE_PICTURE,
+    "POINT_LIGHT": POINT_LIGHT,
+    "HEADLIGHT": HEADLIGHT,
+}
+
+HASH_CONSTANTS = dict(
+    zip(
+        ("HASH_X", "HASH_Y", "HASH_Z", "HASH_OCTAVE", "HASH_INSTANCE"),
+        HASH_FACTORS,
+        strict=True,
+    )
+) | {
+    "HASH_SEED": SEED_FACTOR,
+    "HASH_CHANNEL": CHANNEL_FACTOR,
+    "HASH_FINALIZER_0": FINALIZER_FACTORS[0],
+    "HASH_FINALIZER_1": FINALIZER_FACTORS[1],
+}
+
+
+@lru_cache(maxsize=1)
+def shader_defines() -> str:
+    """Return a ``#define`` for each shared constant, one a line."""
+    values = {name: _float_literal(value) for name, value in FLOAT_CONSTANTS.items()}
+    for name, vector in VECTOR_CONSTANTS.items():
+        values[name] = f"vec{len(vector)}({', '.join(map(_float_literal, vector))})"
+    # Fails if a constant is not an integer.
+    values |= {name: str(operator.index(value)) for name, value in INT_CONSTANTS.items()}
+    values |= {name: f"0x{value:08X}u" for name, value in HASH_CONSTANTS.items()}
+    return "".join(f"#define {name} {text}\n" for name, text in values.items())
+
+
+def _float_literal(value: float) -> str:
+    """The shortest decimal number that rounds to the same single precision number."""
+    text = str(np.float32(value))
+    return f"({text})" if value < 0 else text

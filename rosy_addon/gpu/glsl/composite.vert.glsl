@@ -1,0 +1,11 @@
+// The surface, moved a little towards the eye so that its own depth does not hide it.
+
+void main()
+{
+  vec4 point = vec4(vertex_data.xyz, 1.0);
+  vec4 position = vec4(dot(clip_x, point), dot(clip_y, point), dot(clip_z, point), dot(clip_w, point));
+  position.z -= depth_bias * position.w;
+  gl_Position = position;
+  clip_distances = vec4(dot(plane0, point), dot(plane1, point), dot(plane2, point), dot(plane3, point));
+  more_clip_distances = vec2(dot(plane4, point), dot(plane5, point));
+}

@@ -1,0 +1,110 @@
+// The cells of the covering, and the direction of each line on screen: `pixel_neighbors` and
+// `covering` in one pass. A cell holds its phase with the neighbor mask, and the noise.
+
+// Whether the surface continues from a pixel to a neighbor, as in `pixel_neighbors`.
+bool is_continuous(ivec2 pixel, ivec2 offset, vec4 value, vec4 normal, vec4 slope)
+{
+  ivec2 neighbor = pixel + offset;
+  if (any(lessThan(neighbor, ivec2(0))) || any(greaterThanEqual(neighbor, imageSize(cells)))) {
+    return false;
+  }
+  vec4 other = texelFetch(field_values, neighbor, 0);
+  if (other.w != value.w || other.xy == vec2(0.0)) {
+    return false;
+  }
+  vec4 other_slope = texelFetch(depth_slopes, neighbor, 0);
+  vec4 other_normal = texelFetch(normals, neighbor, 0);
+  float jump = other_slope.x - slope.x;
+  float predicted = dot(slope.yz, vec2(offset)), predicted_back = dot(other_slope.yz, vec2(offset));
+  float tolerance = min(slope.w, other_slope.w);
+  if (offset.x != 0 && offset.y != 0) {
+    tolerance *= 1.41421356;
+  }
+  if (jump > max(predicted, predicted_back) + tolerance ||
+      jump < min(predicted, predicted_back) - tolerance) {
+    return false;
+  }
+  bool both_agree = abs(jump - predicted) <= tolerance && abs(jump - predicted_back) <= tolerance;
+  if (!both_agree && (normal.w > 0.0) != (other_normal.w > 0.0)) {
+    return false;
+  }
+  return dot(normal.xyz, other_normal.xyz) >= min_normal_cosine;
+}
+
+// A tangent of the view plane, moved to the surface and projected to the screen, in pixels.
+vec2 screen_direction(vec3 tangent, vec3 toward_eye, vec3 normal, vec2 ray)
+{
+  vec3 tangent_on_surface = parallel_transport(tangent, toward_eye, normal);
+  vec2 in_plane = is_perspective != 0 ?
+                      tangent_on_surface.xy + tangent_on_surface.z * ray :
+                      tangent_on_surface.xy;
+  return vec2(dot(camera_to_pixels.xy, in_plane), dot(camera_to_pixels.zw, in_plane));
+}
+
+// The direction of a member. For a RoSy it is the member itself. Otherwise its deviation is a function
+// of the member without wobble (`wobble`).
+vec2 member_direction(vec2 member, float wobble, ivec2 pixel)
+{
+  if (harmonic_count == 0) {
+    return member;
+  }
+  vec2 unwobbled = times(member, vec2(cos(wobble), -sin(wobble)));
+  vec2 total = vec2(0.0);
+  for (int layer = 0; layer < harmonic_count; ++layer) {
+    vec4 harmonic = texelFetch(field_channels, ivec3(pixel, layer), 0);
+    total += times(harmonic.xy, signed_power(unwobbled, first_harmonic + layer));
+  }
+  return unit_or_zero(times(member, total));
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  if (any(greaterThanEqual(pixel, imageSize(cells)))) {
+    return;
+  }
+  vec4 value = texelFetch(field_values, pixel, 0);
+  if (value.w == 0.0 || value.z != float(degree)) {
+    imageStore(cells, pixel, vec4(0.0));
+    return;
+  }
+  vec4 noise_value = texelFetch(noise, pixel, 0);
+  if (value.xy == vec2(0.0)) {
+    imageStore(cells, pixel, vec4(with_neighbor_mask(2.0, 0), noise_value.xyz));
+    for (int line = 0; line < line_count; ++line) {
+      imageStore(directions, ivec3(pixel, line), vec4(0.0));
+    }
+    return;
+  }
+  vec4 normal = texelFetch(normals, pixel, 0), slope = texelFetch(depth_slopes, pixel, 0);
+  int neighbors = 16;
+  for (int bit = 0; bit < 9; ++bit) {
+    if (bit != 4 && is_continuous(pixel, ivec2(bit % 3 - 1, bit / 3 - 1), value, normal, slope)) {
+      neighbors |= 1 << bit;
+    }
+  }
+  float wobble = wobble_strength > 0.0 ?
+                     wobble_strength * texelFetch(wobble_angles, pixel, 0).x :
+                     0.0;
+  float frame_angle = float(degree) * (guiding_angle - wobble);
+  vec2 z = times(value.xy, vec2(cos(frame_angle), -sin(frame_angle)));
+  float angle = atan(z.y, z.x) / float(degree);
+  float phase = angle * float(sheet_count) / TAU + 2.0;
+  imageStore(cells, pixel, vec4(with_neighbor_mask(phase, neighbors), noise_value.xyz));
+
+  vec2 ray = pixel_ray(pixel, vec2(imageSize(cells)), clip_to_camera, lens_shift);
+  vec3 eye = direction_to_eye(ray, is_perspective != 0);
+  // The camera's axes, moved to the plane perpendicular to the ray, as `frames`.
+  float a = 1.0 / (1.0 + eye.z);
+  vec3 x = vec3(1.0 - eye.x * eye.x * a, -eye.x * eye.y * a, -eye.x);
+  vec3 y = vec3(-eye.x * eye.y * a, 1.0 - eye.y * eye.y * a, -eye.y);
+  vec2 screen_x = screen_direction(x, eye, normal.xyz, ray);
+  vec2 screen_y = screen_direction(y, eye, normal.xyz, ray);
+  for (int line = 0; line < line_count; ++line) {
+    float member_angle = angle + guiding_angle + TAU * float(line) / float(sheet_count);
+    vec2 member = member_direction(vec2(cos(member_angle), sin(member_angle)), wobble, pixel);
+    vec2 direction = screen_x * member.x + screen_y * member.y;
+    direction = foreshorten != 0 ? direction : unit_or_zero(direction);
+    imageStore(directions, ivec3(pixel, line), vec4(direction, 0.0, 0.0));
+  }
+}

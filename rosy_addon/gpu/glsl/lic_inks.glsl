@@ -1,0 +1,105 @@
+// Hatching: which lines are drawn at a tone, and in which ink. Included by lic.comp.glsl.
+
+float smooth_unit_step(float x)
+{
+  x = clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// How many lines are closer to the guiding angle than this one, as `hatching._line_ranks`. `first` is
+// the angle from the guiding angle to line 0.
+float line_rank(int line, float first)
+{
+  float angle = first + TAU * float(line) / float(sheet_count);
+  return atan(abs(sin(angle)), abs(cos(angle))) * 4.0 * float(line_count) / TAU;
+}
+
+// As `hatching._soft_rank`.
+float soft_rank(float rank, int count)
+{
+  float position = 0.0;
+  for (int layer = 1; layer < count; ++layer) {
+    position += smooth_unit_step((rank - float(layer) + RANK_BLEND) / (2.0 * RANK_BLEND));
+  }
+  return position;
+}
+
+// The darkness from which a line is drawn, as `hatching._onset_darkness`. Beyond 1 for a line that
+// exceeds the number of layers.
+float onset_darkness(int line, float first)
+{
+  float rank = line_rank(line, first);
+  float surplus = smooth_unit_step((rank - float(layers) + RANK_BLEND) / (2.0 * RANK_BLEND));
+  return soft_rank(rank, layers) * layering + 2.0 * surplus;
+}
+
+// The weight, 0 to 1, of a line whose onset is a delay later than the first one.
+float onset_weight(float delay, float transmittance)
+{
+  return smooth_unit_step((1.0 - transmittance - delay + onset_lead) / (onset_range + onset_lead));
+}
+
+// Interpolate between the inks of one table: dark, middle or light.
+vec3 table_ink(float ink, int first_texel)
+{
+  int low_index = min(int(ink), ink_count - 1);
+  int high_index = min(low_index + 1, ink_count - 1);
+  vec3 low = texelFetch(ink_table, ivec2(first_texel + low_index, 0), 0).xyz;
+  vec3 high = texelFetch(ink_table, ivec2(first_texel + high_index, 0), 0).xyz;
+  return mix(low, high, ink - float(low_index));
+}
+
+// An ink at a tone, as `inks.Inks.at_tone`.
+vec3 ink_of_tone(float ink, float tone)
+{
+  vec3 middle_ink = table_ink(ink, ink_count);
+  float light_weight = clamp((tone - ink_mid_tone) / (1.0 - ink_mid_tone), 0.0, 1.0);
+  float dark_weight = clamp(1.0 - tone / ink_mid_tone, 0.0, 1.0);
+  return middle_ink + light_weight * (table_ink(ink, 2 * ink_count) - middle_ink) +
+         dark_weight * (table_ink(ink, 0) - middle_ink);
+}
+
+// Light inks on dark paper are computed as the negatives of dark inks on light paper.
+vec3 complement_if_light(vec3 light)
+{
+  return is_light_ink != 0 ? 1.0 - light : light;
+}
+
+// The share of the paper's light, by channel, that an ink lets through.
+vec3 transmittance_of(vec3 ink)
+{
+  return complement_if_light(ink) / max(complement_if_light(paper_color.xyz), 1e-3);
+}
+
+// The coverage at which an ink leaves a share of the paper's luminance.
+float ink_coverage(float target, vec3 ink)
+{
+  float paper_luminance = dot(complement_if_light(paper_color.xyz), LUMINANCE_WEIGHTS);
+  float ink_luminance = dot(complement_if_light(ink), LUMINANCE_WEIGHTS);
+  float ink_transmittance = ink_luminance / max(paper_luminance, 1e-3);
+  return clamp((1.0 - target) / max(1.0 - ink_transmittance, 1e-3), 0.0, 1.0);
+}
+
+// The height of the paper grain for a member. In the picture, each member has its own part of one
+// texture; on the surface, one of the channels.
+float grain_height(int member, ivec2 pixel)
+{
+  if (paper_grain_channels == 0) {
+    ivec2 texel = pixel / supersampling + ivec2(member * paper_grain_shift, 0);
+    return texelFetch(paper_grain, texel, 0).x;
+  }
+  vec3 heights = texelFetch(paper_grain, pixel, 0).xyz - NOISE_MEAN;
+  int channel = modulo(member, paper_grain_channels);
+  return channel == 0 ? heights.x : channel == 1 ? heights.y : heights.z;
+}
+
+// The threshold of the noise above which ink is drawn, for a coverage.
+float coverage_threshold(float coverage)
+{
+  int last_texel = textureSize(ink_thresholds, 0).x - 1;
+  float position = clamp(coverage, 0.0, 1.0) * float(last_texel);
+  int low_index = min(int(position), last_texel - 1);
+  float low = texelFetch(ink_thresholds, ivec2(low_index, 0), 0).x;
+  float high = texelFetch(ink_thresholds, ivec2(low_index + 1, 0), 0).x;
+  return mix(low, high, position - float(low_index));
+}

@@ -1,0 +1,6 @@
+// The depth of the closest surface; 0 where there is none.
+
+void main()
+{
+  shadow_depth = vec4(light_depth, 0.0, 0.0, 1.0);
+}

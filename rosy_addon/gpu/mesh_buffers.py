@@ -1,0 +1,269 @@
+"""Vertex buffers and triangle records: a surface and its field in the layout of the shaders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import RosyError
+from ..field.directional_field import field_harmonics
+from ..field.frames import transform_components
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..progress import run_to_completion
+from ..projection.corner_field import (
+    SIMILARITY_EPS,
+    CornerField,
+    FieldChannel,
+    corner_field_task,
+    rotation_order,
+)
+from ..projection.mip_map import MipMap
+from ..projection.surface_tone import SurfaceTone
+
+#: Texels in a row of the record texture: a power of two, with its exponent.
+ROW_BITS = 13
+ROW_TEXELS = 1 << ROW_BITS
+
+#: Maximum triangles of a mesh: shaders handle their ids in single precision.
+MAX_TRIANGLES = 1 << 24
+
+#: Texels of a record: 3 positions, 3 normals, 2 of the representation, 2 for each channel, 2 for the
+#: tone if there is one. The last texel is the z of the rest positions.
+POSITION_TEXEL, NORMAL_TEXEL, VALUE_TEXEL = 0, 3, 6
+
+
+@dataclass(frozen=True, eq=False)
+class MeshBuffers:
+    """A surface in the layout of the shaders, without its transformation.
+
+    Attributes
+    ----------
+    corners : (3 T, 4) float32 ndarray
+        Position of each corner of each triangle, and the id of the triangle.
+    center : (3,) float64 ndarray
+        Origin of all positions, so that surfaces far from the origin keep their precision.
+    triangle_records : (rows, ROW, 4) float32 ndarray or None
+        The record of each triangle, `texels_per_record` texels in a row (see `_triangle_records`). None
+        without a field.
+    texels_per_record : int
+    bounds : (8, 3) float64 ndarray
+        Corners of the bounding box, relative to `center`.
+    has_tone : bool
+        Whether the records contain a tone of the surface.
+    """
+
+    corners: np.ndarray
+    center: np.ndarray
+    triangle_records: np.ndarray | None
+    texels_per_record: int
+    bounds: np.ndarray
+    has_tone: bool = False
+
+    @property
+    def channel_count(self) -> int:
+        """Number of channels of the field."""
+        return max(self.texels_per_record - record_texels(0, self.has_tone), 0) // 2
+
+
+def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Split a matrix into the part that changes the shape and a similarity.
+
+    Parameters
+    ----------
+    matrix : (4, 4) ndarray
+        Object to world space.
+
+    Returns
+    -------
+    linear : (3, 3) ndarray
+        The identity if the matrix is a similarity, so that a mesh that is moved stays on the device.
+    model_matrix : (4, 4) ndarray
+        A rotation, a uniform scale and a translation.
+    """
+    matrix = np.asarray(matrix, dtype=np.float64)
+    linear = matrix[:3, :3]
+    gram = linear.T @ linear
+    scale = np.trace(gram) / 3
+    mirrored = np.cross(linear[0], linear[1]) @ linear[2] <= 0
+    if mirrored or np.abs(gram - scale * np.eye(3)).max() > SIMILARITY_EPS * scale:
+        model_matrix = np.eye(4)
+        model_matrix[:3, 3] = matrix[:3, 3]
+        return linear, model_matrix
+    return np.eye(3), matrix
+
+
+def translation_matrix(vector: np.ndarray) -> np.ndarray:
+    """Return the (4, 4) matrix of a translation."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = vector
+    return matrix
+
+
+def field_channels(field: RosyField) -> list[FieldChannel]:
+    """Return the channels of a field besides the representation."""
+    channels: list[FieldChannel] = [("deviation", j) for j in field_harmonics(field)]
+    if field.family_count > 1:
+        channels.append(("family", field.family_count))
+    return channels
+
+
+def build_mesh_buffers(
+    surface: Surface,
+    linear: np.ndarray,
+    field: RosyField | None,
+    display: str,
+    channels: Sequence[FieldChannel] = (),
+    tone: SurfaceTone | None = None,
+) -> MeshBuffers:
+    """Return a surface and its field in the layout of the shaders.
+
+    Parameters
+    ----------
+    surface : Surface
+    linear : (3, 3) ndarray
+        Of `split_matrix`.
+    field : RosyField or None
+        None for a mesh that only occludes.
+    display : {"smooth", "flat"}
+    channels : sequence of FieldChannel
+        What each layer of the image of field channels contains, for all fields of this degree.
+    tone : SurfaceTone, optional
+
+    Raises
+    ------
+    RosyError
+        If the surface has more than `MAX_TRIANGLES`.
+    """
+    if field is not None and len(surface.triangles) > MAX_TRIANGLES:
+        raise RosyError(
+            f"{surface.name}: {len(surface.triangles)} triangles are more than the "
+            f"{MAX_TRIANGLES} that are drawn on a graphics card"
+        )
+    points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
+    used = np.zeros(points.shape[1], dtype=bool)
+    used[surface.triangle_vertex] = True
+    bounds = _box_corners(points[:, used])
+    center = bounds.mean(axis=0)
+    points -= center[:, None]
+    positions = points.astype(np.float32).take(surface.triangle_vertex, axis=1)
+    count = positions.shape[1]
+    corners = np.empty((count, 3, 4), dtype=np.float32)
+    corners[:, :, :3] = positions.transpose(1, 2, 0)
+    corners[:, :, 3] = np.arange(count, dtype=np.float32)[:, None]
+    records, texels = None, 0
+    if field is not None:
+        matrix = np.eye(4)
+        matrix[:3, :3] = linear
+        corner_field = run_to_completion(corner_field_task(surface, matrix, field, display))
+        rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+        rest = rest.take(surface.triangle_vertex, axis=0)
+        tone_values = None if tone is None else tone.values[surface.triangles]
+        records = _triangle_records(
+            corners, rest, corner_field, field.degree, channels, tone_values
+        )
+        texels = records.shape[1]
+        records = _to_texture_rows(records)
+    has_tone = field is not None and tone is not None
+    return MeshBuffers(corners.reshape(-1, 4), center, records, texels, bounds - center, has_tone)
+
+
+def _triangle_records(
+    corners: np.ndarray,
+    rest: np.ndarray,
+    corner_field: CornerField,
+    degree: int,
+    channels: Sequence[FieldChannel],
+    tone: np.ndarray | None,
+) -> np.ndarray:
+    """Return the (T, texels, 4) float32 records.
+
+    Texels 0 to 2 are the positions of the corners, 3 to 5 their normals, 6 and 7 the values of
+    `CornerField.representation` with the order of its rotation. Each channel has two texels, with
+    the order of its rotation and its layer. A tone with (T, 3, 1 or 2) values has two texels. The
+    (T, 3, 3) rest positions are in the fourth components of positions (x) and normals (y), and in
+    the last texel (z).
+    """
+    texels = record_texels(len(channels), tone is not None)
+    records = np.zeros((len(corners), texels, 4), dtype=np.float32)
+    records[:, POSITION_TEXEL:NORMAL_TEXEL, 3], records[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = (
+        rest[..., 0],
+        rest[..., 1],
+    )
+    records[:, -1, :3] = rest[..., 2]
+    records[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[:, :, :3]
+    records[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = corner_field.corner_normals.transpose(2, 0, 1)
+    _write_values(records, VALUE_TEXEL, corner_field.representation, degree, 0)
+    for layer, channel in enumerate(channels):
+        # A RoSy has the constant harmonic 1.
+        default = np.full_like(corner_field.representation, 1 if channel == ("deviation", 0) else 0)
+        values = corner_field.channels.get(channel, default)
+        _write_values(
+            records, VALUE_TEXEL + 2 + 2 * layer, values, rotation_order(channel, degree), layer
+        )
+    if tone is not None:
+        for corner in range(3):
+            texel, column = texels - 3 + corner // 2, corner % 2 * 2
+            records[:, texel, column : column + tone.shape[2]] = tone[:, corner]
+    return records
+
+
+def record_texels(channel_count: int, has_tone: bool = False) -> int:
+    """Return the number of texels of a record."""
+    return VALUE_TEXEL + 2 * (1 + channel_count) + 2 * has_tone + 1
+
+
+def _write_values(
+    records: np.ndarray, first_texel: int, values: np.ndarray, order: int, layer: int
+) -> None:
+    for corner, z in enumerate(values):
+        texel, column = first_texel + corner // 2, corner % 2 * 2
+        records[:, texel, column], records[:, texel, column + 1] = z.real, z.imag
+    records[:, first_texel + 1, 2], records[:, first_texel + 1, 3] = order, layer
+
+
+def _to_texture_rows(records: np.ndarray) -> np.ndarray:
+    """Return records as (rows, ROW_TEXELS, 4), padded with zeros."""
+    flat = records.reshape(-1, 4)
+    rows = np.zeros((max(-(-len(flat) // ROW_TEXELS), 1) * ROW_TEXELS, 4), dtype=np.float32)
+    rows[: len(flat)] = flat
+    return rows.reshape(-1, ROW_TEXELS, 4)
+
+
+def _box_corners(points: np.ndarray) -> np.ndarray:
+    """Return the (8, 3) corners of the bounding box of (3, V) points."""
+    ends = np.stack([points.min(axis=1), points.max(axis=1)])
+    corner_bits = np.indices((2, 2, 2)).reshape(3, 8)
+    return np.stack([ends[corner_bits[axis], axis] for axis in range(3)], axis=1)
+
+
+def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, int], int]:
+    """Return all levels of a mip map in one image: the smaller ones are right of level 0, stacked.
+
+    Parameters
+    ----------
+    mip_map : MipMap
+    max_side : int
+        Levels with a longer side are left out.
+
+    Returns
+    -------
+    texels : (h, w, 4) float32 ndarray
+        The values in the first channel.
+    size : (int, int)
+        Width and height of level 0.
+    max_level : int
+    """
+    levels = [level for level in mip_map.levels if max(level.shape) <= max_side]
+    height, width = levels[0].shape
+    atlas_height = max(height, sum(len(level) for level in levels[1:]))
+    atlas_width = width + (levels[1].shape[1] if len(levels) > 1 else 0)
+    texels = np.zeros((atlas_height, atlas_width, 4), dtype=np.float32)
+    texels[:height, :width, 0] = levels[0]
+    row = 0
+    for level in levels[1:]:
+        texels[row : row + len(level), width : width + level.shape[1], 0] = level
+        row += len(level)
+    return texels, (width, height), len(levels) - 1

@@ -1,0 +1,279 @@
+"""Meshes, images and textures that stay on the device from picture to picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..compositor.target_tone import ReferenceRender
+from ..errors import RosyError
+from ..field.rosy_field import RosyField
+from ..projection.corner_field import FieldChannel
+from ..projection.gbuffer import MeshInstance
+from ..projection.mip_map import MipMap
+from ..projection.rest_coordinates import matrix_scale
+from .device import Device
+from .field_kind import FieldKind, field_kinds
+from .mesh_buffers import (
+    MeshBuffers,
+    build_mesh_buffers,
+    mip_atlas,
+    split_matrix,
+    translation_matrix,
+)
+
+#: Uploads, of all views together, after which images and meshes that were not used are freed. Each
+#: frame of an animation has new meshes.
+IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
+
+#: Maximum side, in texels, of an image that tones are sampled from.
+MAX_TONE_IMAGE_SIDE = 2048
+
+
+@dataclass(frozen=True, eq=False)
+class DrawItem:
+    """A mesh instance on the device.
+
+    Attributes
+    ----------
+    mesh : GpuMesh
+    field : RosyField or None
+        None for a mesh that only occludes.
+    model_matrix : (4, 4) float64 ndarray
+        From the mesh buffers to world space: a rotation, a uniform scale and a translation.
+    object_scale : float
+        Scale of the matrix of the instance.
+    kind : FieldKind or None
+    instance : MeshInstance or None
+    """
+
+    mesh: GpuMesh
+    field: RosyField | None
+    model_matrix: np.ndarray
+    object_scale: float
+    kind: FieldKind | None
+    instance: MeshInstance | None = None
+
+
+@dataclass(eq=False)
+class GpuMesh:
+    """A mesh with its field on the device.
+
+    Attributes
+    ----------
+    buffers : MeshBuffers
+    batch : handle
+        Of `Device.batch`.
+    records_texture : texture or None
+        The triangle records; None without a field.
+    keep_alive : tuple
+        Surface, field and tone: the key of the mesh contains their ids.
+    tone_atlas : MipAtlas or None
+    last_used : int
+        Number of the upload that used it last.
+    """
+
+    buffers: MeshBuffers
+    batch: Any
+    records_texture: Any
+    keep_alive: tuple[Any, ...]
+    tone_atlas: MipAtlas | None = None
+    last_used: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class MipAtlas:
+    """All levels of a mip map in one texture (`mesh_buffers.mip_atlas`).
+
+    Attributes
+    ----------
+    texture
+    size : (int, int)
+        Width and height of level 0.
+    max_level : int
+    skipped_levels : int
+        Levels of the mip map that are larger than level 0 of the atlas.
+    """
+
+    texture: Any
+    size: tuple[int, int]
+    max_level: int
+    skipped_levels: int
+
+
+class GpuResources:
+    """Owns what stays on a device, and frees what has not been used for some uploads.
+
+    Parameters
+    ----------
+    device : Device
+    """
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._meshes: dict[tuple, GpuMesh] = {}
+        self._images: dict[tuple, Any] = {}
+        self._last_used: dict[tuple, int] = {}
+        self._lookup_textures: dict[str, tuple[Any, Any]] = {}
+        self._upload_count = 0
+
+    @property
+    def meshes(self) -> list[GpuMesh]:
+        """Return the meshes on the device."""
+        return list(self._meshes.values())
+
+    @property
+    def texture_count(self) -> int:
+        """Return the number of textures on the device."""
+        records = sum(mesh.records_texture is not None for mesh in self.meshes)
+        atlases = sum(mesh.tone_atlas is not None for mesh in self.meshes)
+        return records + atlases + len(self._images) + len(self._lookup_textures)
+
+    def release(self) -> None:
+        """Free all resources."""
+        for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
+            cache.clear()
+
+    def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
+        """Return draw items of mesh instances. Meshes on the device are not sent again.
+
+        Raises
+        ------
+        RosyError
+            If a mesh has too many triangles for the device.
+        """
+        self._upload_count += 1
+        self._evict_images()
+        kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
+        items = [self._draw_item(instance, display, kinds) for instance in instances]
+        oldest_kept = self._upload_count - MESH_LIFETIME_UPLOADS
+        for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
+            del self._meshes[key]
+        return items
+
+    def image(
+        self,
+        name: Hashable,
+        width: int,
+        height: int,
+        texel_format: str = "RGBA32F",
+        layers: int = 0,
+    ) -> Any:
+        """Return the image of a name, size and format. Its contents are those of its last use."""
+        key = name, width, height, texel_format, layers
+        return self._cached(key, lambda: self.device.texture(width, height, texel_format, layers))
+
+    def depth_image(self, width: int, height: int) -> Any:
+        """Return the depth buffer of a size."""
+        key = "depth", width, height
+        return self._cached(key, lambda: self.device.depth_texture(width, height))
+
+    def lookup_texture(self, name: str, key: Any, create: Callable[[], np.ndarray]) -> Any:
+        """Return (H, W, 4) values as a texture. Of each name, the last key is kept."""
+        cached = self._lookup_textures.get(name)
+        if cached is None or cached[0] != key:
+            cached = self._lookup_textures[name] = key, self._texture_of(create())
+        return cached[1]
+
+    def growing_texture(
+        self, name: str, key: Any, size: tuple[int, int], create: Callable[[int, int], np.ndarray]
+    ) -> Any:
+        """Return a texture of a size or larger.
+
+        Parameters
+        ----------
+        name : str
+        key : any
+            The texture is created again if the key has changed.
+        size : (int, int)
+            Width and height in texels.
+        create : function
+            From width and height to (H, W, 4) values.
+        """
+        cached = self._lookup_textures.get(name)
+        if cached is not None:
+            cached_key, (texture, cached_size) = cached
+            if cached_key == key and size[0] <= cached_size[0] and size[1] <= cached_size[1]:
+                return texture
+        texture = self._texture_of(create(*size))
+        self._lookup_textures[name] = key, (texture, size)
+        return texture
+
+    def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
+        """Return the image that the tone "picture" is sampled from."""
+        cached = self._lookup_textures.get("rendered")
+        if cached is None or cached[0] is not reference:
+            cached = reference, self._upload_atlas(reference.mip_map)
+            self._lookup_textures["rendered"] = cached
+        return cached[1]
+
+    def _texture_of(self, values: np.ndarray) -> Any:
+        return self.device.texture(values.shape[1], values.shape[0], "RGBA32F", data=values)
+
+    def _cached(self, key: tuple, create: Callable[[], Any]) -> Any:
+        if key not in self._images:
+            self._images[key] = create()
+        self._last_used[key] = self._upload_count
+        return self._images[key]
+
+    def _evict_images(self) -> None:
+        """Free images of names and sizes that were not used for some uploads."""
+        oldest_kept = self._upload_count - IMAGE_LIFETIME_UPLOADS
+        for key in [key for key, last_used in self._last_used.items() if last_used < oldest_kept]:
+            del self._images[key], self._last_used[key]
+
+    def _draw_item(
+        self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
+    ) -> DrawItem:
+        linear, model_matrix = split_matrix(instance.matrix)
+        kind = None if instance.field is None else kinds[instance.field.degree]
+        channels = () if kind is None else kind.channels
+        key = (
+            id(instance.surface),
+            id(instance.field),
+            id(instance.tone),
+            linear.tobytes(),
+            display,
+            channels,
+        )
+        if key not in self._meshes:
+            self._meshes[key] = self._upload_mesh(instance, linear, display, channels)
+        mesh = self._meshes[key]
+        mesh.last_used = self._upload_count
+        model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
+        return DrawItem(
+            mesh, instance.field, model_matrix, matrix_scale(instance.matrix), kind, instance
+        )
+
+    def _upload_mesh(
+        self,
+        instance: MeshInstance,
+        linear: np.ndarray,
+        display: str,
+        channels: Sequence[FieldChannel],
+    ) -> GpuMesh:
+        surface, field, tone = instance.surface, instance.field, instance.tone
+        buffers = build_mesh_buffers(surface, linear, field, display, channels, tone)
+        records_texture = None
+        if buffers.triangle_records is not None:
+            if len(buffers.triangle_records) > self.device.max_texture_size:
+                raise RosyError(
+                    f"{surface.name}: {len(surface.triangles)} triangles are too many for this "
+                    "graphics card"
+                )
+            records_texture = self._texture_of(buffers.triangle_records)
+        tone_atlas = None
+        if buffers.has_tone and tone.image is not None:
+            tone_atlas = self._upload_atlas(tone.mip_map)
+        batch = self.device.batch(buffers.corners)
+        return GpuMesh(buffers, batch, records_texture, (surface, field, tone), tone_atlas)
+
+    def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
+        max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)
+        texels, size, max_level = mip_atlas(mip_map, max_side)
+        height, width = texels.shape[:2]
+        texture = self.device.texture(width, height, "RGBA16F", data=texels)
+        return MipAtlas(texture, size, max_level, len(mip_map.levels) - 1 - max_level)

@@ -1,0 +1,67 @@
+"""Choice of the renderer, by device: for pictures and for 3D views."""
+
+from __future__ import annotations
+
+from ..cache import Cache
+from ..compositor.look import Look
+from ..errors import DeviceError
+from ..render.cpu import CpuRenderer
+from ..render.renderer import Renderer, ViewportRenderer
+from .cpu_viewport import CpuViewportRenderer
+from .device import blender_device
+from .renderer import GpuRenderer
+
+#: What draws pictures: the names, and what a user reads of them.
+RENDER_DEVICES = {
+    "cpu": ("Processor", "The same pixels on every machine"),
+    "gpu": ("Graphics Card", "Faster; single pixels differ from card to card"),
+    "auto": ("Automatic", "The graphics card where there is one, or else the processor"),
+}
+
+
+def select_renderer(
+    device: str, look: Look, cache: Cache | None = None, *, keep_gbuffers: bool = True
+) -> Renderer:
+    """Return the renderer that draws a look on a device.
+
+    The choice depends on the device and on the look's method alone.
+
+    Parameters
+    ----------
+    device : {"cpu", "gpu", "auto"}
+        "auto" is the graphics card if there is one that draws the look, otherwise the processor.
+    look : Look
+    cache : Cache, optional
+    keep_gbuffers : bool
+        What the processor keeps in the cache, see `CpuRenderer`.
+
+    Raises
+    ------
+    DeviceError
+        If the device is "gpu" and there is no graphics card, or it does not draw this look.
+    """
+    if device == "cpu":
+        return CpuRenderer(cache, keep_gbuffers=keep_gbuffers)
+    try:
+        if look.method == "members":
+            raise DeviceError(
+                "the graphics card follows each streamline from member to member; it does not draw "
+                "the method 'members'"
+            )
+        return GpuRenderer(blender_device())
+    except DeviceError:
+        if device == "gpu":
+            raise
+    return CpuRenderer(cache, keep_gbuffers=keep_gbuffers)
+
+
+def select_viewport_renderer(device: str) -> ViewportRenderer:
+    """Return the renderer for 3D views: numpy if the device is "cpu", otherwise the graphics card.
+
+    Raises
+    ------
+    DeviceError
+        If there is no graphics context: then no picture can be shown.
+    """
+    gpu_device = blender_device()
+    return CpuViewportRenderer(gpu_device) if device == "cpu" else GpuRenderer(gpu_device)

@@ -1,0 +1,283 @@
+"""The uniforms of shaders, computed from cameras, looks, lights and draw items."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..compositor.contrast import expected_std, streak_args, supersampling_gain
+from ..compositor.family_hues import SOFTMAX_SHARPNESS
+from ..compositor.filter_kernel import full_sample_count
+from ..compositor.hatching import (
+    ONSET_LEAD,
+    ONSET_RANGE,
+    has_breaks,
+    has_overshoot,
+    has_paper_grain,
+)
+from ..compositor.image_noise import NOISE_STD, streak_moments
+from ..compositor.inks import ink_count, inks_of
+from ..compositor.lic import noise_args
+from ..compositor.look import Look, is_hatched
+from ..compositor.look_units import cell_size_args, supersampled_look
+from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
+from ..compositor.shading import Light, lights_of
+from ..compositor.streak_statistics import (
+    StreakStatistics,
+    break_steps,
+    look_streak_statistics,
+    softness,
+)
+from ..compositor.surface_noise import LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
+from ..compositor.target_tone import ReferenceRender, tone_curve
+from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, has_wobble
+from ..projection.camera import Camera
+from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
+from .defines import HEADLIGHT, MAGNITUDE_MODES, POINT_LIGHT, SUN_LIGHT
+from .field_kind import FieldKind
+from .passes import LIC_SETTINGS, TONE_SETTINGS
+from .resources import DrawItem
+
+#: Planes that clip nothing.
+NO_CLIP_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
+
+
+def clip_uniforms(
+    item: DrawItem, camera: Camera, clip_planes: np.ndarray
+) -> dict[str, tuple[float, ...]]:
+    """Return the rows of the model-to-clip matrix, and the clip planes in model space."""
+    clip = camera.projection @ camera.view @ item.model_matrix
+    uniforms = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
+    object_planes = np.asarray(clip_planes) @ item.model_matrix
+    uniforms.update({f"plane{number}": tuple(row) for number, row in enumerate(object_planes)})
+    return uniforms
+
+
+def camera_uniforms(camera: Camera) -> dict[str, Any]:
+    """Return what maps pixels to the rays through their centers."""
+    projection = camera.projection
+    shift = projection[:2, 2] if camera.is_perspective else -projection[:2, 3]
+    return {
+        "clip_to_camera": tuple(camera.clip_to_camera_xy.ravel()),
+        "lens_shift": tuple(shift),
+        "is_perspective": int(camera.is_perspective),
+    }
+
+
+def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
+    """Return the (2, 2) matrix from the camera plane to pixels, as in `pixel_neighbors`."""
+    scaled = camera.projection[:2, :2] * [[camera.width], [camera.height]]
+    return tuple((scaled / (2 * camera.pixels_per_unit)).ravel())
+
+
+def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+    """Return the settings of the LIC pass. Lengths are in pixels of the supersampled frame."""
+    pixel_look = supersampled_look(look)
+    _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, tapered=look.taper)
+    gain = supersampling_gain(pixel_look) if look.supersampling > 1 else 1.0
+    inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
+    statistics = look_streak_statistics(pixel_look) if is_hatched(look) else None
+    return {
+        **setting_values(pixel_look, LIC_SETTINGS),
+        "half_length": pixel_look.length,
+        "full_samples": full_sample_count(pixel_look),
+        "step_length": pixel_look.step,
+        "crossing_correlation": crossing,
+        "gain": look.gain * gain,
+        "noise_channels": noise_args(pixel_look)["channels"],
+        "family_count": kind.family_count if look.hue == "families" else 1,
+        "family_channel": len(kind.channels) - 1,
+        "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(pixel_look),
+        "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
+        "magnitude_range": look.magnitude_range,
+        "paper_color": (*inks.paper, 1.0),
+        "ink_count": len(inks.dark),
+        "ink_mid_tone": inks.mid_tone,
+        "min_transmittance": inks.min_transmittance,
+        "is_hatched": int(is_hatched(look)),
+        "is_light_ink": int(inks.is_light),
+        "softness": softness(look.crispness),
+        "streak_std": statistics.std if statistics else 1.0,
+        "break_steps": break_steps(pixel_look) if has_breaks(look) else 0,
+        "overshoot_steps": max(round(pixel_look.overshoot / pixel_look.step), 1)
+        if has_overshoot(look)
+        else 0,
+        "break_samples": full_sample_count(replace(pixel_look, length=break_steps(pixel_look))),
+        "break_std": statistics.break_std if statistics else 1.0,
+        "wobble_strength": look.wobble if has_wobble(look) else 0.0,
+        "paper_grain_depth": _paper_grain_depth(look, statistics),
+        "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
+        "paper_grain_shift": line_offset(look.grain),
+        "supersampling": look.supersampling,
+        # Not defines: compilers reorder sums with constants, and the result would change.
+        "onset_range": ONSET_RANGE,
+        "onset_lead": ONSET_LEAD,
+    }
+
+
+def setting_values(look: Look, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the values of settings for uniforms of the same names; switches as 0 or 1."""
+    values = {name: getattr(look, name) for name in names}
+    return {
+        name: int(value) if value is True or value is False else value
+        for name, value in values.items()
+    }
+
+
+def _paper_grain_depth(look: Look, statistics: StreakStatistics | None) -> float:
+    if statistics is None or not has_paper_grain(look):
+        return 0.0
+    return PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
+
+
+def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
+    """Return the uniforms of each light, or those of a black headlight if there is none."""
+    if look.light == "headlight":
+        return [{"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (1.0,) * 4}]
+    result = [
+        {
+            "light_kind": SUN_LIGHT if light.kind == "sun" else POINT_LIGHT,
+            "light_vector": (*np.asarray(light.vector, dtype=float), 0.0),
+            "light_color": (*np.asarray(light.colour) * light.strength, 1.0),
+        }
+        for light in lights_of(look, lights)
+    ]
+    return result or [
+        {"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (0.0,) * 4}
+    ]
+
+
+def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None) -> dict[str, Any]:
+    """Return the settings of the tone pass."""
+    scale, black = tone_curve(look)
+    to_reference = np.zeros((4, 4)) if reference is None else reference.reprojection(camera)
+    return {
+        "pixels_per_unit": camera.pixels_per_unit,
+        **setting_values(look, TONE_SETTINGS),
+        "curve_light": int(look.tone == "light"),
+        "curve_black": black,
+        "curve_scale": scale,
+        "curve_power": 1 / look.tone_gamma,
+        **{
+            f"to_reference_{axis}": tuple(to_reference[row])
+            for axis, row in zip("xyw", (0, 1, 3), strict=True)
+        },
+    }
+
+
+def shadow_uniforms(item: DrawItem, light_view: Camera) -> dict[str, Any]:
+    """Return the rows of the matrix from a model to the clip space of a light, and of its depth."""
+    clip = light_view.projection @ light_view.view @ item.model_matrix
+    uniforms = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
+    return {**uniforms, "depth_row": tuple(-(light_view.view @ item.model_matrix)[2])}
+
+
+def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
+    """Return the matrices from camera space to the shadow map of a light."""
+    rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
+    camera_to_world = np.eye(4)
+    camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
+    camera_to_light = light_view.view @ camera_to_world
+    return {
+        **{
+            f"light_view_{axis}": tuple(row)
+            for axis, row in zip("xyz", camera_to_light[:3], strict=True)
+        },
+        **{
+            f"light_projection_{axis}": tuple(row)
+            for axis, row in zip("xy", light_view.projection[:2], strict=True)
+        },
+        "light_is_perspective": int(light_view.is_perspective),
+        "normal_bias": NORMAL_BIAS_PIXELS / light_view.pixels_per_unit,
+    }
+
+
+def instance_uniforms(instance_id: int, item: DrawItem, camera: Camera) -> dict[str, Any]:
+    """Return what passes over the pixels of one instance need."""
+    model_to_camera = camera.view @ item.model_matrix
+    return {
+        "instance_id": float(instance_id),
+        "texels_per_record": item.mesh.buffers.texels_per_record,
+        **{
+            f"model_view_{axis}": tuple(row)
+            for axis, row in zip("xyz", model_to_camera[:3], strict=True)
+        },
+    }
+
+
+def uniform_scale(model_matrix: np.ndarray) -> float:
+    """Return the scale of a similarity matrix."""
+    return float(np.linalg.norm(model_matrix[:3, 0]))
+
+
+def covering_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+    """Return how the sheets of the covering are numbered."""
+    return {
+        "degree": kind.degree,
+        "line_count": kind.line_count,
+        "sheet_count": kind.sheets_per_turn,
+        "guiding_angle": look.guiding_angle,
+    }
+
+
+def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
+    """Return the settings of the pass that unfolds the covering."""
+    orders = kind.harmonic_orders
+    return {
+        "camera_to_pixels": camera_to_pixels(camera),
+        "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
+        "foreshorten": int(look.foreshorten),
+        "harmonic_count": len(orders),
+        "first_harmonic": orders[0] if orders else 0,
+        "wobble_strength": look.wobble if has_wobble(look) else 0.0,
+    }
+
+
+def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what the noise of all surfaces has in common.
+
+    Parameters
+    ----------
+    settings : dict
+        Of `surface_noise.surface_noise`.
+    """
+    density = settings["density"]
+    amplitude = NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS)
+    return {
+        **{f"lattice_{axis}": (*row, 0.0) for axis, row in zip("xyz", lattice_axes(), strict=True)},
+        "amplitude": amplitude,
+        "density": density,
+        "density_threshold": round(density * 2**24),
+        "noise_channels": settings["channels"],
+        "seed": settings["seed"],
+        "min_cell_scale": settings["smallest"] / settings["grain"],
+    }
+
+
+def surface_cell_uniforms(
+    settings: dict[str, Any], item: DrawItem, camera: Camera
+) -> dict[str, Any]:
+    """Return the size of the noise cells of one surface, in its own units."""
+    cell = settings["grain"] * LATTICE_SCALE
+    return {
+        "pixel_size": cell / (camera.pixels_per_unit * item.object_scale),
+        "cell_size": cell * settings["pixel"] / item.object_scale,
+    }
+
+
+def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
+    """Return the wavelength of the wobble, in pixels or in the units of a surface."""
+    pixel_look = supersampled_look(look)
+    wavelength = pixel_look.grain * MEAN_WAVELENGTH_GRAINS
+    cell_size = cell_size_args(pixel_look)
+    on_surface = look.anchor == "surface"
+    pixels_per_object_unit = camera.pixels_per_unit * item.object_scale if on_surface else 1.0
+    return {
+        "on_surface": int(on_surface),
+        "pixel_size": wavelength / pixels_per_object_unit,
+        "cell_size": wavelength * cell_size["pixel"] * on_surface / item.object_scale,
+        "min_cell_scale": cell_size["smallest"] / pixel_look.grain,
+    }

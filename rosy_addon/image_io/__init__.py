@@ -1,0 +1,1 @@
+"""Image files: reading and writing PNG, writing GIF; numpy only."""

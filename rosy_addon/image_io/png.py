@@ -1,0 +1,192 @@
+"""Reading and writing of PNG files with numpy and zlib."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+
+import numpy as np
+
+from ..color import to_display, to_linear
+from ..errors import RosyError
+from ..file_io import read_bytes, write_bytes
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
+
+#: Compression level of zlib. Streaks are noise: higher levels take five times as long and make
+#: files only a tenth smaller.
+ZLIB_LEVEL = 1
+
+
+def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
+    """Write a picture as an sRGB PNG file with 8 bits per channel.
+
+    Parameters
+    ----------
+    path : path-like
+    rgba : (H, W, 4) float ndarray
+        Linear, not premultiplied, rows from the bottom, as in a `Picture`.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written.
+    """
+    write_bytes(path, png_bytes(to_srgb_uint8(rgba)))
+
+
+def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
+    """Convert an (H, W, 4) linear picture to uint8 display values (sRGB). Alpha stays linear."""
+    display = np.concatenate([to_display(rgba[..., :3]), np.clip(rgba[..., 3:], 0, 1)], axis=-1)
+    return np.rint(display * 255).astype(np.uint8)
+
+
+def png_bytes(rgba: np.ndarray) -> bytes:
+    """Encode an (H, W, 4) uint8 picture (sRGB, rows from the bottom) as a PNG file."""
+    height, width = rgba.shape[:2]
+    rows = rgba[::-1].reshape(height, width * 4)
+    # Each row starts with its filter type. It is 0, none, as filters do not help with noise.
+    rows = np.concatenate([np.zeros((height, 1), dtype=np.uint8), rows], axis=1)
+    header = struct.pack(">IIBBBBB", width, height, _BIT_DEPTH, _RGBA_COLOR_TYPE, 0, 0, 0)
+    chunks = [
+        (b"IHDR", header),
+        (b"sRGB", bytes([_PERCEPTUAL_INTENT])),
+        (b"IDAT", zlib.compress(rows.tobytes(), ZLIB_LEVEL)),
+        (b"IEND", b""),
+    ]
+    return _SIGNATURE + b"".join(_pack_chunk(kind, data) for kind, data in chunks)
+
+
+def _pack_chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+#: Channels of a pixel by color type: gray, RGB, palette index, gray and alpha, RGBA.
+_CHANNELS_BY_COLOR_TYPE = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+_PALETTE_COLOR_TYPE = 3
+
+
+def read_png(path: str | os.PathLike[str]) -> np.ndarray:
+    """Read a PNG file with 8 or 16 bits per channel. Its values are assumed to be sRGB.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    (H, W, 4) float32 ndarray
+        Linear, not premultiplied, rows from the bottom.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is not a valid PNG file, is interlaced, or has fewer than 8 bits
+        per channel.
+    """
+    chunks = _read_chunks(path, read_bytes(path))
+    invalid_file = RosyError(f"{path}: is broken, or no .png file as it should be")
+    try:
+        width, height, bits, color_type, _, _, interlaced = struct.unpack(
+            ">IIBBBBB", chunks[b"IHDR"]
+        )
+    except (KeyError, struct.error):
+        raise invalid_file from None
+    if bits not in (8, 16) or color_type not in _CHANNELS_BY_COLOR_TYPE or interlaced:
+        raise RosyError(
+            f"{path}: only pictures of 8 or 16 bits a channel that are not interlaced are read"
+        )
+    bytes_per_sample = bits // 8
+    bytes_per_pixel = _CHANNELS_BY_COLOR_TYPE[color_type] * bytes_per_sample
+    try:
+        rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), dtype=np.uint8)
+        rows = rows.reshape(height, 1 + width * bytes_per_pixel)
+        values = _undo_filters(rows[:, 1:].reshape(height, width, bytes_per_pixel), rows[:, 0])
+        if color_type == _PALETTE_COLOR_TYPE:
+            values = _apply_palette(values, chunks)
+    except (KeyError, ValueError, IndexError, zlib.error):
+        raise invalid_file from None
+    if bytes_per_sample == 2:
+        values = values.reshape(height, width, -1).view(">u2")
+    return _to_linear_rgba(values[::-1].astype(np.float32) / np.float32(256**bytes_per_sample - 1))
+
+
+def _read_chunks(path: str | os.PathLike[str], data: bytes) -> dict[bytes, bytes]:
+    """Return the data of the chunks of a file by their type. Chunks of one type are joined."""
+    if data[:8] != _SIGNATURE:
+        raise RosyError(f"{path}: is not a .png file")
+    chunks: dict[bytes, bytes] = {}
+    offset = 8
+    while offset + 8 <= len(data):
+        size, name = struct.unpack(">I4s", data[offset : offset + 8])
+        chunks[name] = chunks.get(name, b"") + data[offset + 8 : offset + 8 + size]
+        offset += 12 + size
+    return chunks
+
+
+def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
+    """Reverse the filters of the rows.
+
+    A byte depends on those to the left, above, and above to the left. So all pixels of an
+    antidiagonal (row + column = constant) are decoded at once, in the order of these sums.
+
+    Parameters
+    ----------
+    rows : (H, W, bytes per pixel) uint8 ndarray
+    filter_types : (H,) uint8 ndarray
+        Filter type of each row, 0 to 4.
+
+    Returns
+    -------
+    (H, W, bytes per pixel) uint8 ndarray
+
+    Raises
+    ------
+    ValueError
+        If there is another filter type.
+    """
+    height, width, bytes_per_pixel = rows.shape
+    if not filter_types.any():
+        return rows
+    if filter_types.max() > 4:
+        raise ValueError
+    # A border of zeros to the left and above.
+    out = np.zeros((height + 1, width + 1, bytes_per_pixel), dtype=np.int16)
+    for diagonal in range(height + width - 1):
+        row = np.arange(max(diagonal - width + 1, 0), min(diagonal + 1, height))
+        column = diagonal - row
+        left, above, corner = out[row + 1, column], out[row, column + 1], out[row, column]
+        estimate = left + above - corner
+        errors = [np.abs(estimate - near) for near in (left, above, corner)]
+        paeth = np.where(
+            (errors[0] <= errors[1]) & (errors[0] <= errors[2]),
+            left,
+            np.where(errors[1] <= errors[2], above, corner),
+        )
+        predictions = np.stack([np.zeros_like(left), left, above, (left + above) // 2, paeth])
+        row_filters = filter_types[row].astype(np.intp)
+        predicted = predictions[row_filters, np.arange(len(row))]
+        out[row + 1, column + 1] = (rows[row, column] + predicted) & 255
+    return out[1:, 1:].astype(np.uint8)
+
+
+def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray:
+    """(H, W, 4) uint8 colors of (H, W, 1) palette indices."""
+    colours = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
+    palette = np.full((len(colours), 4), 255, dtype=np.uint8)
+    palette[:, :3] = colours
+    alpha = np.frombuffer(chunks.get(b"tRNS", b""), dtype=np.uint8)
+    palette[: len(alpha), 3] = alpha
+    return palette[values[..., 0]]
+
+
+def _to_linear_rgba(values: np.ndarray) -> np.ndarray:
+    """(H, W, 4) linear RGBA of gray, gray and alpha, RGB or RGBA display values from 0 to 1."""
+    channels = values.shape[2]
+    rgba = np.ones((*values.shape[:2], 4), dtype=np.float32)
+    rgba[..., :3] = to_linear(values[..., : 3 if channels > 2 else 1])
+    if channels % 2 == 0:
+        rgba[..., 3] = values[..., -1]
+    return rgba

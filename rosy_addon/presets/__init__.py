@@ -1,0 +1,1 @@
+"""Presets of looks: finding, reading and writing their files, and preview pictures; numpy only."""

@@ -1,0 +1,121 @@
+"""Preview pictures of looks: a trefoil knot, the same for all looks."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..color import from_hex, to_linear
+from ..compositor.compose import compose
+from ..compositor.look import Look, is_hatched
+from ..field.generate import curvature_field
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface, build_surface
+from ..projection.camera import orbit_camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.project import project
+
+#: Side of a preview in pixels: twice the size in the panel, for high-resolution displays.
+PREVIEW_SIZE = 256
+
+#: Azimuth and elevation of the camera in degrees.
+VIEW_ANGLES = (0.0, 68.0)
+
+#: Background of looks without paper, a display color (sRGB) as dark as Blender's panels.
+BACKGROUND = "#292929"
+
+
+def draw_preview(look: Look) -> np.ndarray:
+    """Draw a trefoil knot in a look, with a field along its principal curvatures.
+
+    This takes about a second for any look, because expensive settings are reduced.
+
+    Parameters
+    ----------
+    look : Look
+
+    Returns
+    -------
+    (PREVIEW_SIZE, PREVIEW_SIZE, 4) float32 ndarray
+        Linear, opaque, rows from the bottom.
+    """
+    look = _fast_look(look)
+    surface, field = _trefoil_mesh()
+    render_size = PREVIEW_SIZE * look.supersampling
+    camera = orbit_camera(surface, *VIEW_ANGLES, render_size, render_size, margin=0.03)
+    gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera, look.display)
+    return _over_background(compose(gbuffer, look).rgba, look)
+
+
+def _fast_look(look: Look) -> Look:
+    """Reduce settings of a look that take long and are hardly visible in a small picture.
+
+    Brute force is replaced by the method "sheets", which follows the same streamlines. The method
+    "members" is drawn without supersampling, as its cost is proportional to the number of samples.
+    Lengths are limited to fractions of the size of the preview.
+    """
+    return look.with_settings(
+        {
+            "method": "sheets" if look.method == "brute" else look.method,
+            "supersampling": 1 if look.method == "members" else 2,
+            "unit": "pixels",
+            "length": min(look.length, PREVIEW_SIZE // 2),
+            "grain": min(look.grain, PREVIEW_SIZE / 2),
+            "high_pass": min(look.high_pass, PREVIEW_SIZE / 4),
+        }
+    )
+
+
+def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
+    """(H, W, 4) linear picture over the paper of the look, or over `BACKGROUND` if it has none."""
+    background = to_linear(from_hex(look.paper_colour if is_hatched(look) else BACKGROUND))
+    alpha = rgba[..., 3:]
+    opaque = np.ones_like(rgba)
+    opaque[..., :3] = rgba[..., :3] * alpha + background * (1 - alpha)
+    return opaque
+
+
+@cache
+def _trefoil_mesh(
+    tube_radius: float = 0.66, segments: int = 300, sides: int = 40
+) -> tuple[Surface, RosyField]:
+    """Build a thick tube around a trefoil knot, and its field of principal curvatures (degree 4).
+
+    The tube has positive and negative curvature, occludes itself, and has normals in all
+    directions.
+    """
+    t = np.arange(segments) * (2 * np.pi / segments)
+    curve, tangent = _trefoil_curve(t)
+    # The knot winds around a circle of radius 2. The vector from the nearest point of that circle
+    # is never parallel to the tangent, so it serves as the normal of the curve.
+    normal = curve - 2 * np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1)
+    normal -= np.sum(normal * tangent, axis=1, keepdims=True) * tangent
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    angle = np.arange(sides)[None, :, None] * (2 * np.pi / sides)
+    ring = np.cos(angle) * normal[:, None] + np.sin(angle) * np.cross(tangent, normal)[:, None]
+    points = (curve[:, None] + tube_radius * ring).reshape(-1, 3)
+    index = np.arange(len(points), dtype=np.int32).reshape(segments, sides)
+    next_segment, next_side = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    corners = np.stack([index, next_segment, np.roll(next_segment, -1, axis=1), next_side], axis=-1)
+    start = np.arange(index.size + 1) * 4
+    surface = build_surface(points, corners.ravel(), start, name="knot")
+    return surface, curvature_field(surface, 4)
+
+
+def _trefoil_curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) points of the trefoil knot at (n,) parameters, and (n, 3) unit tangents."""
+    radius, height = 2 + np.cos(3 * t), 1.1
+    curve = np.stack(
+        [radius * np.cos(2 * t), radius * np.sin(2 * t), height * np.sin(3 * t)], axis=1
+    )
+    radius_derivative = -3 * np.sin(3 * t)
+    tangent = np.stack(
+        [
+            radius_derivative * np.cos(2 * t) - 2 * radius * np.sin(2 * t),
+            radius_derivative * np.sin(2 * t) + 2 * radius * np.cos(2 * t),
+            3 * height * np.cos(3 * t),
+        ],
+        axis=1,
+    )
+    return curve, tangent / np.linalg.norm(tangent, axis=1, keepdims=True)

@@ -1,0 +1,377 @@
+"""Preset files: find, read, write, rename and delete saved looks.
+
+A preset is a small JSON file with a name, a description, and the settings that differ from the
+default look. Shipped presets, a user's own presets and presets that users share have the same
+format. The preview picture is a .png file next to it. It can be drawn again from the look
+(`preview.draw_preview`), so shared presets need none, and pictures from others are never read.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import reprlib
+import sys
+import unicodedata
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..compositor.look import Look
+from ..errors import RosyError
+from ..file_io import read_bytes, write_bytes
+from ..image_io.png import write_png
+from ..settings import settings_of
+from .preview import draw_preview
+
+#: Folder of the shipped presets.
+SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "presets"
+
+#: Key of the preset with the default look.
+DEFAULT_KEY = "default"
+
+#: Maximum numbers of characters of a name and of a description, and of bytes of a preset file.
+MAX_NAME_LENGTH, MAX_DESCRIPTION_LENGTH, MAX_FILE_BYTES = 48, 200, 1 << 16
+
+#: File names that Windows reserves for devices, with any extension.
+WINDOWS_DEVICE_NAMES = {"con", "prn", "aux", "nul"} | {
+    f"{p}{n}" for p in ("com", "lpt") for n in range(10)
+}
+
+
+class Preset(NamedTuple):
+    """A look with a name.
+
+    Attributes
+    ----------
+    name : str
+        The name that users see. One line of at most `MAX_NAME_LENGTH` characters.
+    description : str
+        One line of at most `MAX_DESCRIPTION_LENGTH` characters.
+    look : Look
+    """
+
+    name: str
+    description: str
+    look: Look
+
+
+def default_user_folder() -> Path:
+    """Return the folder of a user's own presets outside Blender.
+
+    It is the environment variable ROSY_PRESETS or, by default, ``rosy/presets`` in the folder of
+    user data of the operating system.
+    """
+    if "ROSY_PRESETS" in os.environ:
+        return Path(os.environ["ROSY_PRESETS"])
+    home = Path.home()
+    if sys.platform == "win32":
+        data = Path(os.environ.get("APPDATA", home / "AppData" / "Roaming"))
+    elif sys.platform == "darwin":
+        data = home / "Library" / "Application Support"
+    else:
+        data = Path(os.environ.get("XDG_DATA_HOME", home / ".local" / "share"))
+    return data / "rosy" / "presets"
+
+
+def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
+    """List the files of all presets.
+
+    Parameters
+    ----------
+    user_folder : Path, optional
+        Folder of the user's own presets. They replace shipped presets with the same key.
+
+    Returns
+    -------
+    dict of str to Path
+        Files by their keys (see `preset_key`): the default, then the other shipped presets, then
+        the user's own, both in alphabetical order.
+    """
+    shipped = {path.stem: path for path in sorted(SHIPPED_FOLDER.glob("*.json"))}
+    files = {DEFAULT_KEY: shipped.pop(DEFAULT_KEY), **shipped}
+    if user_folder is not None and user_folder.is_dir():
+        user_files = {
+            path.stem: path for path in sorted(user_folder.glob("*.json")) if path.is_file()
+        }
+        files = {key: path for key, path in files.items() if key not in user_files} | user_files
+    return files
+
+
+def preset_keys(user_folder: Path | None = None) -> list[str]:
+    """List the keys of all presets, in the order of `preset_files`."""
+    return list(preset_files(user_folder))
+
+
+def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Path:
+    """Find the file of a preset.
+
+    Parameters
+    ----------
+    preset : str or Path
+        A key of a preset, its name, or the path of a .json file. A path is returned unchanged.
+    user_folder : Path, optional
+        Folder of the user's own presets.
+
+    Raises
+    ------
+    RosyError
+        If no preset has that key or name.
+    """
+    path = Path(preset)
+    if path.suffix.lower() == ".json":
+        return path
+    files = preset_files(user_folder)
+    if str(preset) in files:
+        return files[str(preset)]
+    for path in files.values():
+        with suppress(RosyError):
+            if preset_key(read_preset(path).name) == preset_key(str(preset)):
+                return path
+    raise RosyError(f"no preset is named '{preset}'; there are {', '.join(files)}")
+
+
+def load_preset(preset: str | Path, user_folder: Path | None = None) -> Preset:
+    """Find and read a preset; see `find_preset_file` and `read_preset`."""
+    return read_preset(find_preset_file(preset, user_folder))
+
+
+def read_preset(path: str | os.PathLike[str]) -> Preset:
+    """Read a preset file. Files from untrusted sources are safe to read.
+
+    Parameters
+    ----------
+    path : path-like
+        A JSON file with an object of `name`, `description` and `look`. The look is an object of
+        the settings that differ from the default.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be read, is larger than `MAX_FILE_BYTES` or has another content, or if
+        there is no such setting or its value is not allowed.
+    """
+    data = _read_json_object(path)
+    try:
+        name, description, look = (data.pop(key) for key in ("name", "description", "look"))
+    except KeyError as missing:
+        raise RosyError(f"{path}: a preset needs a {missing}") from None
+    if data:
+        raise RosyError(f"{path}: a preset has no {_short_repr(next(iter(data)))}")
+    if not isinstance(look, dict):
+        raise RosyError(f"{path}: 'look' is not an object of settings")
+    unknown = sorted(set(look) - set(settings_of(Look)))
+    if unknown:
+        raise RosyError(
+            f"{path}: a look has no setting {_short_repr(unknown[0])}: it is misspelt, or of a newer RoSy"
+        )
+    try:
+        return _validated(Preset(name, description, Look().with_settings(look)))
+    except RosyError as reason:
+        raise RosyError(f"{path}: {reason}") from None
+
+
+def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
+    """Write a preset file with the settings that differ from the default look.
+
+    Raises
+    ------
+    RosyError
+        If its name or description is not allowed, or the file cannot be written.
+    """
+    _validated(preset)
+    data = preset._replace(look=changed_settings(preset.look))._asdict()
+    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+    write_bytes(path, text.encode("utf-8"))
+
+
+def changed_settings(look: Look) -> dict[str, Any]:
+    """Return the settings in which a look differs from the default, in the order of `Look`."""
+    values = {name: getattr(look, name) for name in settings_of(Look)}
+    return {name: value for name, value in values.items() if value != getattr(Look, name)}
+
+
+def preview_path(path: Path) -> Path:
+    """Return the path of the preview picture of a preset file. The picture may not exist."""
+    return path.with_suffix(".png")
+
+
+def preset_key(name: str) -> str:
+    """Return the key of a preset, which is also the stem of its file name, for its name.
+
+    The key has the letters and digits of the name in lower case, with dashes between words.
+    Reserved names of Windows get the suffix "-preset".
+
+    Raises
+    ------
+    RosyError
+        If there is no letter or digit in the name.
+    """
+    normalized = unicodedata.normalize("NFC", name).lower()
+    words = "".join(sign if sign.isalnum() else " " for sign in normalized).split()
+    if not words:
+        raise RosyError(f"preset {_short_repr(name)}: a name needs a letter or a digit")
+    key = "-".join(words)
+    return f"{key}-preset" if key in WINDOWS_DEVICE_NAMES else key
+
+
+def save_preset(preset: Preset, user_folder: Path, *, replace: bool = False) -> str:
+    """Save a preset of the user, and draw and save its preview picture.
+
+    Parameters
+    ----------
+    preset : Preset
+    user_folder : Path
+        Folder of the user's own presets. It is created if it does not exist.
+    replace : bool
+        Whether to replace an existing preset of the user with the same key.
+
+    Returns
+    -------
+    str
+        Key of the preset.
+
+    Raises
+    ------
+    RosyError
+        If the name or the description is not allowed, the name is that of a shipped preset or,
+        unless `replace` is set, of another preset of the user, or if a file cannot be written.
+    """
+    path = _target_path(_validated(preset), user_folder, replace)
+    _create_folder(user_folder)
+    write_png(preview_path(path), draw_preview(preset.look))
+    write_preset(path, preset)
+    return path.stem
+
+
+def rename_preset(key: str, name: str, description: str, user_folder: Path) -> str:
+    """Change the name and the description of one of the user's own presets.
+
+    Parameters
+    ----------
+    key : str
+        Present key of the preset.
+    name, description : str
+        New values, which may be the present ones.
+    user_folder : Path
+        Folder of the user's own presets.
+
+    Returns
+    -------
+    str
+        New key of the preset.
+
+    Raises
+    ------
+    RosyError
+        If the preset is not the user's own, or the name or the description is not allowed, or the
+        name is taken.
+    """
+    path = _user_file(key, user_folder)
+    preset = _validated(read_preset(path)._replace(name=name, description=description))
+    target = (
+        path if preset_key(name) == path.stem else _target_path(preset, user_folder, replace=False)
+    )
+    write_preset(target, preset)
+    if target != path:
+        if preview_path(path).is_file():
+            os.replace(preview_path(path), preview_path(target))
+        _delete_file(path)
+    return target.stem
+
+
+def remove_preset(key: str, user_folder: Path) -> None:
+    """Delete one of the user's own presets, and its preview picture.
+
+    Raises
+    ------
+    RosyError
+        If the preset is not the user's own, or a file cannot be deleted.
+    """
+    path = _user_file(key, user_folder)
+    _delete_file(path)
+    _delete_file(preview_path(path))
+
+
+def _validated(preset: Preset) -> Preset:
+    """Return the preset unchanged. Raise RosyError if its name or description is not allowed."""
+    limits = (("name", MAX_NAME_LENGTH), ("description", MAX_DESCRIPTION_LENGTH))
+    for attribute, max_length in limits:
+        text = getattr(preset, attribute)
+        if not isinstance(text, str):
+            raise RosyError(f"the {attribute} of a preset is {_short_repr(text)}, not a text")
+        if len(text) > max_length:
+            raise RosyError(
+                f"the {attribute} of a preset has {len(text):,} characters, {max_length} at most"
+            )
+        if not text.isprintable():
+            raise RosyError(
+                f"the {attribute} of a preset, {_short_repr(text)}, is not a line of text"
+            )
+    preset_key(preset.name)
+    return preset
+
+
+def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
+    """Return the path to save a user's preset at. Raise RosyError if its name is taken."""
+    key = preset_key(preset.name)
+    if key in {*preset_keys(), *(preset_key(load_preset(name).name) for name in preset_keys())}:
+        raise RosyError(f"preset '{preset.name}' comes with RoSy: choose another name")
+    path = user_folder / f"{key}.json"
+    if path.exists() and not replace:
+        raise RosyError(f"there is a preset '{key}' already: replace it, or choose another name")
+    return path
+
+
+def _user_file(key: str, user_folder: Path) -> Path:
+    path = preset_files(user_folder).get(key)
+    if path is None or path.parent != user_folder:
+        raise RosyError(f"'{key}' is not a preset of your own")
+    return path
+
+
+def _create_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise RosyError(f"{folder}: cannot be made: {str(reason.strerror).lower()}") from None
+
+
+def _delete_file(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as reason:
+        raise RosyError(f"{path}: cannot be deleted: {str(reason.strerror).lower()}") from None
+
+
+def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
+    data = read_bytes(path, reject_binary=True, max_bytes=MAX_FILE_BYTES)
+    try:
+        parsed = json.loads(data.decode("utf-8-sig"), object_pairs_hook=_reject_duplicate_keys)
+    except RosyError as reason:
+        raise RosyError(f"{path}: {reason}") from None
+    except json.JSONDecodeError as reason:
+        raise RosyError(f"{path}:{reason.lineno}: {reason.msg.lower()}") from None
+    except UnicodeDecodeError:
+        raise RosyError(f"{path}: is not UTF-8 text") from None
+    except RecursionError:
+        raise RosyError(f"{path}: is nested too deeply") from None
+    except ValueError:  # An integer has more digits than Python converts.
+        raise RosyError(f"{path}: holds a number that is too long") from None
+    if not isinstance(parsed, dict):
+        raise RosyError(f"{path}: a preset is an object, with braces")
+    return parsed
+
+
+def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        names = [name for name, _ in pairs]
+        duplicate = next(name for name in names if names.count(name) > 1)
+        raise RosyError(f"{_short_repr(duplicate)} is there twice")
+    return result
+
+
+def _short_repr(value: Any) -> str:
+    """Abbreviated `repr` of a value from a file, for messages."""
+    return reprlib.repr(value)

@@ -1,0 +1,131 @@
+"""Ambient occlusion at the corners of a surface, from shadow maps in many directions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import RosyError
+from ..field.frames import dot, normalize
+from ..field.surface import Surface, sum_per_fan
+from ..progress import Progress, Task, run_to_completion
+from .gbuffer import MeshInstance
+from .shadow_maps import (
+    NORMAL_BIAS_PIXELS,
+    render_depth_map,
+    sun_camera,
+    visibility_from,
+    world_bounds,
+)
+
+#: Defaults: number of light directions, and width and height of each shadow map in pixels.
+DIRECTION_COUNT, DEPTH_MAP_SIZE = 256, 512
+
+#: Sample points are moved from their vertex into the adjacent faces: by this many pixels of the
+#: shadow map, but at most by this fraction of the distance to the mean of the face centers.
+#: Otherwise a wall that stands on an edge would hide half of the filter window of a sample on that
+#: edge.
+SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
+
+
+def occlusion_task(
+    instances: Sequence[MeshInstance],
+    instance_id: int,
+    direction_count: int = DIRECTION_COUNT,
+    resolution: int = DEPTH_MAP_SIZE,
+) -> Task[np.ndarray]:
+    """Compute the ambient occlusion at the corners of one mesh instance.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        All occluders, including the instance itself.
+    instance_id : int
+        Index of the instance whose occlusion is computed.
+    direction_count : int
+        Number of light directions, spread evenly over the sphere.
+    resolution : int
+        Width and height of each shadow map in pixels.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (C,) float32 ndarray
+        Visible part of the hemisphere over each corner, weighted by the cosine to the normal:
+        1 is fully open, 0 fully occluded. Corners of one smooth fan have equal values.
+
+    Raises
+    ------
+    RosyError
+        If `direction_count` is less than 1.
+    """
+    if direction_count < 1:
+        raise RosyError(f"{direction_count} directions: light comes from 1 at least")
+    instance = instances[instance_id]
+    receiver_points = world_bounds(instance)
+    caster_points = np.concatenate([world_bounds(other) for other in instances])
+    pixel_size = float(np.ptp(receiver_points, axis=0).max()) / resolution
+    points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
+    visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
+    for index, direction in enumerate(fibonacci_sphere(direction_count)):
+        yield Progress(index / direction_count, "looking from all sides")
+        cosine = normals @ direction
+        facing_light = np.flatnonzero(cosine > 0)
+        camera = sun_camera(direction, caster_points, receiver_points, resolution)
+        depth_map = render_depth_map(instances, camera)
+        total_weight[facing_light] += cosine[facing_light]
+        visible_weight[facing_light] += cosine[facing_light] * visibility_from(
+            camera, depth_map, points[facing_light], normals[facing_light]
+        )
+    visible_fraction = np.divide(
+        visible_weight, total_weight, out=np.ones_like(visible_weight), where=total_weight > 0
+    )
+    return visible_fraction[instance.surface.corner_fan].astype(np.float32)
+
+
+def ambient_occlusion(
+    instances: Sequence[MeshInstance],
+    instance_id: int,
+    direction_count: int = DIRECTION_COUNT,
+    resolution: int = DEPTH_MAP_SIZE,
+) -> np.ndarray:
+    """Compute the ambient occlusion at the corners of one mesh instance; see `occlusion_task`."""
+    return run_to_completion(occlusion_task(instances, instance_id, direction_count, resolution))
+
+
+def fibonacci_sphere(count: int) -> np.ndarray:
+    """Return (count, 3) unit vectors, spread evenly on a spiral of golden angles."""
+    index = np.arange(count)
+    z = 1 - (2 * index + 1) / count
+    azimuth = index * (np.pi * (3 - np.sqrt(5)))
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1)
+
+
+def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (K, 3) sample points of the fans, moved into their faces, and (K, 3) unit normals.
+
+    Both are in world space. `inset` is a distance in world units; `MAX_INSET_FRACTION` limits it.
+    """
+    surface, matrix = instance.surface, np.asarray(instance.matrix, dtype=np.float64)
+    linear, translation = matrix[:3, :3], matrix[:3, 3]
+    vertex, center = _fan_positions(surface)
+    position, center = vertex @ linear.T + translation, center @ linear.T + translation
+    offset = center - position
+    length = np.sqrt(dot(offset, offset))
+    fraction = np.minimum(MAX_INSET_FRACTION, inset / np.maximum(length, 1e-30))
+    a, b, c = linear
+    cofactors = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    return position + fraction[:, None] * offset, normalize(surface.fan_normal @ cofactors.T)
+
+
+def _fan_positions(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return (K, 3) vertices of the fans and (K, 3) means of their face centers, object space."""
+    positions = np.empty((len(surface.fan_normal), 3))
+    positions[surface.corner_fan] = surface.vertices[surface.corner_vertex]
+    center_sums = sum_per_fan(surface.face_center[surface.corner_face], surface.corner_fan)
+    return positions, center_sums / np.bincount(surface.corner_fan)[:, None]

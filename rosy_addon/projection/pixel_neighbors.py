@@ -1,0 +1,302 @@
+"""Stepping over the pixels of a G-buffer: directions on screen, and continuity between neighbors.
+
+`screen_jacobians` maps tangents of the surface to directions on screen. `neighbor_masks` marks the
+neighboring pixels on which the surface continues, without a silhouette between.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..field.frames import dot_components, transport_components, view_frame
+from .gbuffer import GBuffer
+
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 14
+
+#: Upper bound of the slope of a tangent plane against the picture, in pixels of depth per pixel.
+#: Corresponds to 88 degrees.
+MAX_SLOPE = 30.0
+
+#: Tolerance of the depth difference between neighbors against the prediction of the tangent planes:
+#: in pixels on a surface that faces the eye, and the increase for each unit of slope.
+DEPTH_TOLERANCE, SLOPE_TOLERANCE = 0.5, 0.5
+
+
+def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
+    """Return the linear maps from tangents of the surface to displacements on screen.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+
+    Returns
+    -------
+    (P, 2) complex64 ndarray
+        Displacement on screen, right + i up, of each axis of the view frame after it is transported
+        from the view plane to the tangent plane. It is relative to the displacement of a unit
+        vector that is parallel to the picture at the same depth. A member at angle t of the
+        representation points along ``jacobians @ (cos t, sin t)`` on screen.
+    """
+    camera = gbuffer.camera
+    to_pixels = camera.projection[:2, :2] * [[camera.width], [camera.height]]
+    to_pixels /= 2 * camera.pixels_per_unit
+    to_pixels = to_pixels.astype(np.float32)
+    jacobians = np.empty((2, len(gbuffer.pixel)), dtype=np.complex64)
+    for start in range(0, len(gbuffer.pixel), BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
+        view_direction, normal = gbuffer.view_direction[block].T, gbuffer.normal[block].T
+        ray = view_direction[:2] / view_direction[2] if camera.is_perspective else None
+        frame = (axis.T for axis in view_frame(view_direction.T))
+        for axis, out in zip(frame, jacobians[:, block], strict=True):
+            x, y, depth = transport_components(axis, view_direction, normal)
+            if ray is not None:
+                # Subtract the motion along the ray, which does not move the projected point.
+                x -= depth * ray[0]
+                y -= depth * ray[1]
+            out.real = x * to_pixels[0, 0] + y * to_pixels[0, 1]
+            out.imag = x * to_pixels[1, 0] + y * to_pixels[1, 1]
+    return jacobians.T
+
+
+def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarray:
+    """Return, for each pixel, the neighbors to which a streamline may step.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    crease_angle : float
+        Radians. If the normals of neighboring pixels differ by more, there is a crease between
+        them.
+    cross_creases : bool
+        Whether streamlines may cross creases.
+
+    Returns
+    -------
+    (P,) uint16 ndarray
+        Bit ``(dy + 1) * 3 + (dx + 1)`` is set if the surface continues on the neighbor at (dx, dy):
+        the neighbor shows the same mesh instance, and there is no silhouette between, and no crease
+        that may not be crossed. Bit 4, the pixel itself, is always set. The relation is symmetric.
+
+    Notes
+    -----
+    Over the line from a pixel to its neighbor, the depth of the surface is a curve, and the tangent
+    planes at both ends are two straight lines. If the curve is convex or concave, the lines cross
+    between the ends, however steep the curve is: the difference in depth is then between the two
+    predictions of the lines. At a silhouette it is outside of them by more than a tolerance. The
+    tolerance is large enough for inflections and irregular meshes, and small enough to separate
+    parallel layers whose distance is one pixel. Depth is measured in a quantity that is linear on
+    screen for planes: z, or -1 / z under perspective.
+    """
+    width = np.int32(gbuffer.camera.width)
+    row, column = np.divmod(gbuffer.pixel, width)
+    masks = np.full(len(row), 1 << 4, dtype=np.uint16)
+    if not len(row):
+        return masks
+    left_column = column.min()
+    column -= left_column - 1
+    # One empty column on either side.
+    width = int(column.max()) + 2
+    min_normal_cosine = None if cross_creases else np.float32(np.cos(crease_angle))
+    band_rows = max(BLOCK_PIXELS // width, 1)
+    for row_start in range(int(row[0]), int(row[-1]) + 1, band_rows):
+        # The grid has one more row: the first row of the next band, or an empty row.
+        first, stop = np.searchsorted(
+            row, np.array([row_start, row_start + band_rows + 1], row.dtype)
+        ).tolist()
+        grid_index = (row[first:stop] - row_start) * width + column[first:stop]
+        grid = _pixel_grid(gbuffer, slice(first, stop), grid_index, (band_rows + 1, width))
+        grid_masks = np.zeros((band_rows + 1, width), dtype=np.uint16)
+        for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
+            source, target = _neighbor_slices(band_rows + 1, width, dx, dy)
+            continuous = _is_continuous(grid, source, target, (dx, dy), min_normal_cosine).astype(
+                np.uint16
+            )
+            bit = (dy + 1) * 3 + (dx + 1)
+            grid_masks[source] |= continuous << np.uint16(bit)
+            grid_masks[target] |= continuous << np.uint16(8 - bit)
+        # Links within the last row of the grid are computed again in the next band.
+        masks[first:stop] |= grid_masks.reshape(-1).take(grid_index)
+    return masks
+
+
+def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
+    """Return the depth of pixels in the quantity that `neighbor_masks` uses, and its tolerance.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+
+    Returns
+    -------
+    depth, tolerance : (P,) float32 ndarray
+        Depth: z if orthographic, -1 / z if perspective; larger is nearer to the eye. Tolerance:
+        permitted deviation from the prediction of the tangent plane, one pixel away.
+    """
+    depth, tolerance = np.empty((2, len(gbuffer.pixel)), dtype=np.float32)
+    for start in range(0, len(gbuffer.pixel), BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
+        depth[block], _, _, tolerance[block] = _depth_slopes(gbuffer, block)
+    return depth, tolerance
+
+
+class _PixelGrid(NamedTuple):
+    """Some rows of the frame as 2D arrays, limited to the columns that the G-buffer covers.
+
+    Attributes
+    ----------
+    depth : (h, w) float32 ndarray
+        A quantity that is linear on screen for planes: z if orthographic, -1 / z if perspective.
+        NaN at empty pixels.
+    slope_x, slope_y : (h, w) float32 ndarray
+        Change of `depth` to the next column and to the next row, on the tangent plane.
+    tolerance : (h, w) float32 ndarray
+        Permitted deviation of `depth` from the prediction, one pixel away.
+    normal : 3 (h, w) float32 ndarrays
+        Components of the unit shading normal.
+    instance_id : (h, w) int32 ndarray or None
+        None if there is only one mesh instance.
+    front_facing : (h, w) bool ndarray or None
+        None if all pixels are front facing.
+    """
+
+    depth: np.ndarray
+    slope_x: np.ndarray
+    slope_y: np.ndarray
+    tolerance: np.ndarray
+    normal: tuple[np.ndarray, ...]
+    instance_id: np.ndarray | None
+    front_facing: np.ndarray | None
+
+
+def _pixel_grid(
+    gbuffer: GBuffer, pixels: slice, grid_index: np.ndarray, shape: tuple[int, int]
+) -> _PixelGrid:
+    """Return some pixels of a G-buffer as a grid; `grid_index` holds their flat indices in it."""
+
+    def scatter(values: np.ndarray, fill_value: float = 0) -> np.ndarray:
+        grid = np.full(shape, fill_value, dtype=values.dtype)
+        grid.reshape(-1)[grid_index] = values
+        return grid
+
+    depth, slope_x, slope_y, tolerance = _depth_slopes(gbuffer, pixels)
+    return _PixelGrid(
+        depth=scatter(depth, np.nan),
+        slope_x=scatter(slope_x),
+        slope_y=scatter(slope_y),
+        tolerance=scatter(tolerance),
+        normal=tuple(scatter(component) for component in gbuffer.normal[pixels].T),
+        instance_id=scatter(gbuffer.instance_id[pixels])
+        if len(gbuffer.instance_names) > 1
+        else None,
+        front_facing=None if gbuffer.front_facing.all() else scatter(gbuffer.front_facing[pixels]),
+    )
+
+
+def _depth_slopes(
+    gbuffer: GBuffer, pixels: slice
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return `depth`, `slope_x`, `slope_y` and `tolerance` of some pixels, as in `_PixelGrid`."""
+    camera, normal, z = (
+        gbuffer.camera,
+        gbuffer.geometric_normal[pixels].T,
+        gbuffer.position[pixels, 2],
+    )
+    pixel_to_camera = (camera.clip_to_camera_xy * (2.0 / camera.width, 2.0 / camera.height)).astype(
+        np.float32
+    )
+    slope_x = normal[0] * pixel_to_camera[0, 0] + normal[1] * pixel_to_camera[1, 0]
+    slope_y = normal[0] * pixel_to_camera[0, 1] + normal[1] * pixel_to_camera[1, 1]
+    per_unit = np.float32(camera.pixels_per_unit)
+    if camera.is_perspective:
+        # A ray r, with depth 1, meets the plane n.x = c at depth d, where 1 / d = n.r / c.
+        divisor, depth = dot_components(normal, gbuffer.position[pixels].T), -1 / z
+        scale = -z * per_unit
+    else:
+        divisor, depth, scale = -normal[2], z, per_unit
+    epsilon = np.float32(1e-12)
+    divisor[np.abs(divisor) < epsilon] = -epsilon
+    np.divide(1, divisor, out=divisor)
+    slope_x *= divisor
+    slope_y *= divisor
+    steepness = np.sqrt(slope_x * slope_x + slope_y * slope_y)
+    steepness *= scale
+    limit = np.minimum(1, np.float32(MAX_SLOPE) / np.maximum(steepness, epsilon))
+    slope_x *= limit
+    slope_y *= limit
+    steepness *= limit
+    steepness *= np.float32(SLOPE_TOLERANCE)
+    steepness += np.float32(DEPTH_TOLERANCE)
+    steepness /= scale
+    return depth, slope_x, slope_y, steepness
+
+
+def _neighbor_slices(
+    height: int, width: int, dx: int, dy: int
+) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Return the slices of the cells that have a neighbor at (dx, dy), and of these neighbors.
+
+    `dy` must not be negative.
+    """
+    columns = slice(max(-dx, 0), width - max(dx, 0)), slice(max(dx, 0), width - max(-dx, 0))
+    return (slice(0, height - dy), columns[0]), (slice(dy, height), columns[1])
+
+
+def _is_continuous(
+    grid: _PixelGrid,
+    source: tuple[slice, slice],
+    target: tuple[slice, slice],
+    step: tuple[int, int],
+    min_normal_cosine: np.float32 | None,
+) -> np.ndarray:
+    """Return whether the surface continues from the source cells to the target cells.
+
+    Parameters
+    ----------
+    grid : _PixelGrid
+    source, target : (slice, slice)
+        From `_neighbor_slices`.
+    step : (int, int)
+        dx and dy from source to target.
+    min_normal_cosine : float32 or None
+        Cosine of the crease angle, or None if creases may be crossed.
+
+    Returns
+    -------
+    (h', w') bool ndarray
+    """
+    jump = grid.depth[target] - grid.depth[source]
+    source_prediction = _predicted_step(grid.slope_x[source], grid.slope_y[source], *step)
+    target_prediction = _predicted_step(grid.slope_x[target], grid.slope_y[target], *step)
+    tolerance = np.minimum(grid.tolerance[source], grid.tolerance[target])
+    if all(step):
+        tolerance *= np.float32(np.sqrt(2))
+    with np.errstate(invalid="ignore"):
+        continuous = jump <= np.maximum(source_prediction, target_prediction) + tolerance
+        continuous &= jump >= np.minimum(source_prediction, target_prediction) - tolerance
+        if grid.front_facing is not None:
+            # A change between front and back faces is a silhouette, unless both planes predict the
+            # difference in depth: then the orientation of the faces is inconsistent.
+            same_side = np.abs(jump - source_prediction) <= tolerance
+            same_side &= np.abs(jump - target_prediction) <= tolerance
+            same_side |= grid.front_facing[source] == grid.front_facing[target]
+            continuous &= same_side
+    if grid.instance_id is not None:
+        continuous &= grid.instance_id[source] == grid.instance_id[target]
+    if min_normal_cosine is not None:
+        normal_cosine = grid.normal[0][source] * grid.normal[0][target]
+        normal_cosine += grid.normal[1][source] * grid.normal[1][target]
+        normal_cosine += grid.normal[2][source] * grid.normal[2][target]
+        continuous &= normal_cosine >= min_normal_cosine
+    return continuous
+
+
+def _predicted_step(slope_x: np.ndarray, slope_y: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Return the change of depth on the tangent plane over a step to a neighbor."""
+    if not dx:
+        return slope_y
+    if not dy:
+        return slope_x
+    return slope_y + slope_x if dx > 0 else slope_y - slope_x

@@ -1,0 +1,564 @@
+"""A scanline rasterizer in numpy: the nearest triangle at the center of each pixel.
+
+The edges of a triangle are intersected with the horizontal lines through pixel centers. An edge is
+always evaluated from its lower to its upper end, so that two triangles with a common edge compute
+bit-identical intersections. A row belongs to a triangle if its line is at or above the lowest
+vertex and below the highest one. A pixel belongs to a span if its center is at or right of the left
+intersection and left of the right one. So adjacent triangles leave no gaps and do not overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+#: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
+BLOCK_SIZE = 1 << 14
+
+#: The bits of the column in an integer that packs a row and a column.
+COLUMN_MASK = 0xFFFF
+
+#: Largest size of the depth buffer, in pixels. Larger frames are rasterized in bands of rows.
+MAX_BAND_PIXELS = 1 << 24
+
+
+class Fragments(NamedTuple):
+    """The nearest triangle at each of the P covered pixels, in ascending order of pixel.
+
+    Attributes
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat index, ``row * width + column`` from the lower left.
+    triangle : (P,) int32 ndarray
+        Index of the visible triangle.
+    barycentric : (P, 3) float32 ndarray
+        Perspective-correct barycentric coordinates of the pixel center in the triangle. Not
+        negative, with sum 1.
+    front_facing : (P,) bool ndarray
+        Whether the corners of the triangle run counter-clockwise on screen.
+    depth : (P,) float64 ndarray
+        z / w, from -1 at the near plane to 1 at the far plane.
+    """
+
+    pixel: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    front_facing: np.ndarray
+    depth: np.ndarray
+
+
+class _ScreenVertices(NamedTuple):
+    """Vertices on screen.
+
+    Attributes
+    ----------
+    x, y : (V,) float64 ndarray
+        Position in pixels, from the lower left corner of the frame.
+    depth : (V,) float64 ndarray
+        z / w.
+    packed_center : (V,) int32 ndarray
+        The first pixel center at or above, and at or right of, the vertex: row times 2^16, plus
+        column. Clamped to the frame.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    packed_center: np.ndarray
+
+    def clamped_to_rows(self, row_start: int, row_stop: int) -> _ScreenVertices:
+        """Return the vertices with the rows of `packed_center` clamped to a range of rows."""
+        row = np.clip(self.packed_center >> 16, row_start, row_stop)
+        return self._replace(packed_center=row << 16 | self.packed_center & COLUMN_MASK)
+
+
+class _ClippedTriangles(NamedTuple):
+    """Triangles after clipping at the near plane.
+
+    Attributes
+    ----------
+    corners : 3 (K,) int32 ndarrays
+        Vertex index of each corner.
+    triangle : (K,) int32 ndarray
+        Index of the original triangle, in ascending order.
+    """
+
+    corners: tuple[np.ndarray, np.ndarray, np.ndarray]
+    triangle: np.ndarray
+
+
+class _Spans(NamedTuple):
+    """Horizontal runs of covered pixels.
+
+    Attributes
+    ----------
+    start : (S,) intp ndarray
+        Flat index of the first pixel.
+    count : (S,) intp ndarray
+        Number of pixels.
+    depth, depth_step : (S,) float64 ndarray
+        z / w at the first pixel, and its change from pixel to pixel.
+    triangle : (S,) ndarray of int
+        Index of the triangle.
+    """
+
+    start: np.ndarray
+    count: np.ndarray
+    depth: np.ndarray
+    depth_step: np.ndarray
+    triangle: np.ndarray
+
+
+def rasterize(
+    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
+) -> Fragments:
+    """Find the nearest triangle at the center of every pixel.
+
+    Both sides of a triangle are drawn. Of triangles at exactly the same depth, the one with the
+    smallest index is visible.
+
+    Parameters
+    ----------
+    clip_vertices : (V, 4) float64 ndarray
+        Clip space, in OpenGL's convention.
+    triangles : (T, 3) ndarray of int
+        Vertex indices. Adjacent triangles are drawn without cracks if they share the vertices of
+        the common edge, or these have equal coordinates.
+    width, height : int
+        Size of the frame in pixels.
+
+    Returns
+    -------
+    Fragments
+    """
+    clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
+    vertices, clipped = _clip_near(clip_vertices, triangles)
+    screen = _to_screen(vertices, width, height)
+    pixel, triangle, depth = [], [], []
+    band_rows = max(1, MAX_BAND_PIXELS // width)
+    for row_start in range(0, height, band_rows):
+        row_stop = min(row_start + band_rows, height)
+        band = _rasterize_rows(screen, clipped, width, row_start, row_stop)
+        for values, collected in zip(band, (pixel, triangle, depth), strict=True):
+            collected.append(values)
+    pixel, triangle = np.concatenate(pixel), np.concatenate(triangle)
+    weights, front_facing = _barycentrics(clip_vertices, triangles, pixel, triangle, width, height)
+    return Fragments(pixel, triangle, weights, front_facing, np.concatenate(depth))
+
+
+def _clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, _ClippedTriangles]:
+    """Clip triangles at the near plane. Triangles behind it are removed.
+
+    Returns
+    -------
+    vertices : (V', 4) float64 ndarray
+        The given vertices, followed by the intersections with the near plane.
+    clipped : _ClippedTriangles
+    """
+    inside = vertices[:, 2] + vertices[:, 3] >= 0
+    a, b, c = np.ascontiguousarray(triangles.T)
+    if inside.all():
+        return vertices, _ClippedTriangles((a, b, c), np.arange(len(triangles), dtype=np.int32))
+    count = inside[a].astype(np.int8) + inside[b] + inside[c]
+    unclipped = np.flatnonzero(count == 3).astype(np.int32)
+    crossing = np.flatnonzero((count == 1) | (count == 2)).astype(np.int32)
+    new_vertices, new_corners, new_triangle = _clip_crossing_triangles(
+        vertices, triangles, inside, crossing
+    )
+    triangle = np.concatenate([unclipped, new_triangle])
+    order = np.argsort(triangle, kind="stable")
+    corners = np.concatenate([triangles[unclipped], new_corners])[order]
+    return (
+        np.concatenate([vertices, new_vertices]),
+        _ClippedTriangles(tuple(np.ascontiguousarray(corners.T)), triangle[order]),
+    )
+
+
+def _clip_crossing_triangles(
+    vertices: np.ndarray, triangles: np.ndarray, inside: np.ndarray, crossing: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Clip K triangles that cross the near plane, and triangulate what is in front of it.
+
+    In each crossing triangle, one vertex (`apex`) is alone on its side of the plane. If it is in
+    front, a triangle remains, otherwise a quadrilateral.
+
+    Parameters
+    ----------
+    vertices : (V, 4) float64 ndarray
+    triangles : (T, 3) int32 ndarray
+    inside : (V,) bool ndarray
+        Whether each vertex is in front of the near plane.
+    crossing : (K,) int32 ndarray
+        Indices of the crossing triangles.
+
+    Returns
+    -------
+    new_vertices : (2 K, 4) float64 ndarray
+        Intersections with the near plane. Their indices continue those of `vertices`.
+    corners : (K', 3) int32 ndarray
+        Vertex indices of the new triangles.
+    triangle : (K',) int32 ndarray
+        Index of the original triangle of each.
+    """
+    corners = triangles[crossing]
+    sides = inside[corners]
+    one_inside = sides.sum(axis=1) == 1
+    lone_corner = np.argmax(sides == one_inside[:, None], axis=1)
+    rotated_corners = (lone_corner[:, None] + np.arange(3)) % 3
+    apex, left, right = np.take_along_axis(corners, rotated_corners, axis=1).T
+    new_vertices = np.concatenate(
+        [_intersect_near(vertices, apex, left), _intersect_near(vertices, apex, right)]
+    )
+    on_left = np.arange(len(crossing), dtype=np.int32) + len(vertices)
+    on_right = on_left + len(crossing)
+    tip, base = one_inside, ~one_inside
+    new_corners = np.concatenate(
+        [
+            np.stack([apex, on_left, on_right], axis=1)[tip],
+            np.stack([on_left, left, right], axis=1)[base],
+            np.stack([on_left, right, on_right], axis=1)[base],
+        ]
+    )
+    return (
+        new_vertices,
+        new_corners.astype(np.int32),
+        np.concatenate([crossing[tip], crossing[base], crossing[base]]),
+    )
+
+
+def _intersect_near(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the (K, 4) intersections of edges with the near plane.
+
+    They do not depend on the order of the two vertices of an edge.
+    """
+    low, high = vertices[np.minimum(first, second)], vertices[np.maximum(first, second)]
+    low_distance, high_distance = low[:, 2] + low[:, 3], high[:, 2] + high[:, 3]
+    t = (low_distance / (low_distance - high_distance))[:, None]
+    return low + t * (high - low)
+
+
+def _to_screen(vertices: np.ndarray, width: int, height: int) -> _ScreenVertices:
+    """Transform (V, 4) vertices from clip space to the screen."""
+    x, y, z, w = vertices.T
+    inverse_w = np.divide(1.0, w, out=np.zeros(len(w)), where=w > 0)
+    x = (x * inverse_w + 1.0) * (0.5 * width)
+    y = (y * inverse_w + 1.0) * (0.5 * height)
+    column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int32)
+    row = np.clip(np.ceil(y - 0.5), 0, height).astype(np.int32)
+    return _ScreenVertices(x, y, z * inverse_w, row << 16 | column)
+
+
+def _rasterize_rows(
+    screen: _ScreenVertices, clipped: _ClippedTriangles, width: int, row_start: int, row_stop: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rasterize the rows from `row_start` up to, but not including, `row_stop`.
+
+    Returns
+    -------
+    pixel : (P,) int32 ndarray
+        Flat indices in the whole frame, ascending.
+    triangle : (P,) int32 ndarray
+    depth : (P,) float64 ndarray
+    """
+    screen = screen.clamped_to_rows(row_start, row_stop)
+    depth_buffer = np.full(
+        (row_stop - row_start) * width, np.nextafter(1.0, 2.0)
+    )  # just beyond the far plane
+    triangle_buffer = np.full((row_stop - row_start) * width, -1, dtype=np.int32)
+    for start in range(0, len(clipped.triangle), BLOCK_SIZE):
+        block = slice(start, start + BLOCK_SIZE)
+        corners = tuple(corner[block] for corner in clipped.corners)
+        for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
+            spans.start[:] -= row_start * width
+            for span_block in _block_slices(spans.count):
+                _depth_test(
+                    _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
+                )
+    pixel = np.flatnonzero(triangle_buffer >= 0)
+    return (pixel + row_start * width).astype(np.int32), triangle_buffer[pixel], depth_buffer[pixel]
+
+
+def _scan_convert(
+    screen: _ScreenVertices, corners: tuple[np.ndarray, ...], triangle: np.ndarray, width: int
+) -> Iterator[_Spans]:
+    """Yield the spans of a block of triangles, in the order of the triangles."""
+    a, b, c = corners
+    # If all corners have the same row or the same column in `packed_center`, the triangle covers no
+    # pixel center.
+    packed = screen.packed_center.take(a)
+    differing_bits = packed ^ screen.packed_center.take(b)
+    differing_bits |= packed ^ screen.packed_center.take(c)
+    covering = np.flatnonzero((differing_bits > COLUMN_MASK) & (differing_bits & COLUMN_MASK != 0))
+    if len(covering) < len(a):
+        a, b, c, triangle = (values.take(covering) for values in (a, b, c, triangle))
+    a, b, c = _sorted_by_y(screen.y, a, b, c)
+    bottom, middle, top = (screen.packed_center.take(corner) >> 16 for corner in (a, b, c))
+    bottom_corner, middle_corner, top_corner = (
+        _gather_corner(screen, corner) for corner in (a, b, c)
+    )
+    depth_plane = _depth_plane(bottom_corner, middle_corner, top_corner)
+    long_edge, lower_edge, upper_edge = (
+        _edge_line(bottom_corner, top_corner),
+        _edge_line(bottom_corner, middle_corner),
+        _edge_line(middle_corner, top_corner),
+    )
+    short_edges = tuple(np.concatenate(pair) for pair in zip(lower_edge, upper_edge, strict=True))
+    for block in _block_slices(top - bottom):
+        first, rows = bottom[block], (top - bottom)[block]
+        local_triangle = np.repeat(np.arange(block.start, block.stop), rows)
+        row = _concatenated_ranges(first, rows)
+        short_edge = local_triangle + len(middle) * (row >= middle.take(local_triangle))
+        center_y = row + 0.5
+        long_x, short_x = (
+            _edge_x_at_row(long_edge, local_triangle, center_y),
+            _edge_x_at_row(short_edges, short_edge, center_y),
+        )
+        first, last = _column_range(long_x, short_x, width)
+        nonempty = np.flatnonzero(first < last)
+        local_triangle, row, first, last = (
+            values.take(nonempty) for values in (local_triangle, row, first, last)
+        )
+        spans = _spans_with_depth(row, local_triangle, first, last, depth_plane, width)
+        yield spans._replace(triangle=triangle.take(local_triangle))
+
+
+class _ScreenCorner(NamedTuple):
+    """One corner of each triangle of a block: x and y in pixels, and z / w as `depth`."""
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+
+
+def _gather_corner(screen: _ScreenVertices, vertex: np.ndarray) -> _ScreenCorner:
+    """Return the position and depth of vertices given by index."""
+    return _ScreenCorner(screen.x.take(vertex), screen.y.take(vertex), screen.depth.take(vertex))
+
+
+def _edge_x_at_row(
+    edges: tuple[np.ndarray, np.ndarray, np.ndarray], edge: np.ndarray, center_y: np.ndarray
+) -> np.ndarray:
+    """Return x where edges intersect horizontal lines.
+
+    `edges` is from `_edge_line`, `edge` holds an index into it for each line at `center_y`.
+    """
+    x, y, slope = edges
+    crossing = center_y - y.take(edge)
+    crossing *= slope.take(edge)
+    crossing += x.take(edge)
+    return crossing
+
+
+def _column_range(x_a: np.ndarray, x_b: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first column with its center between two intersections, and the last plus one.
+
+    Both are float64, clamped to 0 to `width`.
+    """
+    columns = []
+    for x in (np.minimum(x_a, x_b), np.maximum(x_a, x_b)):
+        x -= 0.5
+        np.ceil(x, out=x)
+        np.maximum(x, 0, out=x)
+        columns.append(np.minimum(x, width, out=x))
+    return columns[0], columns[1]
+
+
+def _spans_with_depth(
+    row: np.ndarray,
+    local_triangle: np.ndarray,
+    first: np.ndarray,
+    last: np.ndarray,
+    depth_plane: tuple[np.ndarray, ...],
+    width: int,
+) -> _Spans:
+    """Return spans with depth. Their triangles are indices within the block.
+
+    Parameters
+    ----------
+    row, local_triangle : (S,) ndarray of int
+    first, last : (S,) float64 ndarray
+        From `_column_range`.
+    depth_plane : tuple of ndarray
+        From `_depth_plane`.
+    width : int
+        Width of the frame in pixels.
+    """
+    slope_x, slope_y, base, min_depth, max_depth = (
+        values.take(local_triangle) for values in depth_plane
+    )
+    slope_y *= row + 0.5
+    base += slope_y
+    end_depths = []
+    for column in (first + 0.5, last - 0.5):
+        column *= slope_x
+        column += base
+        # The gradient of a sliver may be dominated by rounding errors, so the depth is clamped to
+        # the range of the triangle.
+        np.maximum(column, min_depth, out=column)
+        end_depths.append(np.minimum(column, max_depth, out=column))
+    start, end = end_depths
+    pixel_count = last - first
+    end -= start
+    end /= np.maximum(pixel_count - 1, 1)
+    return _Spans(
+        start=row * width + first.astype(np.intp),
+        count=pixel_count.astype(np.intp),
+        depth=start,
+        depth_step=end,
+        triangle=local_triangle,
+    )
+
+
+def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.ndarray) -> None:
+    """Draw spans into the depth buffer and the triangle buffer, in place.
+
+    If several fragments write to the same pixel in one assignment, an arbitrary one is kept. The
+    fragments that are nearer than the kept one write again, until there are none. Few rounds are
+    needed, because each removes all fragments that are not in front of the kept one.
+    """
+    span = np.repeat(np.arange(len(spans.count)), spans.count)
+    pixel = _concatenated_ranges(spans.start, spans.count)
+    depth = pixel - spans.start.take(span)
+    depth = depth * spans.depth_step.take(span)
+    depth += spans.depth.take(span)
+    closer = np.flatnonzero(depth < depth_buffer.take(pixel))
+    span, pixel, depth = span.take(closer), pixel.take(closer), depth.take(closer)
+    pending_pixel, pending_depth = pixel, depth
+    while len(pending_pixel):
+        depth_buffer[pending_pixel] = pending_depth
+        closer = np.flatnonzero(pending_depth < depth_buffer.take(pending_pixel))
+        pending_pixel, pending_depth = pending_pixel.take(closer), pending_depth.take(closer)
+    # In reverse order, so that of equal depths the first triangle is written last and is kept.
+    winners = np.flatnonzero(depth == depth_buffer.take(pixel))[::-1]
+    triangle_buffer[pixel.take(winners)] = spans.triangle.take(span.take(winners))
+
+
+def _block_slices(count: np.ndarray) -> Iterator[slice]:
+    """Yield consecutive slices of entries whose counts sum up to at most `BLOCK_SIZE`.
+
+    A single entry with a larger count is a slice of its own.
+    """
+    total = np.cumsum(count, dtype=np.int64)
+    start = done = 0
+    while start < len(count):
+        stop = max(int(np.searchsorted(total, done + BLOCK_SIZE, side="right")), start + 1)
+        yield slice(start, stop)
+        start, done = stop, int(total[stop - 1])
+
+
+def _concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return the concatenation of the ranges ``first[i]`` to ``first[i] + count[i] - 1``, intp.
+
+    Examples
+    --------
+    >>> _concatenated_ranges(np.array([5, 10]), np.array([3, 2])).tolist()
+    [5, 6, 7, 10, 11]
+    """
+    stop = np.cumsum(count)
+    shift = first + count
+    shift -= stop
+    result = np.repeat(shift, count)
+    result += np.arange(len(result))
+    return result
+
+
+def _sorted_by_y(
+    y: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vertex indices of each triangle, sorted from the lowest to the highest y."""
+
+    def ordered(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        swap = y.take(one) > y.take(other)
+        return np.where(swap, other, one), np.where(swap, one, other)
+
+    a, b = ordered(a, b)
+    b, c = ordered(b, c)
+    a, b = ordered(a, b)
+    return a, b, c
+
+
+def _edge_line(
+    low: _ScreenCorner, high: _ScreenCorner
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return x and y of the lower end of edges, and their slope dx / dy."""
+    rise = high.y - low.y
+    rise[rise == 0] = np.inf
+    return low.x, low.y, (high.x - low.x) / rise
+
+
+def _depth_plane(a: _ScreenCorner, b: _ScreenCorner, c: _ScreenCorner) -> tuple[np.ndarray, ...]:
+    """Return the depth of triangles as linear functions on screen, and their depth range.
+
+    z / w is affine on screen for a plane, under perspective too.
+
+    Returns
+    -------
+    slope_x, slope_y, base, min_depth, max_depth : (n,) float64 ndarray
+        depth = slope_x x + slope_y y + base, with x and y in pixels.
+    """
+    xb, yb, depth_b = b.x - a.x, b.y - a.y, b.depth - a.depth
+    xc, yc, depth_c = c.x - a.x, c.y - a.y, c.depth - a.depth
+    inverse_area = xb * yc - xc * yb
+    inverse_area[inverse_area == 0] = np.inf
+    np.divide(1, inverse_area, out=inverse_area)
+    slope_x = (depth_b * yc - depth_c * yb) * inverse_area
+    slope_y = (depth_c * xb - depth_b * xc) * inverse_area
+    min_depth = np.minimum(np.minimum(a.depth, b.depth), c.depth)
+    max_depth = np.maximum(np.maximum(a.depth, b.depth), c.depth)
+    return slope_x, slope_y, a.depth - slope_x * a.x - slope_y * a.y, min_depth, max_depth
+
+
+def _barycentrics(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    pixel: np.ndarray,
+    triangle: np.ndarray,
+    width: int,
+    height: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute perspective-correct barycentric coordinates at pixel centers, in unclipped triangles.
+
+    Uses homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
+    Coordinates", 1997), which are also valid for triangles that extend behind the eye. They are
+    evaluated relative to the pixel center, so that small triangles lose no precision.
+
+    Returns
+    -------
+    weights : (P, 3) float32 ndarray
+        1 / 3 each for triangles that have no area on screen.
+    front_facing : (P,) bool ndarray
+        Whether the corners run counter-clockwise on screen.
+    """
+    w = vertices[:, 3]
+    x, y, w = (vertices[:, 0] + w) * (0.5 * width), (vertices[:, 1] + w) * (0.5 * height), w.copy()
+    corners = np.ascontiguousarray(triangles.T)
+    weights = np.empty((3, len(pixel)), dtype=np.float32)
+    front_facing = np.empty(len(pixel), dtype=bool)
+    for start in range(0, len(pixel), BLOCK_SIZE):
+        block = slice(start, start + BLOCK_SIZE)
+        row, column = np.divmod(pixel[block], np.int32(width))
+        column, row = column + 0.5, row + 0.5
+        offsets = []
+        for corner in corners:
+            vertex = corner.take(triangle[block]).astype(np.intp)
+            depth = w.take(vertex)
+            offsets.append((x.take(vertex) - column * depth, y.take(vertex) - row * depth))
+        (ax, ay), (bx, by), (cx, cy) = offsets
+        area_a, area_b, area_c = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+        total = area_a + area_b
+        total += area_c
+        np.greater_equal(total, 0, out=front_facing[block])
+        with np.errstate(divide="ignore"):
+            np.divide(1, total, out=total)
+        # Triangles without area on screen get weights of 1 / 3 below.
+        degenerate = np.isinf(total)
+        total[degenerate] = 0
+        for area, out in zip((area_a, area_b, area_c), weights[:, block], strict=True):
+            area *= total
+            np.maximum(area, 0, out=area)
+            out[:] = area
+        weights[:, block][:, degenerate] = 1 / 3
+    return weights.T, front_facing

@@ -1,0 +1,147 @@
+"""Positions of the pixels of a G-buffer on the rest shapes of the meshes.
+
+They move with the surface when it is transformed or deformed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.frames import transform_components
+from .gbuffer import GBuffer, MeshInstance
+
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 14
+
+#: Range to which barycentric coordinates are clamped. On a triangle that is seen edge-on, a pixel
+#: can reach far beyond the triangle.
+BARYCENTRIC_RANGE = (-4, 5)
+
+
+@dataclass(frozen=True, eq=False)
+class RestCoordinates:
+    """Positions on the rest shapes, at the centers of P pixels and at offsets from them.
+
+    Attributes
+    ----------
+    weights, weights_dx, weights_dy : (3, P) float32 ndarray
+        Homogeneous barycentric coordinates at the pixel center, and their change to the next pixel
+        on the right and above, in the plane of the triangle.
+    rest_corners : 3 (3, P) float32 ndarrays
+        The corners of the triangle in the rest shape, object space.
+    pixel_size : (P,) float32 ndarray
+        Width of a pixel at the depth of the surface, parallel to the picture, in units of object
+        space.
+    """
+
+    weights: np.ndarray
+    weights_dx: np.ndarray
+    weights_dy: np.ndarray
+    rest_corners: tuple[np.ndarray, np.ndarray, np.ndarray]
+    pixel_size: np.ndarray
+
+    def block(self, pixels: slice) -> RestCoordinates:
+        """Return the coordinates of some of the pixels."""
+        return RestCoordinates(
+            self.weights[:, pixels],
+            self.weights_dx[:, pixels],
+            self.weights_dy[:, pixels],
+            tuple(corner[:, pixels] for corner in self.rest_corners),
+            self.pixel_size[pixels],
+        )
+
+    def at_offset(self, dx: float, dy: float) -> np.ndarray:
+        """Return the (3, P) float32 rest positions at an offset from the pixel centers.
+
+        `dx` and `dy` are in pixels, to the right and up. The position is in the plane of the
+        visible triangle of each pixel.
+        """
+        weight = self.weights + np.float32(dx) * self.weights_dx
+        weight += np.float32(dy) * self.weights_dy
+        total = weight.sum(axis=0)
+        total[np.abs(total) < 1e-30] = 1
+        weight /= total
+        # On a triangle that is seen edge-on, an offset may reach far beyond the triangle.
+        np.clip(weight, *BARYCENTRIC_RANGE, out=weight)
+        return sum(
+            corner_weight * corner
+            for corner_weight, corner in zip(weight, self.rest_corners, strict=True)
+        )
+
+
+def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
+    """Compute the positions of the pixels of a G-buffer on the rest shapes.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With `instances`.
+
+    Returns
+    -------
+    RestCoordinates
+        In object space. The rest shape is `Surface.rest_vertices`, or the vertices if there are
+        none.
+    """
+    count = len(gbuffer.pixel)
+    coordinates = RestCoordinates(
+        *(np.empty((3, count), dtype=np.float32) for _ in range(3)),
+        rest_corners=tuple(np.empty((3, count), dtype=np.float32) for _ in range(3)),
+        pixel_size=np.empty(count, dtype=np.float32),
+    )
+    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
+        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
+        instance = gbuffer.instances[instance_id]
+        for start in range(0, len(pixels), BLOCK_PIXELS):
+            _fill_pixels(coordinates, gbuffer, instance, pixels[start : start + BLOCK_PIXELS])
+    return coordinates
+
+
+def _fill_pixels(
+    coordinates: RestCoordinates, gbuffer: GBuffer, instance: MeshInstance, pixels: np.ndarray
+) -> None:
+    """Compute the coordinates at some pixels of one mesh instance, in place."""
+    camera, surface = gbuffer.camera, instance.surface
+    rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    vertices = surface.triangle_vertex.take(gbuffer.triangle[pixels], axis=0).T
+    clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+    row, column = np.divmod(gbuffer.pixel[pixels], camera.width)
+    offsets = []
+    for corner, out in zip(vertices, coordinates.rest_corners, strict=True):
+        point = surface.vertices.take(corner, axis=0).T
+        x, y, _, w = transform_components(point, clip[:, :3], clip[:, 3])
+        # Homogeneous offset from the pixel center, in pixels times w.
+        x = (x + w) * (0.5 * camera.width) - (column + 0.5) * w
+        y = (y + w) * (0.5 * camera.height) - (row + 0.5) * w
+        offsets.append((x, y, w))
+        out[:, pixels] = rest.take(corner, axis=0).T
+    for edge in range(3):
+        (bx, by, bw), (cx, cy, cw) = offsets[(edge + 1) % 3], offsets[(edge + 2) % 3]
+        # Homogeneous edge functions are linear on screen, so their derivatives are constant.
+        coordinates.weights[edge, pixels] = bx * cy - cx * by
+        coordinates.weights_dx[edge, pixels] = cw * by - bw * cy
+        coordinates.weights_dy[edge, pixels] = bw * cx - cw * bx
+    _normalize_weights(coordinates, pixels)
+    depth = -gbuffer.position[pixels, 2] if camera.is_perspective else 1.0
+    coordinates.pixel_size[pixels] = depth / (
+        camera.pixels_per_unit * matrix_scale(instance.matrix)
+    )
+
+
+def matrix_scale(matrix: np.ndarray) -> float:
+    """Return the mean scale of a (4, 4) matrix: the cube root of its change of volume.
+
+    1 if the matrix is singular.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    return float(np.cbrt(abs(np.cross(linear[0], linear[1]) @ linear[2]))) or 1.0
+
+
+def _normalize_weights(coordinates: RestCoordinates, pixels: np.ndarray) -> None:
+    """Scale the weights to a sum of 1 at the pixel center, in place, for single precision."""
+    total = coordinates.weights[:, pixels].sum(axis=0)
+    total[total == 0] = 1
+    for weights in (coordinates.weights, coordinates.weights_dx, coordinates.weights_dy):
+        weights[:, pixels] /= total

@@ -1,0 +1,71 @@
+"""Sampling of surface tones at the pixels of a G-buffer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..field.frames import dot
+from .gbuffer import GBuffer, MeshInstance
+
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 14
+
+#: Lower bound of the cosine between normal and view direction. Bounds the area of the surface that
+#: a pixel covers.
+MIN_FACING_COSINE = 0.1
+
+
+def surface_tones(gbuffer: GBuffer) -> np.ndarray:
+    """Sample the tones of surfaces at the pixels of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With `instances`.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        Linear tones. NaN where the mesh instance has no tone.
+    """
+    tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
+    for instance, pixels in _instance_blocks(gbuffer):
+        tone = instance.tone
+        if tone is None:
+            continue
+        corners = instance.surface.triangles.take(gbuffer.triangle[pixels], axis=0)
+        sampled = np.einsum("pi,pik->kp", gbuffer.barycentric[pixels], tone.values[corners])
+        if tone.image is None:
+            tones[pixels] = sampled[0]
+        else:
+            level = 0.5 * np.log2(_texel_footprint(gbuffer, instance, pixels, corners) + 1e-12)
+            tones[pixels] = tone.mip_map.sample(*sampled, level, repeat=True)
+    return tones
+
+
+def _instance_blocks(gbuffer: GBuffer) -> Iterator[tuple[MeshInstance, np.ndarray]]:
+    """Yield the visible mesh instances, each with blocks of indices of its pixels."""
+    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
+        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
+        for start in range(0, len(pixels), BLOCK_PIXELS):
+            yield gbuffer.instances[instance_id], pixels[start : start + BLOCK_PIXELS]
+
+
+def _texel_footprint(
+    gbuffer: GBuffer, instance: MeshInstance, pixels: np.ndarray, corners: np.ndarray
+) -> np.ndarray:
+    """Return the (n,) area that pixels of the picture cover on the image of a tone, in texels."""
+    surface, tone = instance.surface, instance.tone
+    linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    positions = surface.vertices[surface.corner_vertex[corners]] @ linear.T
+    edge_1, edge_2 = positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0]
+    surface_area = np.linalg.norm(np.cross(edge_1, edge_2), axis=1)
+    u, v = np.moveaxis(tone.values[corners], -1, 0).astype(np.float64)
+    uv_area = (u[:, 1] - u[:, 0]) * (v[:, 2] - v[:, 0]) - (u[:, 2] - u[:, 0]) * (v[:, 1] - v[:, 0])
+    camera = gbuffer.camera
+    depth = -gbuffer.position[pixels, 2] if camera.is_perspective else 1.0
+    cosine = np.abs(dot(gbuffer.geometric_normal[pixels], gbuffer.view_direction[pixels]))
+    pixel_area = (depth / camera.pixels_per_unit) ** 2 / np.maximum(cosine, MIN_FACING_COSINE)
+    return np.abs(uv_area) * tone.image.size * pixel_area / np.maximum(surface_area, 1e-30)

@@ -1,0 +1,1 @@
+"""Rendering: what a renderer is given, what a renderer is, and the renderer that uses numpy."""

@@ -1,0 +1,50 @@
+"""The renderer that uses numpy alone: project, then compose."""
+
+from __future__ import annotations
+
+from ..cache import Cache
+from ..compositor.compose import compose_task
+from ..compositor.picture import Picture
+from ..compositor.target_tone import check_tone
+from ..progress import Task, subtask
+from ..projection.gbuffer import GBuffer
+from ..projection.project import cached_project_task, project_task
+from .view_input import ViewInput
+
+#: Share of the progress bar that projecting takes.
+PROJECTION_SHARE = 0.4
+
+
+class CpuRenderer:
+    """Draws pictures with numpy. Implements `Renderer`.
+
+    Parameters
+    ----------
+    cache : Cache, optional
+        Keeps results from picture to picture. They are found again while the mesh instances are
+        the same objects, as far as they do not depend on a camera or setting that has changed.
+        Whoever owns the cache evicts. Without a cache nothing is kept.
+    keep_gbuffers : bool
+        Whether G-buffers and what is made of them are kept. Otherwise only what does not depend on
+        the camera is kept, as for animations.
+    """
+
+    device_name = "cpu"
+
+    def __init__(self, cache: Cache | None = None, *, keep_gbuffers: bool = True) -> None:
+        self._cache = cache
+        self._gbuffer_cache = cache if keep_gbuffers else None
+
+    def render_task(self, view: ViewInput) -> Task[Picture]:
+        """As `Renderer.render_task`."""
+        check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
+        gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
+        compose = compose_task(gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache)
+        return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
+
+    def _gbuffer_task(self, view: ViewInput) -> Task[GBuffer]:
+        """Return the G-buffer from the cache, or project the meshes."""
+        instances, camera, display = view.instances, view.sample_camera, view.look.display
+        if self._gbuffer_cache is None:
+            return project_task(instances, camera, display, self._cache)
+        return cached_project_task(instances, camera, display, self._gbuffer_cache)

@@ -1,0 +1,97 @@
+"""The input of a renderer for a mesh that is not part of a scene, such as one from a file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compositor.look import Look
+from ..compositor.target_tone import ReferenceRender
+from ..errors import RosyError
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..projection.camera import orbit_camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.surface_tone import SurfaceTone
+from .view_input import ViewInput
+
+#: Mesh space to world space, where z points up, for each upward axis of a mesh.
+UP_AXIS_MATRIX = {
+    "y": np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]),
+    "z": np.eye(4),
+}
+
+#: The upward axis of mesh files by suffix, as Blender's importers assume it.
+UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
+
+
+def mesh_instance(
+    surface: Surface, field: RosyField | None, up: str, tone: SurfaceTone | None = None
+) -> MeshInstance:
+    """Return a mesh in world space, upright.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : RosyField or None
+    up : {"y", "z"}
+        The mesh's upward axis.
+    tone : SurfaceTone, optional
+    """
+    return MeshInstance(surface, UP_AXIS_MATRIX[up], field, tone)
+
+
+def mesh_view(
+    instance: MeshInstance,
+    look: Look,
+    view_angles: tuple[float, float],
+    size: tuple[int, int],
+    *,
+    perspective: bool = True,
+    reference_luminance: np.ndarray | None = None,
+    reference_name: str = "",
+) -> ViewInput:
+    """Return the view of one mesh that fills the frame.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    look : Look
+    view_angles : (float, float)
+        Azimuth and elevation in degrees, see `orbit_camera`.
+    size : (int, int)
+        Pixels.
+    perspective : bool
+    reference_luminance : (H, W) ndarray, optional
+        Of a picture from the same view, for the tone "picture".
+    reference_name : str
+        Of that picture, for messages.
+
+    Raises
+    ------
+    RosyError
+        If the look uses the lights of a scene, or the size or the angles are impossible.
+    """
+    check_light(look.light, instance.surface.name)
+    camera = orbit_camera(instance.world_points(), *view_angles, *size, perspective=perspective)
+    reference = None
+    if reference_luminance is not None:
+        reference = ReferenceRender(reference_luminance, camera, reference_name)
+    return ViewInput((instance,), camera, look, reference=reference)
+
+
+def check_light(light: str, name: str) -> None:
+    """Refuse the lights of a scene for a mesh that is not in one.
+
+    Parameters
+    ----------
+    light : str
+        `Look.light` or `StrokeStyle.light`.
+    name : str
+        Of the mesh, for the message.
+
+    Raises
+    ------
+    RosyError
+    """
+    if light == "scene":
+        raise RosyError(f"{name}: has no lights: choose the light headlight or lamp")

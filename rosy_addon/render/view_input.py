@@ -1,0 +1,45 @@
+"""`ViewInput`: everything that a renderer needs to draw one picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compositor.look import Look
+from ..compositor.shading import Light
+from ..compositor.target_tone import ReferenceRender
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+
+
+@dataclass(frozen=True, eq=False)
+class ViewInput:
+    """Everything that a renderer needs to draw one picture.
+
+    Attributes
+    ----------
+    instances : tuple of MeshInstance
+        Meshes with their fields and tones, in world space. Those without a field only occlude.
+    camera : Camera
+        Of the size of the finished picture.
+    look : Look
+    lights : tuple of Light
+        For the light "scene", in the camera's space.
+    reference : ReferenceRender or None
+        For the tone "picture".
+    clip_planes : (6, 4) float64 ndarray or None
+        World space. What is on the negative side of a plane is cut away.
+    """
+
+    instances: tuple[MeshInstance, ...]
+    camera: Camera
+    look: Look
+    lights: tuple[Light, ...] = ()
+    reference: ReferenceRender | None = None
+    clip_planes: np.ndarray | None = None
+
+    @property
+    def sample_camera(self) -> Camera:
+        """The camera of the frame that is sampled, larger by the look's supersampling."""
+        return self.camera.scaled(self.look.supersampling)

@@ -1,0 +1,212 @@
+"""Pictures as Blender images: packed, saved to a file, or one file for each frame."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..color import to_display, to_linear
+from ..compositor.picture import Picture
+from ..errors import RosyError
+from ..file_io import check_writable
+from ..image_io.png import write_png
+
+#: Pixels by which colors are extended past the border of the covered area. A render whose
+#: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
+BLEED_PIXELS = 4
+
+#: Shown where there is no picture: the linear value of mid gray on screen.
+NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
+
+
+def new_image(
+    name: str, picture: Picture, *, as_float: bool = False, folder: Path | None = None
+) -> bpy.types.Image:
+    """Create a Blender image from a picture.
+
+    Parameters
+    ----------
+    name : str
+        Name of the datablock, and of the file if the image is saved.
+    picture : Picture
+    as_float : bool
+        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
+    folder : Path, optional
+        Folder to save the image in. By default it is packed into the .blend file.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written. The image is deleted in this case.
+    """
+    rgba = with_bleed(picture.rgba)
+    height, width = rgba.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
+    try:
+        image.alpha_mode = "CHANNEL_PACKED"
+        image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
+        if not as_float:
+            rgba[..., :3] = to_display(rgba[..., :3])
+        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        image.update()
+        if folder is None:
+            image.pack()
+        else:
+            _save_image(image, picture, folder / bpy.path.clean_name(name))
+    except BaseException:
+        bpy.data.images.remove(image)
+        raise
+    return image
+
+
+def with_bleed(rgba: np.ndarray) -> np.ndarray:
+    """Return a picture whose border colors are extended by `BLEED_PIXELS` pixels.
+
+    Pixels farther outside are `NEUTRAL_GRAY`. Alpha is not changed: it is the coverage.
+
+    Parameters
+    ----------
+    rgba : (H, W, 4) float32 ndarray
+        Linear.
+
+    Returns
+    -------
+    (H, W, 4) float32 ndarray
+    """
+    # Pad by one pixel, so that every pixel of the picture has eight neighbors.
+    padded = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))
+    height, width = padded.shape[:2]
+    is_filled = padded[..., 3].ravel() > 0
+    pixels = padded.reshape(-1, 4)
+    pixels[~is_filled, :3] = NEUTRAL_GRAY
+    is_inside = np.zeros((height, width), dtype=bool)
+    is_inside[1:-1, 1:-1] = True
+    neighbor_offsets = [
+        row * width + column for row in (1, 0, -1) for column in (1, 0, -1) if row or column
+    ]
+    frontier = np.flatnonzero(is_filled)
+    for _ in range(BLEED_PIXELS):
+        is_adjacent = np.zeros_like(is_filled)
+        for offset in neighbor_offsets:
+            is_adjacent[frontier + offset] = True
+        targets = np.flatnonzero(is_adjacent & ~is_filled & is_inside.ravel())
+        total = np.zeros((len(targets), 3), dtype=np.float32)
+        count = np.zeros((len(targets), 1), dtype=np.float32)
+        for offset in neighbor_offsets:
+            neighbor_filled = is_filled[targets + offset, None]
+            total += pixels[targets + offset, :3] * neighbor_filled
+            count += neighbor_filled
+        pixels[targets, :3] = total / count
+        is_filled[targets] = True
+        frontier = targets
+    return padded[1:-1, 1:-1].copy()
+
+
+def check_folder(folder: Path) -> None:
+    """Check that pictures can be saved to a folder. It may be missing if it can be created.
+
+    Call this before a long task.
+
+    Raises
+    ------
+    RosyError
+        If the folder cannot be created or written.
+    """
+    if not folder.exists():
+        parent = next((ancestor for ancestor in folder.parents if ancestor.exists()), folder)
+        if not parent.is_dir() or not os.access(parent, os.W_OK):
+            raise RosyError(f"{folder}: cannot be made: {parent} may not be written")
+        return
+    if not folder.is_dir():
+        raise RosyError(f"{folder}: is not a folder")
+    check_writable(folder / "picture.png")
+
+
+def frame_path(folder: Path, name: str, frame: int, as_float: bool) -> Path:
+    """Return the path of one frame of an image sequence, numbered as Blender expects it."""
+    stem = bpy.path.clean_name(f"RoSy {name}")
+    return folder / f"{stem}_{frame:04d}{'.exr' if as_float else '.png'}"
+
+
+def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
+    """Write one frame of an image sequence: 8-bit .png, or .exr with half floats.
+
+    If writing fails, no partial file is left.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    check_writable(path)
+    rgba = with_bleed(picture.rgba)
+    if not as_float:
+        write_png(path, rgba)
+        return
+    height, width = rgba.shape[:2]
+    image = bpy.data.images.new(path.stem, width, height, alpha=True, float_buffer=True)
+    # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
+    scene = bpy.data.scenes.new(path.stem)
+    temp_path = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        image_settings = scene.render.image_settings
+        image_settings.file_format, image_settings.color_mode, image_settings.color_depth = (
+            "OPEN_EXR",
+            "RGBA",
+            "16",
+        )
+        image.save_render(str(temp_path), scene=scene)
+        os.replace(temp_path, path)
+    except (RuntimeError, OSError) as reason:
+        temp_path.unlink(missing_ok=True)
+        raise RosyError(f"{path}: cannot be written: {reason}") from reason
+    finally:
+        bpy.data.images.remove(image)
+        bpy.data.scenes.remove(scene)
+
+
+def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
+    """Load an image sequence as one Blender image, from the path of its first frame."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    image.source = "SEQUENCE"
+    image.alpha_mode = "CHANNEL_PACKED"
+    image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
+    image.filepath = _blend_relative(path)
+    return image
+
+
+def _save_image(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
+    """Save an image to a file, and make the image use this file. An older file is replaced."""
+    path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise RosyError(f"{path.parent}: cannot be made: {reason.strerror.lower()}") from reason
+    check_writable(path)
+    if image.is_float:
+        image.file_format = "OPEN_EXR"
+        image.filepath_raw = str(path)
+        try:
+            image.save()
+        except RuntimeError as reason:
+            raise RosyError(f"{path}: cannot be written: {reason}") from reason
+    else:
+        write_png(path, with_bleed(picture.rgba))
+        image.file_format = "PNG"
+    image.source = "FILE"
+    image.filepath = _blend_relative(path)
+    image.reload()
+
+
+def _blend_relative(path: Path) -> str:
+    """Return a path relative to the .blend file (``//``) if that is saved and on the same drive."""
+    try:
+        return bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    except ValueError:
+        return str(path)  # another drive

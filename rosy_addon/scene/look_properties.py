@@ -1,0 +1,59 @@
+"""Conversion between a `Look` and Blender's properties."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..color import from_hex, to_hex
+from ..compositor.look import Look
+from ..settings import Color, Number, Setting, settings_of
+
+
+def read_look(settings: Any) -> Look:
+    """Return the look that properties hold.
+
+    Parameters
+    ----------
+    settings : PropertyGroup
+        ``scene.rosy``, or its ``look``.
+    """
+    return Look(**read_settings(getattr(settings, "look", settings), Look))
+
+
+def apply_look(settings: Any, look: Look) -> None:
+    """Write a look to the properties of ``scene.rosy``, or of its ``look``."""
+    group = getattr(settings, "look", settings)
+    for name, setting in settings_of(Look).items():
+        value = getattr(look, name)
+        setattr(group, name, from_hex(value) if isinstance(setting, Color) else value)
+
+
+def matches_look(settings: Any, look: Look) -> bool:
+    """Return whether the properties hold a look, to the precision of Blender's numbers."""
+    current = read_look(settings)
+    return all(_is_equal(getattr(current, name), getattr(look, name)) for name in settings_of(Look))
+
+
+def _is_equal(one: Any, other: Any) -> bool:
+    """Whether two values of a setting are equal: text in any case, numbers in single precision."""
+    if isinstance(one, str):
+        return one == other.lower()
+    return math.isclose(one, other, rel_tol=1e-6)
+
+
+def read_settings(group: Any, cls: type) -> dict[str, Any]:
+    """Return the values that a property group holds for the fields of a settings class."""
+    return {
+        name: _from_rna(getattr(group, name), setting) for name, setting in settings_of(cls).items()
+    }
+
+
+def _from_rna(value: Any, setting: Setting) -> Any:
+    """Convert a property value: a color to hex, a float to 7 digits within the setting's range."""
+    if isinstance(setting, Color):
+        return to_hex(value)
+    if not (isinstance(setting, Number) and isinstance(value, float)):
+        return value
+    value = float(f"{value:.7g}")
+    return min(max(value, setting.low), setting.high)

@@ -1,0 +1,214 @@
+"""Nodes that show a picture on objects: a material per camera, and a node group per object."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from .blender_images import NEUTRAL_GRAY
+from .compat import has_nodes_by_default
+
+#: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
+CLIP_ATTRIBUTE = "rosy_projection"
+
+
+def new_material(
+    name: str,
+    image: bpy.types.Image,
+    view_projection: np.ndarray,
+    *,
+    window_coordinates: bool = False,
+    emission: float = 1.0,
+    diffuse: float = 0.0,
+) -> bpy.types.Material:
+    """Create a material that shows a picture, the same in Cycles and EEVEE.
+
+    The attribute `CLIP_ATTRIBUTE` gives the position in the picture. Objects without it, such as
+    those with several instances of one mesh, use their current world position. Outside the frame of
+    the picture, the material is neutral gray.
+
+    Parameters
+    ----------
+    name : str
+    image : bpy.types.Image
+    view_projection : (4, 4) ndarray
+        World to clip space.
+    window_coordinates : bool
+        Map the picture to the frame of the current camera instead.
+    emission : float
+        Strength of the emission.
+    diffuse : float
+        Factor of the diffuse color.
+    """
+    material = bpy.data.materials.new(name)
+    if not has_nodes_by_default(material):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    build = _NodeBuilder(tree)
+    image_node = build(
+        "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
+    )
+    if window_coordinates:
+        tree.links.new(build("ShaderNodeTexCoord").outputs["Window"], image_node.inputs["Vector"])
+        color = image_node.outputs["Color"]
+    else:
+        clip = _clip_position(build, view_projection)
+        x, y, w = (clip.outputs[axis] for axis in "XYZ")
+        max_abs_xy = build.math("MAXIMUM", build.math("ABSOLUTE", x), build.math("ABSOLUTE", y))
+        uv = build("ShaderNodeCombineXYZ")
+        for axis, value in (("X", x), ("Y", y)):
+            ratio = build.math("DIVIDE", value, w)
+            tree.links.new(build.math("MULTIPLY_ADD", ratio, 0.5, 0.5), uv.inputs[axis])
+        tree.links.new(uv.outputs[0], image_node.inputs["Vector"])
+        is_inside = build.math("LESS_THAN", max_abs_xy, w)
+        color = build.mix(
+            "RGBA", is_inside, (NEUTRAL_GRAY,) * 3 + (1.0,), image_node.outputs["Color"]
+        )
+    emission_node, diffuse_node = build("ShaderNodeEmission"), build("ShaderNodeBsdfDiffuse")
+    emission_node.inputs["Strength"].default_value = emission
+    tree.links.new(color, emission_node.inputs["Color"])
+    # A BSDF has no strength, so the diffuse factor scales the color.
+    scaled_color = build("ShaderNodeVectorMath", operation="SCALE")
+    scaled_color.inputs["Scale"].default_value = diffuse
+    tree.links.new(color, scaled_color.inputs[0])
+    tree.links.new(scaled_color.outputs[0], diffuse_node.inputs["Color"])
+    add_shader, output = build("ShaderNodeAddShader"), build("ShaderNodeOutputMaterial")
+    tree.links.new(emission_node.outputs[0], add_shader.inputs[0])
+    tree.links.new(diffuse_node.outputs[0], add_shader.inputs[1])
+    tree.links.new(add_shader.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
+    """Set the frame range of a material's image sequence. Each file is shown at its own frame."""
+    for node in material.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeTexImage":
+            image_user = node.image_user
+            image_user.frame_start, image_user.frame_offset = first, first - 1
+            image_user.frame_duration = last - first + 1
+            image_user.use_auto_refresh = True
+
+
+def _clip_position(build: _NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
+    """Return a node whose outputs X, Y and Z are the clip-space x, y and w."""
+    links = build.tree.links
+    baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE)
+    world_position = build("ShaderNodeNewGeometry").outputs["Position"]
+    live_clip = build.transformed(world_position, _clip_rows(view_projection))
+    length = build("ShaderNodeVectorMath", operation="LENGTH")
+    links.new(baked_clip.outputs["Vector"], length.inputs[0])
+    has_baked_clip = build.math("GREATER_THAN", length.outputs["Value"], 0.0)
+    separate = build("ShaderNodeSeparateXYZ")
+    links.new(
+        build.mix("VECTOR", has_baked_clip, live_clip, baked_clip.outputs["Vector"]),
+        separate.inputs[0],
+    )
+    return separate
+
+
+def new_group(
+    name: str, material: bpy.types.Material, matrix: np.ndarray | None
+) -> bpy.types.NodeTree:
+    """Create a geometry node group that sets a material and the attribute `CLIP_ATTRIBUTE`.
+
+    The user's mesh, material slots and other modifiers are not changed.
+
+    Parameters
+    ----------
+    name : str
+    material : bpy.types.Material
+    matrix : (4, 4) ndarray or None
+        Object to clip space. None for objects with several instances, which get no attribute.
+    """
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group.is_modifier = True
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    build = _NodeBuilder(group)
+    group_input = build("NodeGroupInput")
+    set_material = build("GeometryNodeSetMaterial")
+    set_material.inputs["Material"].default_value = material
+    group.links.new(group_input.outputs["Geometry"], set_material.inputs["Geometry"])
+    geometry = set_material.outputs["Geometry"]
+    if matrix is not None:
+        clip_position = build.transformed(
+            build("GeometryNodeInputPosition").outputs[0], _clip_rows(matrix)
+        )
+        store = build("GeometryNodeStoreNamedAttribute", data_type="FLOAT_VECTOR", domain="POINT")
+        store.inputs["Name"].default_value = CLIP_ATTRIBUTE
+        group.links.new(geometry, store.inputs["Geometry"])
+        value_socket = next(
+            socket for socket in store.inputs if socket.name == "Value" and socket.enabled
+        )
+        group.links.new(clip_position, value_socket)
+        geometry = store.outputs["Geometry"]
+    group.links.new(geometry, build("NodeGroupOutput").inputs["Geometry"])
+    return group
+
+
+def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
+    """Return the material that a group of `new_group` sets; None if it sets none."""
+    for node in group.nodes:
+        if node.bl_idname == "GeometryNodeSetMaterial":
+            return node.inputs["Material"].default_value
+    return None
+
+
+def _clip_rows(matrix: np.ndarray) -> np.ndarray:
+    """Return the rows of a (4, 4) matrix for the clip-space x, y and w: (3, 4)."""
+    return np.asarray(matrix)[[0, 1, 3]]
+
+
+class _NodeBuilder:
+    """Adds nodes to a tree, laid out in rows from left to right.
+
+    Calling it adds a node of a type, and sets its properties.
+    """
+
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self.tree = tree
+        self.node_count = 0
+
+    def __call__(self, kind: str, **settings: Any) -> bpy.types.Node:
+        node = self.tree.nodes.new(kind)
+        node.location = (180 * (self.node_count % 12), -220 * (self.node_count // 12))
+        self.node_count += 1
+        for name, value in settings.items():
+            setattr(node, name, value)
+        return node
+
+    def connect(self, value: Any, socket: bpy.types.NodeSocket) -> None:
+        """Link a socket to an input, or set the input to a constant."""
+        if isinstance(value, bpy.types.NodeSocket):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+        """Add a math node, and return its output. Values are sockets or constants."""
+        node = self("ShaderNodeMath", operation=operation)
+        for value, socket in zip(values, node.inputs, strict=False):
+            self.connect(value, socket)
+        return node.outputs["Value"]
+
+    def mix(self, kind: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """Add a mix node for a data type, and return its output: a for factor 0, b for factor 1."""
+        node = self("ShaderNodeMix", data_type=kind)
+        enabled = {socket.name: socket for socket in node.inputs if socket.enabled}
+        for name, value in (("Factor", factor), ("A", a), ("B", b)):
+            self.connect(value, enabled[name])
+        return next(socket for socket in node.outputs if socket.enabled)
+
+    def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
+        """Add nodes that multiply a point by a (3, 4) matrix, and return the output."""
+        combined = self("ShaderNodeCombineXYZ")
+        for axis, row in zip("XYZ", rows.tolist(), strict=True):
+            product = self("ShaderNodeVectorMath", operation="DOT_PRODUCT")
+            self.connect(point, product.inputs[0])
+            product.inputs[1].default_value = row[:3]
+            component = self.math("ADD", product.outputs["Value"], row[3])
+            self.tree.links.new(component, combined.inputs[axis])
+        return combined.outputs[0]

@@ -1,0 +1,126 @@
+"""Reading a scene as the input of a renderer: one `ViewInput` for each camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..cache import Cache
+from ..compositor.look import Look
+from ..compositor.shading import Light
+from ..projection.gbuffer import MeshInstance
+from ..render.view_input import ViewInput
+from .cameras import CameraSource, render_camera, resolve_camera
+from .lights import read_lights
+from .scene_reader import SceneData, read_scene
+from .tone_inputs import load_reference, make_tone_request
+
+
+@dataclass(frozen=True, eq=False)
+class SceneViews:
+    """The views of a scene from one or more cameras, as the input of a renderer.
+
+    Attributes
+    ----------
+    views : tuple of ViewInput
+        One per camera. They share their mesh instances.
+    scene_data : SceneData
+        The mesh instances, and the objects that they came from.
+    """
+
+    views: tuple[ViewInput, ...]
+    scene_data: SceneData
+
+
+def read_views(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    cameras: Sequence[CameraSource],
+    look: Look,
+    *,
+    objects: Sequence[bpy.types.Object] | None = None,
+    size: tuple[int, int] | None = None,
+    reference_camera: bpy.types.Object | None = None,
+    cache: Cache | None = None,
+) -> SceneViews:
+    """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+        Of a view layer of the scene.
+    cameras : sequence of bpy.types.Object or Camera
+        See `resolve_camera`.
+    look : Look
+        Lights, tones and the reference render are read only if it uses them.
+    objects : sequence of bpy.types.Object, optional
+        Objects whose fields are drawn; by default all that have one. Other objects only occlude.
+    size : (int, int), optional
+        Pixels; by default the size of renders times the scene's percentage for pictures.
+    reference_camera : bpy.types.Object, optional
+        The camera of the reference render; by default the scene's active camera.
+    cache : Cache, optional
+        Keeps meshes, fields and tones that have not changed since an earlier reading.
+
+    Raises
+    ------
+    RosyError
+        See `resolve_camera`, `read_scene` and `load_reference`.
+    """
+    resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
+    tone_request = make_tone_request(scene, look)
+    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), cache, tone_request)
+    reference = None
+    if look.tone == "picture":
+        reference_camera = reference_camera or render_camera(scene)
+        reference = load_reference(scene, depsgraph, reference_camera, look)
+    instances = tuple(scene_data.instances)
+    views = []
+    for camera in resolved_cameras:
+        lights = read_lights(depsgraph, camera.view) if look.light == "scene" else ()
+        views.append(ViewInput(instances, camera, look, tuple(lights), reference))
+    return SceneViews(tuple(views), scene_data)
+
+
+def read_turntable(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object, look: Look
+) -> tuple[MeshInstance, list[Light]]:
+    """Read one object and the lights of the scene, for views of the object from all sides.
+
+    Returns
+    -------
+    instance : MeshInstance
+    lights : list of Light
+        World space. Empty if the look does not use them.
+
+    Raises
+    ------
+    RosyError
+        See `read_scene`.
+    """
+    tone_request = make_tone_request(scene, look)
+    scene_data = read_scene(depsgraph, [obj], nonfinite_policy(scene), tone_request=tone_request)
+    lights = read_lights(depsgraph, np.eye(4)) if look.light == "scene" else []
+    return scene_data.instances[0], lights
+
+
+def nonfinite_policy(scene: bpy.types.Scene) -> str:
+    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
+    return "zero" if scene.rosy.undefined else "error"
+
+
+def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """Return the evaluated depsgraph of a scene.
+
+    It belongs to the view layer in the context if that is one of the scene's, otherwise to the
+    scene's first view layer.
+    """
+    context = bpy.context
+    if context.scene == scene:
+        return context.evaluated_depsgraph_get()
+    with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        return context.evaluated_depsgraph_get()

@@ -1,0 +1,404 @@
+"""Reading a scene as mesh instances: evaluated meshes with their fields, and occluders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..projection.gbuffer import MeshInstance
+from ..projection.surface_tone import SurfaceTone
+from .compat import has_rosy_properties, is_editable
+from .field_attributes import (
+    FACE_NORMAL_ATTRIBUTE,
+    FieldLayout,
+    add_temp_field,
+    add_temp_vectors,
+    attribute_name,
+    field_degree,
+    has_field,
+    is_face_vector_field,
+    read_evaluated_field,
+    read_mesh_field,
+)
+from .meshes import evaluated_mesh, mesh_surface
+from .tone_inputs import ToneRequest, check_tones, read_tone
+
+#: Custom property on every datablock that RoSy created.
+OWNED_TAG = "rosy_made"
+
+#: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
+#: another form.
+TEMP_FIELD_ATTRIBUTE = "rosy_stand_in"
+
+
+@dataclass(frozen=True, eq=False)
+class SceneData:
+    """The mesh instances of a scene, and the objects that they come from.
+
+    Attributes
+    ----------
+    instances : list of MeshInstance
+        World space. Instances with a field come first, then occluders.
+    objects : list of bpy.types.Object
+        The original object of each instance with a field, in the same order.
+    """
+
+    instances: list[MeshInstance]
+    objects: list[bpy.types.Object]
+
+
+def field_objects(
+    view_layer: bpy.types.ViewLayer, names: Iterable[str] | None = None
+) -> list[bpy.types.Object]:
+    """Return the mesh objects with a field that are visible in renders, sorted by name.
+
+    Objects in instanced collections are included. Objects whose field is switched off are not.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer
+    names : iterable of str, optional
+        Return only these objects, in this order.
+
+    Raises
+    ------
+    RosyError
+        If there is no object with one of the names, or it has no field, is hidden or switched off.
+    """
+    candidates = {
+        obj.name: obj
+        for obj in _visible_objects(view_layer)
+        if has_field(obj) and is_field_enabled(obj)
+    }
+    if names is None:
+        return [candidates[name] for name in sorted(candidates)]
+    return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
+
+
+def read_bodies(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object] | None = None,
+    nonfinite: str = "error",
+) -> list[MeshInstance]:
+    """Return the mesh instances of `read_scene`."""
+    return read_scene(depsgraph, objects, nonfinite).instances
+
+
+def read_scene(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object] | None = None,
+    nonfinite: str = "error",
+    cache: Cache | None = None,
+    tone_request: ToneRequest | None = None,
+) -> SceneData:
+    """Read every mesh that is visible in renders, as arrays.
+
+    Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are
+    applied. Each instance is returned as a separate mesh instance. The rest positions of deforming
+    objects with a field are read too. For this, Blender's option to keep them
+    (``add_rest_position_attribute``) is switched on while the scene is read.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        The evaluated depsgraph of a view layer.
+    objects : sequence of bpy.types.Object, optional
+        Original objects whose fields are drawn. All other objects only occlude. By default all of
+        `field_objects`.
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    cache : Cache, optional
+        Keeps mesh instances that have not changed since an earlier call.
+    tone_request : ToneRequest, optional
+        The source of the surface tones.
+
+    Raises
+    ------
+    RosyError
+        If no object has a field, one of the objects is hidden, its field cannot be read or is lost
+        in its modifiers, or no object has the requested tone.
+    """
+    view_layer = depsgraph.view_layer
+    objects = field_objects(view_layer) if objects is None else list(objects)
+    if not objects:
+        raise RosyError("no visible object has a RoSy field: make or import one first")
+    visible_objects = set(_visible_objects(view_layer))
+    cache = Cache() if cache is None else cache
+    with temp_attributes(depsgraph, objects, nonfinite, cache) as layouts:
+        reader = _SceneReader(layouts, nonfinite, cache, tone_request)
+        for instance in depsgraph.object_instances:
+            if _is_rendered(instance, visible_objects):
+                reader.add(instance)
+    reader.check_complete(objects)
+    check_tones(tone_request, [(instance.tone, owner) for instance, owner in reader.field_bodies])
+    return SceneData(
+        [instance for instance, _ in reader.field_bodies] + reader.occluders,
+        [owner for _, owner in reader.field_bodies],
+    )
+
+
+#: A surface, its field and its tone. Occluders have neither field nor tone.
+_MeshData = tuple[Surface, RosyField | None, SurfaceTone | None]
+
+
+class _SceneReader:
+    """Collects mesh instances. All instances of an evaluated mesh share its surface and field.
+
+    Attributes
+    ----------
+    field_bodies : list of (MeshInstance, bpy.types.Object)
+        Instances with a field, and their original objects.
+    occluders : list of MeshInstance
+        All other instances.
+    mesh_data : dict
+        What was read of each evaluated mesh; None if it has no faces. The key is the pointer of the
+        mesh and the original object, or None for an occluder.
+    """
+
+    def __init__(
+        self,
+        layouts: dict[bpy.types.Object, FieldLayout],
+        nonfinite: str,
+        cache: Cache,
+        tone_request: ToneRequest | None,
+    ) -> None:
+        self.layouts = layouts
+        self.nonfinite = nonfinite
+        self.cache = cache
+        self.tone_request = tone_request
+        self.field_bodies: list[tuple[MeshInstance, bpy.types.Object]] = []
+        self.occluders: list[MeshInstance] = []
+        self.mesh_data: dict[tuple, _MeshData | None] = {}
+
+    def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        """Add an instance to `field_bodies` or `occluders`."""
+        obj = instance.object
+        original = obj.original
+        layout = self.layouts.get(original)
+        mesh_key = (obj.data.as_pointer(), original if layout else None)
+        if mesh_key not in self.mesh_data:
+            self.mesh_data[mesh_key] = self._read_mesh(obj, layout)
+        if self.mesh_data[mesh_key] is None:
+            return
+        surface, field, tone = self.mesh_data[mesh_key]
+        matrix = np.array(instance.matrix_world, dtype=np.float64)
+        body_key = "body", id(surface), id(field), id(tone), matrix.tobytes()
+        body = self.cache.get_or_create(
+            body_key, lambda: MeshInstance(surface, matrix, field, tone)
+        )
+        if field is None:
+            self.occluders.append(body)
+        else:
+            self.field_bodies.append((body, original))
+
+    def _read_mesh(self, obj: bpy.types.Object, layout: FieldLayout | None) -> _MeshData | None:
+        """Read an evaluated mesh; None if it has no faces."""
+        with evaluated_mesh(obj) as mesh:
+            if mesh is None:
+                return None
+            if layout is None or any(
+                name not in mesh.attributes for name in layout.attribute_names
+            ):
+                return (
+                    mesh_surface(mesh, obj.name, occluder_only=True, cache=self.cache),
+                    None,
+                    None,
+                )
+            label = f"object '{obj.name}'"
+            surface = mesh_surface(mesh, label, read_rest=True, cache=self.cache)
+            field = read_evaluated_field(mesh, layout, surface, self.nonfinite, label, self.cache)
+            tone = read_tone(mesh, obj.original, surface, self.tone_request, self.cache)
+            return surface, field, tone
+
+    def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:
+        """Raise an error if an object's field was not read."""
+        drawn_objects = {owner for _, owner in self.field_bodies}
+        read_objects = {key[1] for key in self.mesh_data}
+        for obj in objects:
+            if obj in drawn_objects:
+                continue
+            if obj not in read_objects:
+                raise RosyError(f"object '{obj.name}' has a field, but is hidden in the viewport")
+            faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
+            problem = (
+                "has no faces" if faceless else f"has lost attribute '{self.layouts[obj].name}'"
+            )
+            raise RosyError(
+                f"object '{obj.name}': after its modifiers "
+                f"({', '.join(modifier.name for modifier in user_modifiers(obj)) or 'none'}) "
+                f"the mesh {problem}"
+            )
+
+
+def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Return the modifiers of an object without those that RoSy added."""
+    return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
+
+
+def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
+    """Whether RoSy added a modifier."""
+    group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
+    return group is not None and bool(group.get(OWNED_TAG))
+
+
+@contextmanager
+def temp_attributes(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object],
+    nonfinite: str,
+    cache: Cache,
+) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
+    """Add temporary attributes that modifiers carry to evaluated meshes, and remove them at exit.
+
+    The attributes are the rest positions, the normals of the original faces, and vectors on faces
+    for fields that are stored in another form. All fields are checked on the original meshes.
+
+    If a context that is already open covers the same objects, nothing is added again. For many
+    calls of `read_scene`, keep one context open around them.
+
+    Yields
+    ------
+    dict of bpy.types.Object to FieldLayout
+        The attributes that hold each object's field on its evaluated mesh.
+
+    Raises
+    ------
+    RosyError
+        If a field cannot be read.
+    """
+    layouts: dict[bpy.types.Object, FieldLayout] = {}
+    rest_enabled: list[bpy.types.Object] = []
+    temp_meshes: list[bpy.types.Mesh] = []
+    try:
+        for obj in objects:
+            mesh = obj.data
+            layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+            deforms = bool(user_modifiers(obj) or mesh.shape_keys)
+            if deforms and is_editable(obj) and not obj.add_rest_position_attribute:
+                obj.add_rest_position_attribute = True
+                rest_enabled.append(obj)
+            if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
+                temp_meshes.append(mesh)
+                surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
+                add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
+        if rest_enabled or temp_meshes:
+            depsgraph.update()
+        yield layouts
+    finally:
+        for obj in rest_enabled:
+            obj.add_rest_position_attribute = False
+        for mesh in set(temp_meshes):
+            temp_names = [
+                a.name
+                for a in mesh.attributes
+                if a.name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE))
+            ]
+            for name in temp_names:
+                mesh.attributes.remove(mesh.attributes[name])
+            mesh.update_tag()
+        if rest_enabled or temp_meshes:
+            depsgraph.update()
+
+
+def _prepare_field(
+    obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
+) -> FieldLayout:
+    """Return the layout of a field as vectors on faces. Add them temporarily if missing."""
+    mesh, label = obj.data, f"object '{obj.name}'"
+    name = attribute_name(mesh)
+    if mesh.is_editmode and is_face_vector_field(mesh):
+        return FieldLayout(name, field_degree(mesh))  # only the evaluated mesh can be read
+    field = read_mesh_field(mesh, nonfinite=nonfinite, label=label, cache=cache)
+    if is_face_vector_field(mesh):
+        return FieldLayout(name, field.degree)
+    if not _can_modify(mesh):
+        raise RosyError(
+            f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}; there its "
+            "field can be read only as vectors on faces"
+        )
+    if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
+        temp_meshes.append(mesh)
+        return add_temp_field(mesh, field, TEMP_FIELD_ATTRIBUTE)
+    return FieldLayout(
+        TEMP_FIELD_ATTRIBUTE, field.degree, field.direction_ratios is not None, field.family_count
+    )
+
+
+def _can_modify(mesh: bpy.types.Mesh) -> bool:
+    """Whether attributes can be added to a mesh."""
+    return is_editable(mesh) and not mesh.is_editmode
+
+
+def _is_rendered(
+    instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
+) -> bool:
+    """Whether an instance is a mesh that is visible in renders."""
+    obj = instance.object
+    # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
+    if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
+        return False
+    if obj.original.get(OWNED_TAG):  # a stroke object, made a mesh by Geometry Nodes
+        return False
+    if instance.is_instance:
+        instancer = instance.parent
+        return not obj.original.hide_render and (
+            instancer is None or instancer.original in visible_objects
+        )
+    return obj.original in visible_objects
+
+
+def is_field_enabled(obj: bpy.types.Object) -> bool:
+    """Whether drawing an object's field is switched on."""
+    return obj.rosy.include if has_rosy_properties() else True
+
+
+def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """Return the original objects visible in renders, including those in instanced collections."""
+    visible: dict[bpy.types.Object, None] = {}
+
+    def add_object(obj: bpy.types.Object) -> None:
+        """Add an object and the objects of the collection that it instances."""
+        if obj.hide_render or obj in visible:
+            return
+        visible[obj] = None
+        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
+            for child in obj.instance_collection.all_objects:
+                add_object(child)
+
+    def visit_layer(layer: bpy.types.LayerCollection) -> None:
+        """Add the objects of a layer collection and its children."""
+        if layer.exclude or layer.collection.hide_render:
+            return
+        for obj in layer.collection.objects:
+            add_object(obj)
+        for child in layer.children:
+            visit_layer(child)
+
+    visit_layer(view_layer.layer_collection)
+    return list(visible)
+
+
+def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bpy.types.Object:
+    """Return a candidate by name, or raise an error that says why there is none."""
+    if name in candidates:
+        return candidates[name]
+    obj = bpy.data.objects.get(name)
+    if obj is None:
+        raise RosyError(f"there is no object '{name}'")
+    if obj.type != "MESH":
+        raise RosyError(f"object '{name}' is a {obj.type.lower()}, not a mesh")
+    if not has_field(obj):
+        field_name = attribute_name(obj.data)
+        raise RosyError(
+            f"object '{name}' has no attribute '{field_name}'; degree {field_degree(obj.data)} and "
+            "a vector on faces are wanted: make or import a field first"
+        )
+    raise RosyError(f"object '{name}' is hidden in renders of this view layer, or switched off")

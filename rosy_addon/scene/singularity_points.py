@@ -1,0 +1,130 @@
+"""The singularities of an object's field, and point objects that show them in the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ..field.singularities import find_singularities
+from ..field.validate import vertex_normals
+from .field_attributes import read_mesh_field
+from .meshes import mesh_surface
+from .scene_reader import OWNED_TAG, read_scene, user_modifiers
+
+#: Attributes of the points: the singularity index in units of 1 / N, and the degree N.
+INDEX_ATTRIBUTE, DEGREE_ATTRIBUTE = "index", "degree"
+
+
+@dataclass(frozen=True, eq=False)
+class Singularities:
+    """The singularities of a mesh's field.
+
+    Attributes
+    ----------
+    points : (K, 3) float32 ndarray
+        Object space.
+    normals : (K, 3) float32 ndarray
+        Vertex normals, object space.
+    index : (K,) int32 ndarray
+        Singularity index in units of 1 / N.
+    degree : int
+        Degree N of the field.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    index: np.ndarray
+    degree: int
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Singularities:
+    """Find the singularities of an object's field on its evaluated mesh.
+
+    Raises
+    ------
+    RosyError
+        If the field cannot be read.
+
+    See Also
+    --------
+    rosy_addon.field.singularities.find_singularities : The same for a surface and a field.
+    """
+    if user_modifiers(obj) or obj.data.shape_keys:
+        scene_data = read_scene(depsgraph, [obj], nonfinite="zero")
+        instance = scene_data.instances[0]
+        surface, field = instance.surface, instance.field
+    else:
+        label = f"object '{obj.name}'"
+        surface = mesh_surface(obj.data, label)
+        field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
+    # The vectors of the field are tangent to the rest shape.
+    rest_surface = (
+        surface
+        if surface.rest_vertices is None
+        else replace(surface, vertices=surface.rest_vertices, rest_vertices=None)
+    )
+    vertex, index = find_singularities(rest_surface, field)
+    points = surface.vertices[vertex].astype(np.float32)
+    normals = vertex_normals(surface)[vertex].astype(np.float32)
+    return Singularities(points, normals, index, field.degree)
+
+
+def add_singularity_points(
+    scene: bpy.types.Scene, obj: bpy.types.Object, singularity_data: Singularities
+) -> bpy.types.Object:
+    """Create an object with one point for each singularity, and the index as an attribute.
+
+    It is a point cloud, or a mesh without edges if scripts cannot create point clouds in this
+    version of Blender. The new object is a child of `obj`. An earlier one for `obj` is deleted.
+    """
+    remove_singularity_points(scene, obj)
+    name = f"{obj.name} singularities"
+    data = _new_point_cloud(name, len(singularity_data))
+    point_object = bpy.data.objects.new(name, data)
+    point_object[OWNED_TAG] = obj.name
+    data.attributes["position"].data.foreach_set("vector", singularity_data.points.ravel())
+    for key, values in (
+        (INDEX_ATTRIBUTE, singularity_data.index),
+        (DEGREE_ATTRIBUTE, np.full(len(singularity_data), singularity_data.degree)),
+    ):
+        attribute = data.attributes.new(key, "INT", "POINT")
+        attribute.data.foreach_set("value", values.astype(np.int32))
+    point_object.parent = obj
+    for collection in obj.users_collection or (scene.collection,):
+        collection.objects.link(point_object)
+    return point_object
+
+
+def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object | None = None) -> int:
+    """Delete the point objects of an object, or of all objects of a scene. Return their number."""
+    point_objects = [
+        candidate
+        for candidate in scene.objects
+        if isinstance(candidate.get(OWNED_TAG), str) and (obj is None or candidate.parent == obj)
+    ]
+    for point_object in point_objects:
+        data = point_object.data
+        bpy.data.objects.remove(point_object)
+        if not data.users:
+            collection = (
+                bpy.data.meshes if isinstance(data, bpy.types.Mesh) else bpy.data.pointclouds
+            )
+            collection.remove(data)
+    return len(point_objects)
+
+
+def _new_point_cloud(name: str, count: int) -> bpy.types.ID:
+    """Create a point cloud with a number of points, or a mesh if that is not possible."""
+    cloud = bpy.data.pointclouds.new(name)
+    if hasattr(cloud, "resize"):
+        cloud.resize(count)
+        return cloud
+    bpy.data.pointclouds.remove(cloud)
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(count)
+    return mesh

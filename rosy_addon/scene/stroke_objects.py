@@ -1,0 +1,183 @@
+"""Stroke objects of a scene: create, replace and remove them.
+
+There is at most one object of each kind for each camera. Records in ``scene.rosy.strokes`` identify
+these objects. A copy has no record, so it belongs to the user. When strokes are drawn again, the
+object gets new data, and keeps its modifiers, name and collections.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+from mathutils import Matrix
+
+from ..color import to_hex
+from ..compositor.family_hues import PALETTE
+from ..errors import RosyError
+from ..projection.camera import Camera
+from ..strokes.pipeline import StrokeDrawing, stroke_geometry
+from ..strokes.style import StrokeStyle
+from ..strokes.svg import Pen
+from .curves import new_curves
+from .grease_pencil import new_grease_pencil
+from .look_properties import read_settings
+from .pictures import rollback_on_error
+from .scene_reader import OWNED_TAG, field_objects
+
+#: The function that creates the data of each kind of object.
+DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
+    "PENCIL": new_grease_pencil,
+    "CURVES": new_curves,
+}
+
+
+def read_stroke_style(settings: bpy.types.PropertyGroup) -> StrokeStyle:
+    """Return the stroke style that the properties ``scene.rosy.strokes`` hold."""
+    return StrokeStyle(**read_settings(settings, StrokeStyle))
+
+
+def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
+    """Return the pen that the properties ``scene.rosy.strokes`` hold."""
+    ink = to_hex(settings.ink_colour)
+    return Pen(
+        width=float(f"{settings.width:.7g}"),
+        colours=[to_hex(colour) for colour in PALETTE] if settings.inks == "FAMILIES" else [ink],
+        paper=None if settings.plotter or not settings.paper else "#ffffff",
+        millimetres=settings.page or None,
+        plotter=settings.plotter,
+        outline=to_hex(settings.outline_colour) if settings.inks == "FAMILIES" else ink,
+    )
+
+
+def target_objects(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
+) -> list[bpy.types.Object]:
+    """Return the objects to draw strokes on: all with a field, or the selected ones among them.
+
+    Raises
+    ------
+    RosyError
+        If only selected objects are to be drawn, and none of them has a field.
+    """
+    objects = field_objects(view_layer)
+    if not scene.rosy.strokes.selected:
+        return objects
+    selected = [obj for obj in objects if obj.select_get(view_layer=view_layer)]
+    if not selected:
+        raise RosyError("none of the selected objects has a field: select one that has")
+    return selected
+
+
+def store_strokes(
+    scene: bpy.types.Scene,
+    kind: str,
+    drawing: StrokeDrawing,
+    camera: Camera,
+    pen: Pen,
+    owner: bpy.types.Object | None = None,
+) -> bpy.types.Object:
+    """Store strokes in an object. Those of the same kind from the same camera are replaced.
+
+    If an error is raised, the scene is not changed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    kind : {"PENCIL", "CURVES"}
+        Grease Pencil or Curves.
+    drawing : StrokeDrawing
+    camera : Camera
+        The width of the pen is in pixels of this camera.
+    pen : Pen
+    owner : bpy.types.Object, optional
+        Parent of the object. The strokes move with it.
+
+    Returns
+    -------
+    bpy.types.Object
+    """
+    name = f"RoSy Strokes {camera.name}"
+    geometry = stroke_geometry(drawing, camera, pen)
+    final_names: dict[bpy.types.ID, str] = {}
+    with rollback_on_error() as created:
+
+        def register(datablock: bpy.types.ID, final_name: str) -> None:
+            created.append(datablock)
+            final_names[datablock] = final_name
+
+        data = DATA_BUILDERS[kind](
+            name, geometry, min(scene.frame_start, scene.frame_current), register
+        )
+        obj = _find_object(scene, kind, camera.name)
+        if obj is None:
+            obj = bpy.data.objects.new(name, data)
+            created.append(obj)
+            scene.collection.objects.link(obj)
+            obj.visible_shadow = False
+            obj.use_grease_pencil_lights = False
+    if obj.data != data:
+        old_data, obj.data = obj.data, data
+        _remove_data(old_data)
+        for datablock, final_name in final_names.items():
+            datablock.name = final_name  # free now: the old data had it
+    obj.parent = owner
+    obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
+    obj.matrix_basis = Matrix()
+    _store_record(scene, kind, camera.name, obj)
+    return obj
+
+
+def stroke_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the stroke objects that RoSy created and that are still in the scene."""
+    objects = (record.thing for record in scene.rosy.strokes.made)
+    return [obj for obj in objects if obj is not None and obj.name in scene.objects]
+
+
+def remove_strokes(scene: bpy.types.Scene) -> int:
+    """Delete all stroke objects that RoSy created in a scene. Return their number."""
+    objects = stroke_objects(scene)
+    for record in scene.rosy.strokes.made:
+        if record.thing is not None:
+            _delete_object(record.thing)
+    scene.rosy.strokes.made.clear()
+    return len(objects)
+
+
+def _find_object(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Object | None:
+    """Return the recorded object; None if the user has deleted it or given it other data."""
+    for record in scene.rosy.strokes.made:
+        if (record.kind, record.name) == (kind, camera) and record.thing in stroke_objects(scene):
+            return record.thing if record.thing.data.get(OWNED_TAG) else None
+    return None
+
+
+def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types.Object) -> None:
+    """Record an object, and clean up the records of objects that the user has deleted."""
+    records = scene.rosy.strokes.made
+    for index in reversed(range(len(records))):
+        record = records[index]
+        if record.thing is None or record.thing.name not in scene.objects:
+            if record.thing is not None:
+                _delete_object(record.thing)
+            records.remove(index)
+        elif (record.kind, record.name) == (kind, camera):
+            records.remove(index)
+    record = records.add()
+    record.name, record.kind, record.thing = camera, kind, obj
+
+
+def _delete_object(obj: bpy.types.Object) -> None:
+    """Delete an object, and its data if RoSy created them and nothing else uses them."""
+    data = obj.data
+    bpy.data.objects.remove(obj)
+    _remove_data(data)
+
+
+def _remove_data(data: bpy.types.ID) -> None:
+    """Delete data that RoSy created, and their materials, if nothing else uses them."""
+    if data.users or not data.get(OWNED_TAG):
+        return
+    materials = [material for material in data.materials if material and material.get(OWNED_TAG)]
+    bpy.data.batch_remove([data])
+    bpy.data.batch_remove([material for material in materials if not material.users])

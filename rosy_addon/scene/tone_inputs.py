@@ -1,0 +1,264 @@
+"""Reading the inputs of tone: mesh attributes, images on meshes, and reference renders."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..cache import Cache, content_hash
+from ..color import luminance, to_linear
+from ..compositor.look import Look
+from ..compositor.target_tone import ReferenceRender
+from ..errors import RosyError
+from ..field.surface import Surface
+from ..projection.surface_tone import SurfaceTone
+from .cameras import camera_of_object, render_size
+from .compat import has_rosy_properties
+from .field_attributes import scalar_values
+
+
+@dataclass(frozen=True)
+class ToneRequest:
+    """The source of the surface tones.
+
+    Attributes
+    ----------
+    kind : {"attribute", "image"}
+    attribute : str
+        Name of the attribute. If empty, the active color attribute of each mesh.
+    """
+
+    kind: str
+    attribute: str = ""
+
+
+def make_tone_request(scene: bpy.types.Scene, look: Look) -> ToneRequest | None:
+    """Return the source of the surface tones for a look; None if it does not use them."""
+    if look.tone == "attribute":
+        return ToneRequest("attribute", scene.rosy.tone_attribute)
+    return ToneRequest("image") if look.tone == "image" else None
+
+
+def read_tone(
+    mesh: bpy.types.Mesh,
+    owner: bpy.types.Object,
+    surface: Surface,
+    tone_request: ToneRequest | None,
+    cache: Cache | None = None,
+) -> SurfaceTone | None:
+    """Read the surface tone of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Evaluated.
+    owner : bpy.types.Object
+        The original object.
+    surface : Surface
+        The surface of the mesh.
+    tone_request : ToneRequest or None
+    cache : Cache, optional
+        Keeps tones that have not changed since an earlier call.
+
+    Returns
+    -------
+    SurfaceTone or None
+        None if the mesh has no such attribute, or no image is chosen.
+
+    Raises
+    ------
+    RosyError
+        If the type of the attribute is not supported, a value is not finite, the image cannot be
+        read, or there is no UV map.
+    """
+    if tone_request is None:
+        return None
+    label = f"object '{owner.name}'"
+    if tone_request.kind == "attribute":
+        values, image = _corner_scalars(mesh, surface, tone_request.attribute, label), None
+    else:
+        image = owner.rosy.tone_image if has_rosy_properties() else None
+        values = None if image is None else _tone_uvs(mesh, owner.rosy.tone_uv_map, label)
+        image = None if image is None else image_luminance(image)
+    if values is None:
+        return None
+    if cache is None:
+        return SurfaceTone(values, image)
+    key = "tone", content_hash(values, image)
+    return cache.get_or_create(key, lambda: SurfaceTone(values, image))
+
+
+def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
+    """Return a cache key for the tone image and the UV map that are chosen on an object."""
+    if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
+        return ()
+    image = owner.rosy.tone_image
+    return ("" if image is None else image.name_full, owner.rosy.tone_uv_map)
+
+
+def check_tones(
+    tone_request: ToneRequest | None, tones: Sequence[tuple[SurfaceTone | None, bpy.types.Object]]
+) -> None:
+    """Check that at least one object has the requested tone.
+
+    Parameters
+    ----------
+    tone_request : ToneRequest or None
+    tones : sequence of (SurfaceTone or None, bpy.types.Object)
+        The tones that were read, and their objects.
+
+    Raises
+    ------
+    RosyError
+        If no object has it. The message lists the attributes that exist.
+    """
+    if tone_request is None or any(tone is not None for tone, _ in tones):
+        return
+    names = ", ".join(f"'{obj.name}'" for obj in dict.fromkeys(owner for _, owner in tones))
+    if tone_request.kind == "image":
+        raise RosyError(f"no image is chosen for the tone of {names}")
+    if not tone_request.attribute:
+        raise RosyError(f"there are no vertex colours on {names}: choose an attribute for the tone")
+    available = dict.fromkeys(
+        attribute.name
+        for _, owner in tones
+        for attribute in owner.data.attributes
+        if attribute.data_type in ("FLOAT", "FLOAT_COLOR", "BYTE_COLOR")
+        and not attribute.name.startswith(".")
+    )
+    listing = ", ".join(f"'{name}'" for name in available) or "none that would do"
+    raise RosyError(
+        f"there is no attribute '{tone_request.attribute}' for the tone on {names}; there is {listing}"
+    )
+
+
+def _corner_scalars(
+    mesh: bpy.types.Mesh, surface: Surface, name: str, label: str
+) -> np.ndarray | None:
+    """Return an attribute at the corners, (C, 1) float32; None if it is missing or unreadable."""
+    name = name or mesh.color_attributes.active_color_name
+    attribute = mesh.attributes.get(name)
+    if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
+        return None
+    source = f"{label}, attribute '{name}'"
+    values = scalar_values(attribute, source)
+    if not np.isfinite(values).all():
+        raise RosyError(f"{source}: has values that are not finite")
+    if attribute.domain == "POINT":
+        values = values[surface.corner_vertex]
+    elif attribute.domain == "FACE":
+        values = values[surface.corner_face]
+    return values[:, None].astype(np.float32)
+
+
+def _tone_uvs(mesh: bpy.types.Mesh, name: str, label: str) -> np.ndarray:
+    """Return texture coordinates, (C, 2) float32, from a UV map; by default the active one."""
+    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
+    if layer is None:
+        missing = f"no UV map '{name}'" if name else "no UV map"
+        raise RosyError(f"{label}: its mesh has {missing} for the image of its tone")
+    values = np.empty(2 * len(mesh.loops), dtype=np.float32)
+    layer.uv.foreach_get("vector", values)
+    return values.reshape(-1, 2)
+
+
+def image_luminance(image: bpy.types.Image) -> np.ndarray:
+    """Return the linear luminance of an image, (H, W) float32, composited over white.
+
+    Raises
+    ------
+    RosyError
+        If the image has no pixels.
+    """
+    width, height = image.size
+    if not (width and height and len(image.pixels)):
+        raise RosyError(f"image '{image.name}': has no pixels; is its file there?")
+    rgba = np.empty(4 * width * height, dtype=np.float32)
+    image.pixels.foreach_get(rgba)
+    rgba = rgba.reshape(height, width, 4)
+    alpha = rgba[..., 3:]
+    if image.is_float:
+        # Float images are premultiplied.
+        np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    elif image.colorspace_settings.name != "Non-Color":
+        rgba[..., :3] = to_linear(rgba[..., :3])
+    return luminance(rgba)
+
+
+def reference_path(scene: bpy.types.Scene) -> Path:
+    """Return the file of the reference render for the current frame of a scene.
+
+    In the path, a run of ``#`` is replaced by the frame number, padded with zeros to its length.
+
+    Raises
+    ------
+    RosyError
+        If no file is chosen.
+    """
+    pattern = scene.rosy.tone_picture
+    if not pattern:
+        raise RosyError("the tone is to come from a picture: choose its file under Look > Tone")
+    filename = re.sub("#+", lambda match: f"{scene.frame_current:0{len(match[0])}d}", pattern)
+    return Path(bpy.path.abspath(filename))
+
+
+def load_reference(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    camera: bpy.types.Object,
+    look: Look,
+    picture_luminance: np.ndarray | None = None,
+) -> ReferenceRender | None:
+    """Return the reference render for the tone of a look; None if the look does not use one.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        The current frame must be that of the reference render.
+    depsgraph : bpy.types.Depsgraph
+    camera : bpy.types.Object
+        The camera of the reference render.
+    look : Look
+    picture_luminance : (H, W) ndarray, optional
+        The luminance of the reference render, if it has been read already.
+
+    Raises
+    ------
+    RosyError
+        If no file is chosen, it cannot be read, or its aspect ratio is not that of renders.
+    """
+    if look.tone != "picture":
+        return None
+    path = reference_path(scene)
+    reference_camera = camera_of_object(scene, depsgraph, camera, *render_size(scene))
+    return ReferenceRender(
+        load_luminance(path) if picture_luminance is None else picture_luminance,
+        reference_camera,
+        str(path),
+    )
+
+
+def load_luminance(path: Path) -> np.ndarray:
+    """Read the linear luminance, (H, W) float32, of an image file with Blender.
+
+    Raises
+    ------
+    RosyError
+        If Blender cannot read the file.
+    """
+    try:
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError as reason:
+        message = str(reason).strip().splitlines()[-1].removeprefix("Error: ")
+        raise RosyError(f"{path}: cannot be read: {message}") from None
+    try:
+        return image_luminance(image)
+    except RosyError:
+        raise RosyError(f"{path}: is no picture that Blender can read") from None
+    finally:
+        bpy.data.images.remove(image)

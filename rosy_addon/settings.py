@@ -1,0 +1,263 @@
+"""Settings that describe themselves.
+
+A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
+`color`. Each field carries a `Setting`: its default, range, label, help text, place in the panels,
+the stage of rendering that it affects and when it applies. Properties, panels, validation, command
+line options, tables of the documentation and cache keys are derived from these descriptions.
+"""
+
+from __future__ import annotations
+
+import re
+import reprlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from enum import IntEnum
+from functools import cache
+from types import MappingProxyType
+from typing import Any
+
+from .errors import RosyError
+
+#: Stored keys are spelled in British English, the interface in American English.
+AMERICAN_SPELLING = {"Colour": "Color", "Grey": "Gray"}
+
+#: Values of switches on the command line.
+SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+
+
+class Stage(IntEnum):
+    """Stages of rendering, in their order. A changed setting invalidates its stage and all later."""
+
+    GBUFFER = 0  #: the visible pixels
+    LIC = 1  #: the images of line integral convolution
+    SHADING = 2  #: contrast, ink, color and light
+
+
+def always(_settings: Any) -> bool:
+    """Return True: the predicate of a setting that applies whatever the others are."""
+    return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """The description of one setting.
+
+    Attributes
+    ----------
+    name : str
+        The stored key. `settings_of` fills it in.
+    default : object
+    text : str
+        Help text for the user.
+    label : str
+        Name in the interface; made from the key if empty.
+    panel_label : str
+        A shorter name, for panels in which the label does not fit.
+    panel : str
+        Key of the panel that shows the setting. Empty: the panel for advanced settings.
+    panel_before : str
+        Setting above which this one is shown. Empty: panels follow the order of the fields.
+    stage : Stage
+        First stage of rendering that has to be repeated when the setting changes.
+    applies : callable
+        Whether the setting has an effect, given all settings: an object of the settings class, or
+        Blender's property group of the same names.
+    """
+
+    name: str = ""
+    default: Any = None
+    text: str = ""
+    label: str = ""
+    panel_label: str = ""
+    panel: str = ""
+    panel_before: str = ""
+    stage: Stage = Stage.LIC
+    applies: Callable[[Any], bool] = always
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not allowed."""
+        raise NotImplementedError
+
+    def parse(self, text: str) -> Any:
+        """Return the value that a text on the command line stands for.
+
+        Only the type is converted; `check` tells whether the value is allowed.
+
+        Raises
+        ------
+        ValueError
+            If the text is not a number where one is expected.
+        """
+        return text
+
+    def _refuse(self, value: Any, expected: str) -> None:
+        # `reprlib` keeps the message to one short line, whatever a file holds.
+        raise RosyError(f"setting '{self.name}' is {reprlib.repr(value)}, not {expected}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number(Setting):
+    """A number: whole if its default is an int.
+
+    Attributes
+    ----------
+    low, high : float
+        The range, both ends included.
+    unit : str
+        "angle" (radians), "length" (Blender units), "pixels" or "spacings"; empty if it has none.
+    is_pixel_length : bool
+        Whether the value is a length that depends on the resolution. Such lengths are multiplied
+        when the frame has more pixels, as with supersampling.
+    preview_low : float
+        Lower end of the range in previews of reduced resolution, if higher than `low`.
+    """
+
+    low: float = 0.0
+    high: float = 1.0
+    unit: str = ""
+    is_pixel_length: bool = False
+    preview_low: float = 0.0
+
+    @property
+    def is_integer(self) -> bool:
+        """Whether only whole numbers are allowed."""
+        return isinstance(self.default, int)
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not a number within the range."""
+        types = int if self.is_integer else (int, float)
+        if isinstance(value, bool) or not isinstance(value, types):
+            self._refuse(value, f"a {'whole ' * self.is_integer}number")
+        if not self.low <= value <= self.high:
+            self._refuse(value, f"from {self.low} to {self.high}")
+
+    def parse(self, text: str) -> Any:
+        """Return the number that a text stands for."""
+        return type(self.default)(text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice(Setting):
+    """One of several options.
+
+    Attributes
+    ----------
+    options : mapping of str to str
+        Help texts of the options by their stored keys.
+    """
+
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not one of the options."""
+        if not isinstance(value, str) or value not in self.options:
+            self._refuse(value, f"one of {', '.join(self.options)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch(Setting):
+    """True or false."""
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not a bool."""
+        if not isinstance(value, bool):
+            self._refuse(value, "true or false")
+
+    def parse(self, text: str) -> Any:
+        """Return the bool that a text stands for, or the text if it stands for none."""
+        return SWITCH_VALUES.get(text.lower(), text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Color(Setting):
+    """A color in display values (sRGB), as ``#rrggbb``."""
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not a color."""
+        if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
+            self._refuse(value, "a color like #08080d")
+
+
+def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a `Number`."""
+    return _field(Number(default=default, low=low, high=high, text=text, **description))
+
+
+def choice(default: str, text: str, options: Mapping[str, str], **description: Any) -> Any:
+    """Return a dataclass field for a `Choice`."""
+    return _field(Choice(default=default, text=text, options=options, **description))
+
+
+def switch(default: bool, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a `Switch`."""
+    return _field(Switch(default=default, text=text, **description))
+
+
+def color(default: str, text: str, **description: Any) -> Any:
+    """Return a dataclass field for a `Color`."""
+    return _field(Color(default=default, text=text, **description))
+
+
+def _field(setting: Setting) -> Any:
+    return field(default=setting.default, metadata={"setting": setting})
+
+
+@cache
+def settings_of(cls: type) -> Mapping[str, Setting]:
+    """Return the descriptions of a settings class by name, in the order of its fields."""
+    settings = {}
+    for entry in fields(cls):
+        setting: Setting = entry.metadata["setting"]
+        label = setting.label or title(entry.name)
+        settings[entry.name] = replace(setting, name=entry.name, label=label)
+    return MappingProxyType(settings)
+
+
+def title(key: str) -> str:
+    """Return a stored key as a label of the interface: "ink_colour" is "Ink Color"."""
+    label = key.replace("_", " ").title()
+    for british, american in AMERICAN_SPELLING.items():
+        label = label.replace(british, american)
+    return label
+
+
+def check_settings(settings: Any) -> None:
+    """Check all values of an object of a settings class.
+
+    Raises
+    ------
+    RosyError
+        If a value is not allowed.
+    """
+    for name, setting in settings_of(type(settings)).items():
+        setting.check(getattr(settings, name))
+
+
+def pixel_lengths(cls: type) -> Iterator[Number]:
+    """Yield the settings of a class that are lengths in pixels."""
+    for setting in settings_of(cls).values():
+        if isinstance(setting, Number) and setting.is_pixel_length:
+            yield setting
+
+
+def stage_key(settings: Any, stage: Stage) -> tuple[Any, ...]:
+    """Return a key of the values that the result of a stage depends on.
+
+    Settings that do not apply count with their defaults.
+    """
+    return tuple(
+        getattr(settings, name) if setting.applies(settings) else setting.default
+        for name, setting in settings_of(type(settings)).items()
+        if setting.stage <= stage
+    )
+
+
+def panel_settings(cls: type, panel: str) -> tuple[str, ...]:
+    """Return the names of the settings that a panel shows, from top to bottom."""
+    names: list[str] = []
+    for name, setting in settings_of(cls).items():
+        if setting.panel == panel:
+            before = setting.panel_before
+            names.insert(names.index(before) if before else len(names), name)
+    return tuple(names)

@@ -1,0 +1,1 @@
+"""Hatching: evenly spaced streamlines on surfaces, drawn as strokes. Numpy only."""

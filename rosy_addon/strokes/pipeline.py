@@ -1,0 +1,345 @@
+"""Draw strokes on the mesh instances of a scene: spacing, tracing, clipping and overshoot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..field.frames import dot
+from ..progress import Progress, Task, run_to_completion, subtask
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from .crossings import with_crossing_gaps
+from .families import label_families
+from .head_on_ends import head_on_ends
+from .outline import OUTLINE_KINDS, outline
+from .overshoot import extend_free_ends, mark_free_boundary_ends
+from .spacing import (
+    LightSource,
+    lit_tone,
+    pixel_spacing,
+    spacing_by_curvature,
+    spacing_by_foreshortening,
+    spacing_by_tone,
+    values_at_points,
+    weight_by_tone,
+)
+from .stroke_set import POINT_COLUMNS, Strokes
+from .style import StrokeStyle
+from .svg import Pen, simplify_mask
+from .tangent_mesh import build_tangent_mesh
+from .trace import trace_strokes_task
+from .visibility import clip_to_visible, in_frame, pixel_size, project_to_pixels
+
+#: Width of a tapered stroke at its end, as a fraction of the full width.
+TIP_WIDTH = 0.15
+
+#: If no vertex of a mesh instance is in the frame, its spacings are at least the spacing at this
+#: fraction of its mean distance to the camera.
+OFFSCREEN_DISTANCE_RATIO = 0.1
+
+#: Largest distance in pixels between a removed point and the simplified stroke, and the number of
+#: pixels that a difference of the full width counts as.
+SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
+
+#: Largest tangent of the angle between the normal and the direction to the camera for which the
+#: offset toward the camera grows.
+MAX_STEEPNESS = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeDrawing:
+    """The strokes of several mesh instances.
+
+    Attributes
+    ----------
+    strokes : Strokes
+        Families with the same name are merged across instances. The kinds of outline come last.
+    body_index : (S,) int32 ndarray
+        The mesh instance of each stroke: an index into the instances that were given.
+    hidden : bool
+        Whether parts that the camera does not see were kept.
+    """
+
+    strokes: Strokes
+    body_index: np.ndarray
+    hidden: bool = False
+
+
+def draw_bodies(
+    instances: Sequence[MeshInstance], camera: Camera, style: StrokeStyle | None = None, **options
+) -> StrokeDrawing:
+    """Run `draw_bodies_task` to its end.
+
+    Examples
+    --------
+    >>> drawing = draw_bodies([instance], camera, StrokeStyle(spacing=6.0))  # doctest: +SKIP
+    >>> write_svg("strokes.svg", drawing.strokes, camera)  # doctest: +SKIP
+    """
+    return run_to_completion(draw_bodies_task(instances, camera, style, **options))
+
+
+def draw_bodies_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    style: StrokeStyle | None = None,
+    *,
+    lights: Sequence[LightSource] = (),
+    clip_to_frame: bool = True,
+    cache: Cache | None = None,
+) -> Task[StrokeDrawing]:
+    """Cover mesh instances with strokes and remove what the camera does not see.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        Strokes are drawn on those with a field. All of them occlude.
+    camera : Camera
+        Its resolution also sets the length of a pixel.
+    style : StrokeStyle, optional
+    lights : sequence of LightSource
+        Lights of the tone, in camera space. Without lights, the light is at the camera.
+    clip_to_frame : bool
+        Clip strokes to the frame even if `style.hidden` keeps hidden ones. Without `style.hidden`
+        they are always clipped.
+    cache : Cache, optional
+        Cache for corner fields.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    StrokeDrawing
+
+    Raises
+    ------
+    RosyError
+        If no instance has a field, a spacing is not valid, or no stroke is visible.
+    """
+    style = style or StrokeStyle()
+    cache = Cache() if cache is None else cache
+    body_indices = [index for index, instance in enumerate(instances) if instance.field is not None]
+    if not body_indices:
+        raise RosyError("there is no field to draw strokes along")
+    if clip_to_frame or not style.hidden:
+        body_indices = [index for index in body_indices if _is_in_view(instances[index], camera)]
+    body_strokes = []
+    for rank, index in enumerate(body_indices):
+        start, stop = (0.05 + 0.8 * done / len(body_indices) for done in (rank, rank + 1))
+        work = _trace_body(instances[index], camera, style, lights, cache)
+        body_strokes.append((yield from subtask(work, start, stop)))
+    if not body_strokes:
+        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+    strokes = reduce(Strokes.concatenate, body_strokes)
+    if not len(strokes):
+        raise RosyError("there is no room for a stroke: ask for a narrower spacing")
+    if clip_to_frame or not style.hidden:
+        yield Progress(0.85, "finding what is seen")
+        strokes = clip_to_visible(strokes, instances, camera, remove_hidden=not style.hidden)
+    if style.overshoot:
+        strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
+    if not len(strokes):
+        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+    family_counts = [len(single.names) for single in body_strokes]
+    body_index = np.repeat(np.array(body_indices, dtype=np.int32), family_counts)[strokes.family]
+    return StrokeDrawing(_merge_families_by_name(strokes), body_index, style.hidden)
+
+
+def _trace_body(
+    instance: MeshInstance,
+    camera: Camera,
+    style: StrokeStyle,
+    lights: Sequence[LightSource],
+    cache: Cache,
+) -> Task[Strokes]:
+    """Return all strokes of a mesh instance, with its outline, including hidden parts."""
+    spacing = _vertex_spacing(instance, camera, style)
+    tone = lit_tone(instance, camera, lights) if style.tone else None
+    if tone is not None:
+        spacing = spacing_by_tone(spacing, tone)
+    if style.curvature:
+        spacing = spacing_by_curvature(instance.surface, spacing, style.curvature)
+    strokes = yield from trace_strokes_task(
+        instance, spacing, cross_creases=style.cross_creases, cache=cache
+    )
+    strokes = label_families(strokes, build_tangent_mesh(instance, cache=cache), camera.view[0, :3])
+    if style.overshoot:
+        strokes = mark_free_boundary_ends(
+            strokes, build_tangent_mesh(instance, cross_creases=style.cross_creases, cache=cache)
+        )
+    if tone is not None:
+        point_tone = values_at_points(strokes, instance.surface, tone)
+        strokes = weight_by_tone(strokes, point_tone, style.layering)
+    if style.gaps:
+        strokes = with_crossing_gaps(strokes, style.gaps, weave=True)
+    if style.taper:
+        ends = ~head_on_ends(strokes)
+        if style.overshoot:
+            # Ends that will be extended are tapered after the extension.
+            ends &= ~strokes.free_end_mask
+        strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
+    if style.outline:
+        strokes = Strokes.concatenate(strokes, outline(instance, camera))
+    return strokes
+
+
+def _overshoot_ends(
+    strokes: Strokes,
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    style: StrokeStyle,
+    clip_to_frame: bool,
+) -> Strokes:
+    """Extend free ends, clip the extensions to the frame, and taper these ends."""
+    occluders = None if style.hidden else instances
+    strokes = extend_free_ends(strokes, camera, style.overshoot, occluders)
+    if clip_to_frame or not style.hidden:
+        inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
+        strokes = strokes.runs_where(inside, free_at_removed=False)
+    return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
+
+
+def _vertex_spacing(instance: MeshInstance, camera: Camera, style: StrokeStyle) -> np.ndarray:
+    """Return (V,) float64: the spacing at vertices, in world space.
+
+    Outside the frame of a perspective camera, the spacing is not smaller than the smallest spacing
+    inside. Otherwise the number of strokes near the camera plane would be unlimited.
+    """
+    if style.unit == "world":
+        return np.full(len(instance.surface.vertices), style.distance)
+    spacing = spacing_by_foreshortening(
+        instance, camera, pixel_spacing(instance, camera, style.spacing)
+    )
+    points = instance.world_points()
+    pixels, _ = project_to_pixels(points, camera)
+    inside = in_frame(pixels, camera)
+    if not camera.is_perspective:
+        return spacing
+    if inside.any():
+        return np.maximum(spacing, spacing[inside].min())
+    mean_pixel_size = (
+        float(np.linalg.norm(points - camera.eye, axis=1).mean()) / camera.pixels_per_unit
+    )
+    ratio = OFFSCREEN_DISTANCE_RATIO if _is_in_view(instance, camera) else 1.0
+    return np.maximum(spacing, style.spacing * ratio * mean_pixel_size)
+
+
+def _is_in_view(instance: MeshInstance, camera: Camera) -> bool:
+    """Return False if all vertices are beyond one plane of the view frustum, except the far one."""
+    points = instance.world_points()
+    matrix = camera.projection @ camera.view
+    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    outside = np.abs(clip[:, :2]) > clip[:, 3:]
+    outside_sides = np.concatenate(
+        [outside & (clip[:, :2] > 0), outside & (clip[:, :2] < 0)], axis=1
+    )
+    return not (outside_sides.all(axis=0).any() or (clip[:, 2] < -clip[:, 3]).all())
+
+
+def _merge_families_by_name(strokes: Strokes) -> Strokes:
+    """Merge families with the same name, and put the kinds of outline last."""
+    names = sorted(
+        set(strokes.names), key=lambda name: (name in OUTLINE_KINDS, strokes.names.index(name))
+    )
+    new_family = np.array([names.index(name) for name in strokes.names], dtype=np.int32)
+    return replace(strokes, family=new_family[strokes.family], names=tuple(names))
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeGeometry:
+    """Strokes as curves in world space with radii and colors, ready for a Blender object.
+
+    Attributes
+    ----------
+    strokes : Strokes
+        Simplified strokes; n points in all.
+    body_index : (S,) int32 ndarray
+        As in `StrokeDrawing`.
+    points : (n, 3) float64 ndarray
+        Points of the curves in world space, offset from the surface.
+    radius : (n,) float64 ndarray
+        Radii in world space.
+    colors : list of str
+        The color of each family.
+    """
+
+    strokes: Strokes
+    body_index: np.ndarray
+    points: np.ndarray
+    radius: np.ndarray
+    colors: list[str]
+
+
+def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeGeometry:
+    """Return the curves of a drawing for a pen whose width is in pixels of the camera."""
+    strokes = simplify_strokes(drawing.strokes, camera)
+    # Hidden strokes may face away from the camera. An offset toward it would move them into the
+    # surface.
+    points = (offset_along_normal if drawing.hidden else offset_toward_camera)(
+        strokes, camera, pen.width
+    )
+    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
+    return StrokeGeometry(
+        strokes, drawing.body_index, points, radius, pen.family_colors(strokes.names)
+    )
+
+
+def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
+    """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    camera : Camera
+        Camera that sets the length of a pixel.
+    """
+    pixel_length = pixel_size(strokes.points, camera)
+    min_pixel_length = np.minimum.reduceat(pixel_length, strokes.start[:-1])
+    min_pixel_length = np.maximum(min_pixel_length, 1e-3 * pixel_length.max())[strokes.stroke]
+    features = np.column_stack(
+        [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
+    )
+    kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    return replace(
+        strokes,
+        start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),
+        **{name: getattr(strokes, name)[kept] for name in POINT_COLUMNS},
+    )
+
+
+def offset_along_normal(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
+    """Return (n, 3) float64: the points offset along the surface normals, by `width` pixels."""
+    return strokes.points + width * pixel_size(strokes.points, camera)[:, None] * strokes.normal
+
+
+def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
+    """Return the points of strokes, offset toward the camera that sees them.
+
+    Their positions in the picture do not change. Ribbons of the given width that face the camera
+    are then in front of the surface. The offset grows with the angle between the surface and the
+    image plane, but the height above the surface hardly does.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    camera : Camera
+    width : float
+        Width of the ribbons in pixels at the depth of each point.
+
+    Returns
+    -------
+    (n, 3) float64 ndarray
+        World space.
+    """
+    to_camera = camera.view_directions(strokes.points)
+    facing = np.abs(dot(strokes.normal, to_camera))
+    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / MAX_STEEPNESS)
+    offset = width * (1 + steepness) * pixel_size(strokes.points, camera)
+    return strokes.points + offset[:, None] * to_camera

@@ -1,0 +1,233 @@
+"""A hashed uniform grid for radius queries, to which points can be added and removed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+#: Factors of the three cell coordinates in the hash.
+_PRIMES = np.array([73856093, 19349663, 83492791], dtype=np.int64)
+
+#: Largest radius of a query, in cells.
+MAX_RINGS = 4
+
+#: Points in a block. The points of a cell are a linked list of blocks.
+BLOCK_SIZE = 8
+
+#: Queries that are answered at once, so that their data fit into the CPU caches.
+QUERY_BATCH_SIZE = 1 << 11
+
+
+class QueryBand(NamedTuple):
+    """Restricts n radius queries to a small ball and a band perpendicular to a direction.
+
+    Attributes
+    ----------
+    direction : (n, 3) ndarray
+        Unit direction of each query.
+    inner_ratio : float
+        Radius of the ball, as a fraction of that of the query. All points in it are returned.
+    band_ratio : float
+        Outside the ball, points are returned if their distance along the direction is at most this
+        fraction of the radius.
+    """
+
+    direction: np.ndarray
+    inner_ratio: float = 0.6
+    band_ratio: float = 0.25
+
+
+class PointGrid:
+    """A hashed uniform grid of points.
+
+    Parameters
+    ----------
+    cell : float
+        Side of a cell; best about the radius of most queries.
+    expected_count : int
+        Expected number of points. It sets the size of the hash table.
+
+    Examples
+    --------
+    >>> grid = PointGrid(1.0, 2)
+    >>> index = grid.add(np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]))
+    >>> query, point = grid.pairs_within(np.zeros((1, 3)), np.array([0.5]))
+    >>> point.tolist()
+    [0]
+    """
+
+    def __init__(self, cell: float, expected_count: int) -> None:
+        self.cell = cell
+        bits = int(np.clip(np.ceil(np.log2(max(expected_count, 2))), 10, 22))
+        self.mask = np.int64((1 << bits) - 1)
+        # The last block of each cell, and the number of its slots in use.
+        self.last_block = np.full(1 << bits, -1, dtype=np.int32)
+        self.last_block_fill = np.full(1 << bits, BLOCK_SIZE, dtype=np.int8)
+        self.block_count = 0
+        self.next_block = np.empty(128, dtype=np.int32)
+        self.point_index = np.empty((128, BLOCK_SIZE), dtype=np.int32)
+        # Free slots hold NaN, for which all comparisons are false.
+        self.position = np.full((128, 3, BLOCK_SIZE), np.nan)
+        self.point_count = 0
+        self.point_slot = np.empty(1024, dtype=np.int32)
+
+    def add(self, points: np.ndarray) -> np.ndarray:
+        """Add (n, 3) points and return their (n,) int32 numbers, which continue those before."""
+        first = self.point_count
+        self.point_count += len(points)
+        self.point_slot = _grow_to(self.point_slot, self.point_count, 0)
+        index = np.arange(first, self.point_count, dtype=np.int32)
+        key = self._hash_cells(self._cells(points))
+        order = np.argsort(key, kind="stable")
+        key = key[order]
+        starts_group = np.ones(len(key), dtype=bool)
+        starts_group[1:] = key[1:] != key[:-1]
+        group_start = np.flatnonzero(starts_group)
+        group = np.cumsum(starts_group) - 1
+        key = key[group_start]
+        group_size = np.diff(np.append(group_start, len(points)))
+        last_block, block_fill = self.last_block[key], self.last_block_fill[key].astype(np.int64)
+        # Fill the last block of each cell, then new blocks.
+        chain_position = block_fill[group] + np.arange(len(points)) - group_start[group]
+        new_blocks = (block_fill + group_size - 1) // BLOCK_SIZE
+        first_new_block = self.block_count + np.cumsum(new_blocks) - new_blocks
+        block_ordinal = chain_position // BLOCK_SIZE
+        block = np.where(
+            block_ordinal == 0, last_block[group], first_new_block[group] + block_ordinal - 1
+        )
+        self._append_blocks(first_new_block, new_blocks, last_block)
+        grows = new_blocks > 0
+        self.last_block[key[grows]] = (first_new_block + new_blocks - 1)[grows]
+        self.last_block_fill[key] = block_fill + group_size - BLOCK_SIZE * new_blocks
+        slot = chain_position % BLOCK_SIZE
+        self.point_index[block, slot] = index[order]
+        self.position[block, :, slot] = points[order]
+        self.point_slot[index[order]] = block * BLOCK_SIZE + slot
+        return index
+
+    def _append_blocks(
+        self, first_new_block: np.ndarray, new_blocks: np.ndarray, last_block: np.ndarray
+    ) -> None:
+        """Append new blocks and link them to the previous last blocks of their cells.
+
+        Parameters
+        ----------
+        first_new_block, new_blocks : (cells,) ndarray of int
+            First new block of each cell, and the number of new blocks.
+        last_block : (cells,) int32 ndarray
+            Previous last block, or -1.
+        """
+        first = self.block_count
+        self.block_count += int(new_blocks.sum())
+        self.next_block = _grow_to(self.next_block, self.block_count, -1)
+        self.point_index = _grow_to(self.point_index, self.block_count, -1)
+        self.position = _grow_to(self.position, self.block_count, np.nan)
+        self.next_block[first : self.block_count] = np.arange(first, self.block_count) - 1
+        grows = new_blocks > 0
+        self.next_block[first_new_block[grows]] = last_block[grows]
+
+    def remove(self, index: np.ndarray) -> None:
+        """Remove points by number. Their numbers are not used again."""
+        block, slot = np.divmod(self.point_slot[index], BLOCK_SIZE)
+        self.position[block, :, slot] = np.nan
+
+    def pairs_within(
+        self, points: np.ndarray, radius: np.ndarray, band: QueryBand | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Find all pairs of a query and a point of the grid within its radius.
+
+        Parameters
+        ----------
+        points : (n, 3) ndarray
+            Centers of the queries.
+        radius : (n,) ndarray
+            Radii. Points farther than `MAX_RINGS` cells may be missed.
+        band : QueryBand, optional
+            Restricts the queries.
+
+        Returns
+        -------
+        query : (m,) intp ndarray
+            Query of each pair.
+        point : (m,) int32 ndarray
+            Number of the point. A pair may occur twice, because of hash collisions.
+        """
+        rings = np.clip(np.ceil(radius / self.cell), 1, MAX_RINGS).astype(np.int64)
+        pairs = []
+        for ring_count in range(1, int(rings.max(initial=0)) + 1):
+            queries = np.flatnonzero(rings == ring_count)
+            offset = _ring_offsets(ring_count)
+            for start in range(0, len(queries), QUERY_BATCH_SIZE):
+                batch = queries[start : start + QUERY_BATCH_SIZE]
+                pairs += self._batch_pairs(points, radius * radius, batch, offset, band)
+        if not pairs:
+            return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
+        return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
+
+    def _batch_pairs(
+        self,
+        points: np.ndarray,
+        radius_squared: np.ndarray,
+        queries: np.ndarray,
+        offset: np.ndarray,
+        band: QueryBand | None,
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the pairs of some queries: two arrays for each step along the lists of blocks.
+
+        `offset` holds the cell offsets of `_ring_offsets`, `queries` the numbers of the queries.
+        """
+        hash_parts = self._cells(points[queries]) * _PRIMES
+        key = hash_parts[:, 0, None] + offset[:, 0]
+        key ^= hash_parts[:, 1, None] + offset[:, 1]
+        key ^= hash_parts[:, 2, None] + offset[:, 2]
+        key &= self.mask
+        block = self.last_block.take(key).ravel()
+        occupied = np.flatnonzero(block >= 0)
+        block = block[occupied]
+        query = queries[occupied // len(offset)]
+        pairs = []
+        while len(block):
+            delta = self.position.take(block, axis=0)
+            delta -= points.take(query, axis=0)[:, :, None]
+            distance = np.einsum("nij,nij->nj", delta, delta)
+            limit = radius_squared.take(query)[:, None]
+            within = distance <= limit
+            if band is not None:
+                along = np.einsum("nij,ni->nj", delta, band.direction.take(query, axis=0))
+                within &= (distance <= band.inner_ratio**2 * limit) | (
+                    along * along <= band.band_ratio**2 * limit
+                )
+            hit = np.flatnonzero(within)
+            row = hit // BLOCK_SIZE
+            pairs.append(
+                (
+                    query.take(row),
+                    self.point_index.take(block.take(row) * BLOCK_SIZE + hit % BLOCK_SIZE),
+                )
+            )
+            block = self.next_block.take(block)
+            has_next = np.flatnonzero(block >= 0)
+            block, query = block.take(has_next), query.take(has_next)
+        return pairs
+
+    def _cells(self, points: np.ndarray) -> np.ndarray:
+        return np.floor(points / self.cell).astype(np.int64)
+
+    def _hash_cells(self, cells: np.ndarray) -> np.ndarray:
+        hash_parts = cells * _PRIMES
+        return (hash_parts[:, 0] ^ hash_parts[:, 1] ^ hash_parts[:, 2]) & self.mask
+
+
+def _ring_offsets(rings: int) -> np.ndarray:
+    """Return (cells, 3) int64: the cell offsets within `rings` rings, times the hash factors."""
+    side = np.arange(-rings, rings + 1)
+    offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
+    return offset * _PRIMES
+
+
+def _grow_to(values: np.ndarray, count: int, fill: float) -> np.ndarray:
+    """Double the length of an array until it has `count` rows; new rows hold `fill`."""
+    while count > len(values):
+        values = np.concatenate([values, np.full_like(values, fill)])
+    return values

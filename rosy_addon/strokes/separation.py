@@ -1,0 +1,280 @@
+"""Cut strokes of the same family where they are nearer than the minimum separation.
+
+Placement compares samples that are half a spacing apart. Where strokes bend strongly, above all at
+singularities, they may come nearer between samples, or neighbors may turn from different families
+into one. At folds, the distance in space is smaller than along the surface. After placement,
+strokes are compared more finely at such points and near their ends. Of two strokes that are too
+near, the shorter one is cut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..field.frames import dot, normalize
+from .point_grid import PointGrid
+from .stroke_set import Strokes
+from .tangent_mesh import TangentMesh
+
+#: Minimum separation in spacings. It is a little more than the guaranteed half spacing, to allow
+#: for the parts between the points that are compared.
+MIN_SEPARATION = 0.52
+
+#: Tolerance in radians that is added to the largest angle between members of one family.
+FAMILY_TOLERANCE = np.radians(10)
+
+#: Distance between the points that are compared, in spacings.
+SAMPLE_STEP = 0.1
+
+#: Strokes are checked where they or the field turn by more than this within a spacing, in radians.
+MAX_TURN = np.radians(18)
+
+#: The same for the normals of the surface: along strokes, and at their ends.
+FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
+
+#: Radius around such points in which strokes are sampled finely, in spacings.
+CHECK_RADIUS = 1.0
+
+#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
+MIN_SELF_ARC = 2.5
+
+#: Points are on different parts of a fold if the cosine between their normals is below the first
+#: value, or the slope between them relative to the mean normal (height over distance) is above the
+#: second.
+MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
+
+
+def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Strokes:
+    """Remove the parts of strokes that are nearer than `MIN_SEPARATION` to another of their family.
+
+    Two strokes are of the same family at a point if the angle between their directions is less than
+    half the angle between two lines of the field.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+        The mesh on which the strokes were traced.
+    strokes : Strokes
+        Strokes before `label_families`: their families are not used.
+    min_length : float
+        Remaining parts of cut strokes that are shorter than this are removed, in spacings.
+
+    Returns
+    -------
+    Strokes
+        Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
+    """
+    suspect = _suspect_points(mesh, strokes)
+    if not suspect.any():
+        return strokes
+    near_suspect = _points_near(strokes, suspect)
+    candidates = np.unique(strokes.stroke[near_suspect])
+    point = np.concatenate(
+        [np.arange(strokes.start[stroke], strokes.start[stroke + 1]) for stroke in candidates]
+    )
+    subset = strokes.select(candidates)
+    refined, source = _refine(subset, np.isin(point, near_suspect))
+    too_close = _too_close(mesh, refined, suspect[point][source], subset.length)
+    if not too_close.any():
+        return strokes
+    # Loops that are cut are also cut at their first point, where they were closed.
+    opened = np.flatnonzero(refined.closed & (np.bincount(refined.stroke, too_close) > 0))
+    too_close[refined.start[:-1][opened]] = too_close[refined.start[1:][opened] - 1] = True
+    too_close = _dilate(refined, too_close)
+    cut = np.unique(refined.stroke[too_close])
+    remaining = refined.runs_where(~too_close, free_at_removed=False)
+    is_cut = np.repeat(False, len(candidates))
+    is_cut[cut] = True
+    remaining = remaining.select(is_cut[_run_owner(refined, ~too_close)])
+    remaining = replace(remaining, weights=mesh.weights_at(remaining.triangle, remaining.points))
+    remaining = remaining.select(
+        remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
+    )
+    untouched = np.ones(len(strokes), dtype=bool)
+    untouched[candidates[cut]] = False
+    result = Strokes.concatenate(strokes.select(untouched), remaining)
+    return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
+
+
+def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+    """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
+    surface_turn = surface_turn_per_spacing(mesh, strokes)
+    suspect = (
+        (stroke_turn_per_spacing(strokes) > MAX_TURN)
+        | (field_turn_per_spacing(mesh, strokes) > MAX_TURN)
+        | (surface_turn > FOLD_ANGLE)
+    )
+    ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
+    gap = strokes.points[ends[:, 1]] - strokes.points[ends[:, 0]]
+    self_distance = MIN_SELF_ARC * strokes.spacing[ends[:, 1]]
+    nearly_closed = (
+        (dot(gap, gap) < self_distance**2) & (strokes.length > 2 * self_distance) & ~strokes.closed
+    )
+    suspect[ends] |= (surface_turn[ends] > END_FOLD_ANGLE) | nearly_closed[:, None]
+    return suspect
+
+
+def surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+    """Return (n,) radians by which the shading normal turns within a spacing.
+
+    It is the norm of the derivatives in two perpendicular directions.
+    """
+    gradient, normal = mesh.gradient[strokes.triangle], mesh.corner_normal[strokes.triangle]
+    derivative_x = np.einsum("nk,nki->ni", gradient.real, normal)
+    derivative_y = np.einsum("nk,nki->ni", gradient.imag, normal)
+    return strokes.spacing * np.sqrt(
+        dot(derivative_x, derivative_x) + dot(derivative_y, derivative_y)
+    )
+
+
+def stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
+    """Return (n,) radians by which strokes turn in space within half a spacing on either side."""
+    arc, stroke = strokes.arc, strokes.stroke
+    stride = 2 * (float(arc.max(initial=0)) + float(strokes.spacing.max(initial=0)))
+    key = stroke * stride + arc
+    first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
+    half_window = 0.5 * strokes.spacing
+    before = np.clip(np.searchsorted(key, key - half_window), first, last)
+    after = np.clip(np.searchsorted(key, key + half_window), first, last)
+    member_before, member_after = strokes.member[before], strokes.member[after]
+    return np.arccos(np.clip(dot(member_before, member_after), -1, 1))
+
+
+def field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+    """Return (n,) radians by which the field turns within a spacing, at most over directions."""
+    z, gradient = mesh.z[strokes.triangle], mesh.gradient[strokes.triangle]
+    value = np.einsum("nk,nk->n", strokes.weights, z)
+    derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()
+    derivative_y = np.einsum("nk,nk->n", gradient.imag, z) * value.conj()
+    scale = np.maximum(mesh.degree * np.abs(value) ** 2, 1e-300)
+    return strokes.spacing * np.hypot(derivative_x.imag, derivative_y.imag) / scale
+
+
+def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
+    """Return the numbers of all points within `CHECK_RADIUS` spacings of suspect points.
+
+    The test is by grid cells, so it includes some points that are farther away.
+    """
+    cell = CHECK_RADIUS * float(strokes.spacing.max())
+    cells = np.floor((strokes.points - strokes.points.min(axis=0)) / cell).astype(np.int64) + 1
+    grid_shape = cells.max(axis=0) + 2
+    stride = np.array([grid_shape[1] * grid_shape[2], grid_shape[2], 1])
+    step = np.arange(-1, 2)
+    offset = np.stack(np.meshgrid(step, step, step), axis=-1).reshape(-1, 3) @ stride
+    suspect_cells = np.unique(cells[suspect] @ stride)
+    return np.flatnonzero(np.isin(cells @ stride, np.unique(suspect_cells[:, None] + offset)))
+
+
+def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.ndarray]:
+    """Subdivide strokes to steps of at most `SAMPLE_STEP` spacings at some points.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    near_suspect : (n,) bool ndarray
+        The points next to which segments are subdivided.
+
+    Returns
+    -------
+    refined : Strokes
+    source : (m,) int64 ndarray
+        For each new point, the original point at or after it.
+    """
+    step = np.diff(strokes.arc, prepend=0)
+    step[strokes.start[:-1]] = 0
+    step[1:][~(near_suspect[1:] | near_suspect[:-1])] = 0
+    counts = np.ceil(step / (SAMPLE_STEP * strokes.spacing)).clip(1, 1000).astype(np.int64)
+    return strokes.subdivided(counts), np.repeat(np.arange(len(counts)), counts)
+
+
+def _too_close(
+    mesh: TangentMesh, refined: Strokes, suspect: np.ndarray, length: np.ndarray
+) -> np.ndarray:
+    """Return (m,) bool: the points of refined strokes to remove.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    refined : Strokes
+        m points in all.
+    suspect : (m,) bool ndarray
+        The points that are compared with all others.
+    length : (S,) float64 ndarray
+        Lengths of the strokes, in world space.
+    """
+    arc, stroke, spacing = refined.arc, refined.stroke, refined.spacing
+    grid = PointGrid(1.01 * MIN_SEPARATION * float(np.median(spacing)), len(stroke))
+    grid.add(refined.points)
+    query = np.flatnonzero(suspect)
+    point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
+    point = query[point]
+    arc_gap = refined.arc_distance(point, other)
+    distinct = (stroke[point] != stroke[other]) | (arc_gap > MIN_SELF_ARC * spacing[point])
+    point, other = point[distinct], other[distinct]
+    normal_a, normal_b = refined.normal[point], refined.normal[other]
+    normal_sum, delta = normal_a + normal_b, refined.points[point] - refined.points[other]
+    same_family = dot(normal_a, normal_b) > MIN_NORMAL_COSINE
+    same_family &= dot(delta, normal_sum) ** 2 <= MAX_SLOPE**2 * dot(delta, delta) * dot(
+        normal_sum, normal_sum
+    )
+    member_a = mesh.transport_to_normal(refined.triangle[point], refined.member[point], normal_a)
+    member_b = mesh.transport_to_normal(refined.triangle[other], refined.member[other], normal_b)
+    # At sharp bends, the result depends on how directions are compared. Accept a match by transport
+    # or by projection along the mean normal.
+    mean_normal = normalize(normal_sum)
+    members = refined.member[point], refined.member[other]
+    projected = [
+        normalize(member - dot(member, mean_normal)[:, None] * mean_normal) for member in members
+    ]
+    same_family &= mesh.is_same_family(
+        member_a, normal_a, member_b, normal_b, FAMILY_TOLERANCE
+    ) | mesh.is_same_family(projected[0], mean_normal, projected[1], mean_normal, FAMILY_TOLERANCE)
+    point, other = point[same_family], other[same_family]
+    # Cut the shorter stroke, or within one stroke the point that is nearer to an end.
+    end_distance = np.minimum(arc, length[stroke] - arc)
+    priority = np.where(stroke[point] == stroke[other], end_distance[point], length[stroke[point]])
+    other_priority = np.where(
+        stroke[point] == stroke[other], end_distance[other], length[stroke[other]]
+    )
+    yields = (priority < other_priority) | ((priority == other_priority) & (point > other))
+    rejected = np.zeros(len(stroke), dtype=bool)
+    rejected[np.where(yields, point, other)] = True
+    return rejected
+
+
+def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
+    """Widen the removed stretches to a minimum length.
+
+    Otherwise the parts of a stroke on both sides of a stretch could be too near to each other.
+
+    Returns
+    -------
+    (m,) bool ndarray
+    """
+    arc, stroke = refined.arc, refined.stroke
+    stride = 2 * (float(arc.max()) + float(refined.spacing.max()))
+    key = stroke * stride + arc
+    transitions = np.diff(np.concatenate([[0], (removed * (stroke + 1)), [0]]))
+    changes = np.flatnonzero(transitions)
+    # A stretch at the end of a stroke and one at the start of the next share one change.
+    first = changes[removed[np.minimum(changes, len(removed) - 1)] & (changes < len(removed))]
+    last = changes[(changes > 0) & removed[np.maximum(changes - 1, 0)]] - 1
+    min_extent = (MIN_SEPARATION + 2 * SAMPLE_STEP) * refined.spacing[first]
+    padding = np.maximum(min_extent - (arc[last] - arc[first]), 0) / 2
+    low = np.searchsorted(key, key[first] - padding)
+    high = np.searchsorted(key, key[last] + padding, side="right")
+    coverage = np.zeros(len(removed) + 1, dtype=np.int64)
+    np.add.at(coverage, low, 1)
+    np.add.at(coverage, high, -1)
+    return np.cumsum(coverage[:-1]) > 0
+
+
+def _run_owner(strokes: Strokes, kept: np.ndarray) -> np.ndarray:
+    """Return the stroke of each run that `Strokes.runs_where(kept)` returns."""
+    stroke = strokes.stroke
+    starts_run = kept.copy()
+    starts_run[1:] &= ~kept[:-1] | (stroke[1:] != stroke[:-1])
+    run = np.cumsum(starts_run) - 1
+    return stroke[starts_run][np.bincount(run[kept], minlength=int(starts_run.sum())) >= 2]

@@ -1,0 +1,248 @@
+"""Spacing of strokes at vertices: by pixels of a camera, foreshortening, tone and curvature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from ..color import REC709_LUMINANCE
+from ..errors import RosyError
+from ..field.frames import dot, normalize
+from ..field.generate import compute_magnitude
+from ..field.surface import Surface, sum_per_fan
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from .stroke_set import Strokes
+from .visibility import pixel_size
+
+#: Largest and smallest factor by which tone and curvature change a spacing.
+MAX_SPACING_RATIO, MIN_SPACING_RATIO = 3.0, 0.5
+
+#: Strokes end where the tone reduces their width to this fraction.
+MIN_STROKE_WIDTH = 0.12
+
+#: Smallest cosine between the normal and the direction to the camera for which the spacing grows.
+MIN_FACING_COSINE = 1 / 3
+
+#: Luminance of linear red, green and blue, in double precision.
+LUMINANCE_WEIGHTS = np.array(REC709_LUMINANCE)
+
+
+class LightSource(Protocol):
+    """A light in camera space.
+
+    Attributes
+    ----------
+    kind : {"sun", "point"}
+    vector : (3,) ndarray
+        Unit direction to a sun, or position of a point light.
+    colour : (3,) ndarray
+        Linear RGB.
+    strength : float
+        Radiance of a white surface that faces the light; for a point light, at distance 1.
+    """
+
+    kind: str
+    vector: np.ndarray
+    colour: np.ndarray
+    strength: float
+
+
+def pixel_spacing(instance: MeshInstance, camera: Camera, pixels: float) -> np.ndarray:
+    """Return (V,) float64: the lengths in world space of a number of pixels at the vertices.
+
+    Raises
+    ------
+    RosyError
+        If `pixels` is not finite or not above 0.
+    """
+    if not (np.isfinite(pixels) and pixels > 0):
+        raise RosyError(f"a spacing of {pixels:g} pixels is not above 0")
+    return pixels * pixel_size(instance.world_points(), camera)
+
+
+def spacing_by_foreshortening(
+    instance: MeshInstance, camera: Camera, spacing: np.ndarray
+) -> np.ndarray:
+    """Widen the spacing where the surface turns away from the camera, to keep the density even.
+
+    Let c be the cosine between the normal and the direction to the camera. The visible area of the
+    surface is c times its area. Lines on it appear between c and 1 times as long, and (1 + c) / 2
+    times on average over their directions. So the spacing grows by (1 + c) / (2 c).
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    camera : Camera
+    spacing : (V,) ndarray
+        Spacing for a surface that faces the camera, in world space.
+
+    Returns
+    -------
+    (V,) float64 ndarray
+    """
+    to_eye = camera.view_directions(instance.world_points())
+    cosine = np.maximum(
+        np.maximum(lambert_tone(instance, to_eye), lambert_tone(instance, -to_eye)),
+        MIN_FACING_COSINE,
+    )
+    return spacing * (1 + cosine) / (2 * cosine)
+
+
+def spacing_by_tone(
+    spacing: np.ndarray | float, tone: np.ndarray, max_ratio: float = MAX_SPACING_RATIO
+) -> np.ndarray:
+    """Divide the spacing by the darkness, 1 - tone.
+
+    The fraction of the paper that is covered with ink is the width of strokes over their spacing.
+
+    Parameters
+    ----------
+    spacing : float or ndarray
+        Spacing where the tone is black.
+    tone : ndarray
+        Tones at vertices or faces, from 0 (black) to 1 (white).
+    max_ratio : float
+        Largest factor of the spacing.
+
+    Returns
+    -------
+    ndarray
+        As many spacings as tones.
+
+    Raises
+    ------
+    RosyError
+        If a tone is not finite.
+    """
+    tone = np.asarray(tone, dtype=np.float64)
+    if not np.isfinite(tone).all():
+        raise RosyError("a tone is not a number")
+    ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
+    return np.asarray(spacing) / ink
+
+
+def spacing_by_curvature(
+    surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
+) -> np.ndarray:
+    """Divide the spacing by a power of the curvature, relative to its median.
+
+    Parameters
+    ----------
+    surface : Surface
+    spacing : float or (V,) ndarray
+    exponent : float
+        The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
+        The factor is limited to `MIN_SPACING_RATIO` and `MAX_SPACING_RATIO`.
+
+    Returns
+    -------
+    (V,) float64 ndarray
+    """
+    curvature = compute_magnitude(surface, "curvature")
+    corner = surface.corner_vertex
+    count = np.bincount(corner, minlength=len(surface.vertices))
+    vertex_curvature = np.bincount(corner, curvature[surface.corner_face], len(surface.vertices))
+    vertex_curvature = vertex_curvature / np.maximum(count, 1)
+    median = float(np.median(vertex_curvature[count > 0]))
+    relative = np.maximum(vertex_curvature, 1e-3 * max(median, 1e-9)) / max(median, 1e-9)
+    return np.asarray(spacing) * np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
+
+
+def headlight_tone(instance: MeshInstance, camera: Camera) -> np.ndarray:
+    """Return the (V,) tones of a matte surface that is lit from the camera, 1 where it faces it."""
+    return lambert_tone(instance, camera.view_directions(instance.world_points()))
+
+
+def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSource]) -> np.ndarray:
+    """Return the tones of a matte surface under several lights, without shadows.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    camera : Camera
+        Camera whose space the lights are in.
+    lights : sequence of LightSource
+        If there are none, the result is that of `headlight_tone`.
+
+    Returns
+    -------
+    (V,) float64 ndarray
+        From 0 to 1.
+    """
+    if not lights:
+        return headlight_tone(instance, camera)
+    rotation = camera.view[:3, :3]
+    tone = np.zeros(len(instance.surface.vertices))
+    for light in lights:
+        strength = light.strength * float(LUMINANCE_WEIGHTS @ light.colour)
+        if light.kind == "sun":
+            tone += strength * lambert_tone(instance, rotation.T @ light.vector)
+            continue
+        to_light = rotation.T @ (light.vector - camera.view[:3, 3]) - instance.world_points()
+        tone += (
+            strength / np.maximum(dot(to_light, to_light), 1e-12) * lambert_tone(instance, to_light)
+        )
+    return np.minimum(tone, 1)
+
+
+def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
+    """Return the (V,) tones of a matte surface: the cosines between normals and light, 0 to 1.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    to_light : (3,) or (V, 3) array_like
+        Directions to the light in world space, of any length.
+    """
+    matrix = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    surface = instance.surface
+    cofactors = np.array([np.cross(matrix[k - 2], matrix[k - 1]) for k in range(3)])
+    fan_normal = sum_per_fan(surface.corner_normal, surface.corner_vertex)
+    normal = np.zeros_like(surface.vertices)
+    normal[: len(fan_normal)] = fan_normal @ cofactors.T
+    return np.clip(
+        dot(normalize(normal), normalize(np.broadcast_to(to_light, normal.shape) + 0.0)), 0, 1
+    )
+
+
+def weight_by_tone(
+    strokes: Strokes, tone: np.ndarray, layering: float, max_ratio: float = MAX_SPACING_RATIO
+) -> Strokes:
+    """Fade in families one after another as the tone gets darker; remove strokes in the lightest.
+
+    The width of the first family begins to fall at the tone at which `spacing_by_tone` reaches its
+    largest factor. So the ink coverage falls continuously to zero.
+
+    Parameters
+    ----------
+    strokes : Strokes
+        As they were traced.
+    tone : (n,) ndarray
+        Tones at the points of strokes, from 0 to 1; see `values_at_points`.
+    layering : float
+        Difference in darkness between the beginnings of successive families.
+    max_ratio : float
+        As in `spacing_by_tone`.
+
+    Returns
+    -------
+    Strokes
+        With smaller widths, cut where these fall to `MIN_STROKE_WIDTH`. Ends at cuts are free.
+    """
+    darkness = 1 - np.clip(tone, 0, 1) - layering * strokes.family[strokes.stroke]
+    weight = np.clip(darkness * max_ratio, 0, 1)
+    thinned = replace(strokes, width=strokes.width * weight)
+    return replace(thinned.runs_where(weight > MIN_STROKE_WIDTH), names=strokes.names)
+
+
+def values_at_points(strokes: Strokes, surface: Surface, values: np.ndarray) -> np.ndarray:
+    """Interpolate (V,) values at vertices to the (n,) points of strokes.
+
+    The strokes need barycentric weights at all points. `clip_to_visible` adds points without them.
+    """
+    vertex = surface.triangle_vertex[strokes.triangle]
+    return np.einsum("nk,nk->n", strokes.weights, np.asarray(values, dtype=np.float64)[vertex])

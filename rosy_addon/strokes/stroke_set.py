@@ -1,0 +1,274 @@
+"""`Strokes`: polylines on a surface as flat arrays; selection, cutting, tapering, subdivision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..field.frames import dot, normalize
+
+#: The attributes of `Strokes` that have a row for each point.
+POINT_COLUMNS = (
+    "points",
+    "face",
+    "triangle",
+    "weights",
+    "normal",
+    "member",
+    "spacing",
+    "width",
+    "opacity",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """S polylines on a surface with n points in all, in world space.
+
+    The points of stroke s are ``start[s] .. start[s + 1] - 1``, two or more. Each segment lies in
+    one face.
+
+    Attributes
+    ----------
+    points : (n, 3) float64 ndarray
+    start : (S + 1,) int64 ndarray
+        Number of the first point of each stroke, then n.
+    family : (S,) int32 ndarray
+        Family of each stroke, from 0. Families are the lines that a field has at a point; for
+        `outline` they are the kinds of line.
+    names : tuple of str
+        Names of the families.
+    face : (n,) int32 ndarray
+        Face of the segment that ends at each point; for a first point, of the segment after it.
+    triangle : (n,) int32 ndarray
+        Triangle of the surface in which the same segment lies; -1 if there is none.
+    weights : (n, 3) float64 ndarray
+        Barycentric coordinates in this triangle; NaN at points that were added later.
+    normal : (n, 3) float64 ndarray
+        Unit shading normals.
+    member : (n, 3) float64 ndarray
+        Unit direction of the stroke along the field; zero for lines that do not follow a field.
+    spacing : (n,) float64 ndarray
+        Required spacing, in world space.
+    width : (n,) float64 ndarray
+        Width as a fraction of the full width, from 0 to 1.
+    opacity : (n,) float64 ndarray
+        From 0 to 1.
+    closed : (S,) bool ndarray
+        Whether the last point is the same as the first.
+    free_ends : (S, 2) bool ndarray or None
+        Whether the line could continue at its first and last point: it is occluded there, its
+        surface ends, or the tone ends it. None is the same as all false.
+    """
+
+    points: np.ndarray
+    start: np.ndarray
+    family: np.ndarray
+    names: tuple[str, ...]
+    face: np.ndarray
+    triangle: np.ndarray
+    weights: np.ndarray
+    normal: np.ndarray
+    member: np.ndarray
+    spacing: np.ndarray
+    width: np.ndarray
+    opacity: np.ndarray
+    closed: np.ndarray
+    free_ends: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        """Return S, the number of strokes."""
+        return len(self.start) - 1
+
+    @property
+    def stroke(self) -> np.ndarray:
+        """(n,) int64: the stroke of each point."""
+        return np.repeat(np.arange(len(self)), np.diff(self.start))
+
+    @property
+    def arc(self) -> np.ndarray:
+        """(n,) float64: arc length from the start of the stroke to each point, in world space."""
+        return arc_lengths(self.points, self.start)
+
+    @property
+    def length(self) -> np.ndarray:
+        """(S,) float64: lengths of the strokes, in world space."""
+        return self.arc[self.start[1:] - 1]
+
+    @property
+    def free_end_mask(self) -> np.ndarray:
+        """(S, 2) bool: `free_ends`, or all false if it is None."""
+        return np.zeros((len(self), 2), dtype=bool) if self.free_ends is None else self.free_ends
+
+    def arc_distance(self, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
+        """Return (m,) float64: the distances along strokes between pairs of points, in world space.
+
+        On a closed stroke it is the shorter of the two ways. It is infinite if the points are on
+        different strokes.
+        """
+        arc, stroke = self.arc, self.stroke
+        direct = np.abs(arc[point_a] - arc[point_b])
+        around = np.where(self.closed, self.length, np.inf)[stroke[point_a]] - direct
+        return np.where(
+            stroke[point_a] == stroke[point_b], np.minimum(direct, np.abs(around)), np.inf
+        )
+
+    def select(self, selection: np.ndarray) -> Strokes:
+        """Return some strokes, selected by number, in that order, or by an (S,) bool mask."""
+        selection = np.asarray(selection)
+        selection = np.flatnonzero(selection) if selection.dtype == bool else selection
+        count = np.diff(self.start)[selection]
+        start = np.concatenate([[0], np.cumsum(count)])
+        point = np.arange(start[-1]) + np.repeat(self.start[:-1][selection] - start[:-1], count)
+        return replace(
+            self._take_points(point),
+            start=start,
+            family=self.family[selection],
+            closed=self.closed[selection],
+            free_ends=self.free_end_mask[selection],
+        )
+
+    def _take_points(self, point: np.ndarray) -> Strokes:
+        """Return a copy with only some points. The caller has to replace `start` as well."""
+        return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
+
+    def runs_where(
+        self,
+        kept: np.ndarray,
+        split_labels: np.ndarray | None = None,
+        free_at_removed: np.ndarray | bool = True,
+    ) -> Strokes:
+        """Cut strokes into runs of two or more consecutive points that are kept.
+
+        Parameters
+        ----------
+        kept : (n,) bool ndarray
+        split_labels : (n,) ndarray, optional
+            Strokes are also split between points with different labels.
+        free_at_removed : bool or (n,) bool ndarray
+            Whether the ends of runs next to a removed point are free: one value for all, or one for
+            each removed point.
+
+        Returns
+        -------
+        Strokes
+            Runs of a closed stroke are open unless all of it is kept.
+        """
+        stroke = self.stroke
+        starts_run = kept.copy()
+        boundary = stroke[1:] != stroke[:-1]
+        if split_labels is not None:
+            boundary |= split_labels[1:] != split_labels[:-1]
+        starts_run[1:] &= ~kept[:-1] | boundary
+        run = np.cumsum(starts_run) - 1
+        count = np.bincount(run[kept], minlength=int(starts_run.sum()))
+        is_long = count >= 2
+        point = np.flatnonzero(kept)
+        point = point[is_long[run[point]]]
+        first = np.flatnonzero(starts_run)[is_long]
+        owner = stroke[first]
+        ends = np.stack([first, first + count[is_long] - 1], axis=1)
+        stroke_ends = np.stack([self.start[owner], self.start[owner + 1] - 1], axis=1)
+        outside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
+        is_whole = count[is_long] == np.diff(self.start)[owner]
+        return replace(
+            self._take_points(point),
+            start=np.concatenate([[0], np.cumsum(count[is_long])]),
+            family=self.family[owner],
+            closed=self.closed[owner] & is_whole,
+            free_ends=np.where(
+                ends == stroke_ends, self.free_end_mask[owner], (free_at_removed & ~kept)[outside]
+            ),
+        )
+
+    def tapered(
+        self, length: float, min_width: float = 0.0, ends: np.ndarray | None = None
+    ) -> Strokes:
+        """Return the strokes with widths that decrease toward their ends.
+
+        Closed strokes are not tapered.
+
+        Parameters
+        ----------
+        length : float
+            Length of the taper in spacings, at most half of the stroke.
+        min_width : float
+            Factor of the width at the ends, from 0 to 1.
+        ends : (S, 2) bool ndarray, optional
+            The ends to taper; by default all.
+        """
+        arc, stroke = self.arc, self.stroke
+        total = self.length[stroke]
+        taper_length = np.minimum(length * self.spacing, total / 2)
+        taper_first, taper_last = (True, True) if ends is None else ends[stroke].T
+        end_distance = np.minimum(
+            np.where(taper_first, arc, np.inf), np.where(taper_last, total - arc, np.inf)
+        )
+        fraction = np.clip(end_distance / np.where(taper_length > 0, taper_length, 1), 0, 1)
+        fraction[self.closed[stroke] | (taper_length <= 0)] = 1
+        smooth = fraction * fraction * (3 - 2 * fraction)
+        return replace(self, width=self.width * (min_width + (1 - min_width) * smooth))
+
+    def subdivided(self, counts: np.ndarray) -> Strokes:
+        """Divide the segment that ends at each point into `counts` equal parts.
+
+        `counts` is (n,); values at first points are ignored. Added points have NaN as weights.
+        """
+        counts = counts.astype(np.int64)
+        counts[self.start[:-1]] = 1
+        last = np.cumsum(counts) - 1
+        point = np.repeat(np.arange(len(counts)), counts)
+        fraction = (np.arange(len(point)) - (last - counts)[point]) / counts[point]
+        before = np.maximum(point - 1, 0)
+
+        def interpolate(values: np.ndarray) -> np.ndarray:
+            weight = fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            return values[before] + weight * (values[point] - values[before])
+
+        repeated = self._take_points(point)
+        # The weights of the previous point may be in another triangle, so they are not
+        # interpolated.
+        return replace(
+            repeated,
+            points=interpolate(self.points),
+            start=np.concatenate([[0], last[self.start[1:] - 1] + 1]),
+            normal=normalize(interpolate(self.normal)),
+            spacing=interpolate(self.spacing),
+            width=interpolate(self.width),
+            opacity=interpolate(self.opacity),
+            weights=np.where((fraction < 1)[:, None], np.nan, repeated.weights),
+        )
+
+    @staticmethod
+    def concatenate(first: Strokes, second: Strokes) -> Strokes:
+        """Return both sets. The families of the second are numbered after those of the first."""
+        free_ends = np.concatenate([first.free_end_mask, second.free_end_mask])
+        return Strokes(
+            points=np.concatenate([first.points, second.points]),
+            start=np.concatenate([first.start, second.start[1:] + first.start[-1]]),
+            family=np.concatenate([first.family, second.family + len(first.names)]),
+            names=first.names + second.names,
+            free_ends=free_ends,
+            **{
+                name: np.concatenate([getattr(first, name), getattr(second, name)])
+                for name in (*POINT_COLUMNS[1:], "closed")
+            },
+        )
+
+
+def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return (n,) float64: the lengths of polylines up to each point.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    start : (S + 1,) ndarray of int
+        As in `Strokes`.
+    """
+    step = np.zeros(len(points))
+    delta = np.diff(points, axis=0)
+    step[1:] = np.sqrt(dot(delta, delta))
+    step[start[:-1]] = 0
+    total = np.cumsum(step)
+    return total - np.repeat(total[start[:-1]], np.diff(start))

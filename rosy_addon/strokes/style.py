@@ -1,0 +1,109 @@
+"""`StrokeStyle`: the settings of strokes, such as spacing, tone, ends and outline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..settings import check_settings, choice, number, switch
+
+
+@dataclass(frozen=True)
+class StrokeStyle:
+    """The settings of strokes, as shown in the panel and accepted on the command line.
+
+    To add a setting, add a field here. `rosy_addon.settings` lists what is derived from it.
+
+    Raises
+    ------
+    RosyError
+        If a value is not allowed.
+    """
+
+    unit: str = choice(
+        "pixels",
+        "Unit of the spacing",
+        {"pixels": "Pixels of the picture", "world": "Blender units on the surface"},
+    )
+    spacing: float = number(
+        8.0,
+        0.5,
+        1e4,
+        "Distance between adjacent strokes of a family in pixels",
+        unit="pixels",
+        applies=lambda style: style.unit == "pixels",
+    )
+    distance: float = number(
+        0.1,
+        1e-6,
+        1e6,
+        "Distance between adjacent strokes of a family in Blender units",
+        unit="length",
+        applies=lambda style: style.unit == "world",
+    )
+    tone: bool = switch(
+        False,
+        "Place strokes closer together where the light is weak, and leave them out where it is "
+        "strong",
+        panel="density",
+    )
+    layering: float = number(
+        0.3,
+        0.0,
+        1.0,
+        "Difference in darkness between the tones at which successive families begin",
+        panel="density",
+        applies=lambda style: style.tone,
+    )
+    light: str = choice(
+        "headlight",
+        "Light source of the tone",
+        {
+            "headlight": "A light at the camera",
+            "lamp": "A lamp above and to the left of the camera",
+            "scene": "The lights of the scene",
+        },
+        panel="density",
+        panel_before="layering",
+        applies=lambda style: style.tone,
+    )
+    curvature: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Amount by which strokes are closer together where the surface is more curved",
+        panel="density",
+    )
+    gaps: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Gap in the lower of two crossing strokes, as a multiple of the spacing",
+        unit="spacings",
+        panel="ends",
+    )
+    taper: float = number(
+        0.8,
+        0.0,
+        1e3,
+        "Length over which strokes get thinner toward their ends, as a multiple of the spacing. "
+        "Ends that meet head on are not tapered",
+        unit="spacings",
+        panel="ends",
+        panel_before="gaps",
+    )
+    overshoot: float = number(
+        0.0,
+        0.0,
+        1e3,
+        "Maximum distance in pixels by which strokes continue past the end of the surface or of "
+        "the shade, or an occluding edge",
+        unit="pixels",
+        panel="ends",
+        panel_before="gaps",
+    )
+    outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
+    hidden: bool = switch(False, "Keep what the camera does not see")
+    cross_creases: bool = switch(False, "Continue strokes across sharp creases", panel="ends")
+
+    def __post_init__(self) -> None:
+        check_settings(self)

@@ -1,0 +1,356 @@
+"""Particles on a tangent mesh: trace many streamlines or geodesics at once.
+
+A particle moves in straight segments, each within one triangle. At an edge, its direction and its
+member are transported to the next triangle by unfolding. A segment has the direction of the field
+at its midpoint (the midpoint rule) and is short enough that the field turns little along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from .tangent_mesh import ZERO_FIELD_RATIO, TangentMesh, nearest_member
+
+#: Largest turn of the field along a segment, in radians, as estimated at its start.
+MAX_TURN_PER_SEGMENT = np.radians(1.0)
+
+#: Largest angle in radians between a segment and the field at its ends, and how often a segment is
+#: tried, each time shorter, to meet this limit.
+MAX_DIRECTION_ERROR, MAX_HALVINGS = np.radians(0.9), 5
+
+#: Segments that a particle may trace in one call of `advance`.
+MAX_SEGMENTS = 32
+
+#: A particle is stuck if the turn of the field limits a segment to less than this fraction of the
+#: requested length.
+MIN_SEGMENT_RATIO = 0.004
+
+#: A direction is parallel to an edge if the slope of its barycentric coordinate is below this
+#: fraction of the largest slope.
+PARALLEL_EPS = 1e-9
+
+
+@dataclass(eq=False)
+class SurfaceParticles:
+    """The positions and directions of n particles.
+
+    Attributes
+    ----------
+    triangle : (n,) int32 ndarray
+    weights : (n, 3) float64 ndarray
+        Barycentric coordinates in the triangle.
+    member : (n,) complex128 ndarray
+        Unit member that the particle follows, in the frame of the triangle.
+    sign : (n,) float64 ndarray
+        1 to move along the direction of the member, -1 to move against it.
+    """
+
+    triangle: np.ndarray
+    weights: np.ndarray
+    member: np.ndarray
+    sign: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    def take(self, indices: np.ndarray) -> SurfaceParticles:
+        """Return a copy of some particles."""
+        return SurfaceParticles(*(getattr(self, entry.name)[indices] for entry in fields(self)))
+
+    def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
+        """Overwrite the particles at `indices` with those of `source`."""
+        for entry in fields(self):
+            getattr(self, entry.name)[indices] = getattr(source, entry.name)
+
+    @staticmethod
+    def concatenate(first: SurfaceParticles, second: SurfaceParticles) -> SurfaceParticles:
+        """Return both sets, one after the other."""
+        return SurfaceParticles(
+            *(
+                np.concatenate([getattr(first, entry.name), getattr(second, entry.name)])
+                for entry in fields(SurfaceParticles)
+            )
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class TracedPath:
+    """The m segments that particles have traced, in the order in which they were traced.
+
+    Attributes
+    ----------
+    particle : (m,) intp ndarray
+        Number of the particle.
+    triangle : (m,) int32 ndarray
+        Triangle of the segment.
+    begin_weights, end_weights : (m, 3) float64 ndarray
+        Barycentric coordinates of its ends in this triangle.
+    direction : (m,) complex128 ndarray
+        Unit direction in the frame of this triangle.
+    """
+
+    particle: np.ndarray
+    triangle: np.ndarray
+    begin_weights: np.ndarray
+    end_weights: np.ndarray
+    direction: np.ndarray
+
+
+def advance(
+    mesh: TangentMesh,
+    particles: SurfaceParticles,
+    length: np.ndarray,
+    steering: np.ndarray | None = None,
+) -> tuple[SurfaceParticles, np.ndarray, np.ndarray, TracedPath]:
+    """Move particles along the field.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    particles : SurfaceParticles
+    length : (n,) float64 ndarray
+        Length to move, in world space.
+    steering : (n,) float64 ndarray, optional
+        Small angles in radians that are added to the direction of the field, counter-clockwise.
+
+    Returns
+    -------
+    particles : SurfaceParticles
+        The particles after the move.
+    walked : (n,) float64 ndarray
+        Length that was moved. It is less than requested if a particle ended, or after
+        `MAX_SEGMENTS` segments.
+    ended : (n,) bool ndarray
+        Whether the particle cannot continue: at a border, at a crease or at a zero of the field.
+    path : TracedPath
+    """
+    result = particles.take(np.arange(len(particles)))
+    remaining = length.astype(np.float64).copy()
+    ended = np.zeros(len(particles), dtype=bool)
+    active = np.arange(len(particles))
+    steering_rotation = np.exp(1j * (np.zeros(len(particles)) if steering is None else steering))
+    segments: list[tuple[np.ndarray, ...]] = []
+    for _ in range(MAX_SEGMENTS):
+        if not len(active):
+            break
+        current = result.take(active)
+        new_weights, direction, member, edge, step, stuck = _next_segment(
+            mesh, current, remaining[active], length[active], steering_rotation[active]
+        )
+        segments.append(
+            tuple(
+                column[~stuck]
+                for column in (active, current.triangle, current.weights, new_weights, direction)
+            )
+        )
+        current.weights, current.member = new_weights, member
+        remaining[active] -= step
+        stopped = stuck | _cross_edges(mesh, current, edge)
+        result.assign(active[~stuck], current.take(~stuck))
+        ended[active[stopped]] = True
+        active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
+    columns = [np.concatenate(column) for column in zip(*segments, strict=True)]
+    return result, length - remaining, ended, TracedPath(*columns)
+
+
+def trace_geodesics(
+    mesh: TangentMesh, particles: SurfaceParticles, direction: np.ndarray, length: np.ndarray
+) -> tuple[SurfaceParticles, np.ndarray]:
+    """Move particles along straight geodesics, and transport their members.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    particles : SurfaceParticles
+    direction : (n,) complex128 ndarray
+        Unit directions in the frames of their triangles.
+    length : (n,) float64 ndarray
+        Length to move, in world space.
+
+    Returns
+    -------
+    particles : SurfaceParticles
+        The particles after the move. Their members are those of the field that are nearest to the
+        transported ones; 0 where the field is zero.
+    walked : (n,) float64 ndarray
+        Length that was moved. It is less than requested at borders and creases.
+    """
+    result = particles.take(np.arange(len(particles)))
+    direction = direction.copy()
+    remaining = length.astype(np.float64).copy()
+    active = np.arange(len(particles))
+    for _ in range(8 * MAX_SEGMENTS):
+        if not len(active):
+            break
+        current, current_direction = result.take(active), direction[active]
+        slope = _barycentric_slopes(mesh, current.triangle, current_direction)
+        edge_distance, edge = _distance_to_edge(mesh, current, slope)
+        step = np.minimum(edge_distance, remaining[active])
+        edge = np.where(edge_distance <= remaining[active], edge, -1)
+        current.weights = _moved_weights(current.weights, slope, step)
+        remaining[active] -= step
+        rotation = np.ones(len(active), dtype=np.complex128)
+        stopped = _cross_edges(mesh, current, edge, rotation)
+        result.assign(active, current)
+        direction[active] = current_direction * rotation
+        active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
+    result.member = mesh.members_at(result.triangle, result.weights, result.member)
+    return result, length - remaining
+
+
+def _next_segment(
+    mesh: TangentMesh,
+    particles: SurfaceParticles,
+    remaining: np.ndarray,
+    length: np.ndarray,
+    steering_rotation: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Compute one segment for each particle.
+
+    Returns
+    -------
+    new_weights : (n, 3) float64 ndarray
+        Barycentric coordinates of the end of the segment.
+    direction, member : (n,) complex128 ndarray
+        Direction of the segment, and the member at its midpoint.
+    edge : (n,) int64 ndarray
+        The edge that was reached, or -1.
+    step : (n,) float64 ndarray
+        Length of the segment, in world space.
+    stuck : (n,) bool ndarray
+        Whether there is no segment, as the field is zero or turns too fast.
+    """
+    corner_z = mesh.z[particles.triangle]
+    z = np.einsum("nk,nk->n", particles.weights, corner_z)
+    scale = np.abs(corner_z).max(axis=1)
+    stuck = np.abs(z) <= ZERO_FIELD_RATIO * scale
+    member = nearest_member(particles.member, np.where(stuck, 1, z), mesh.degree)
+    rotation = particles.sign * steering_rotation
+    direction = rotation * mesh.directions_at(particles.triangle, particles.weights, member)
+    slope = _barycentric_slopes(mesh, particles.triangle, direction)
+    edge_distance, _ = _distance_to_edge(mesh, particles, slope)
+    turn_rate = np.abs((np.einsum("nk,nk->n", slope, corner_z) * z.conj()).imag)
+    norm_squared = z.real**2 + z.imag**2
+    max_step = np.where(
+        turn_rate > 0,
+        MAX_TURN_PER_SEGMENT * mesh.degree * norm_squared / np.where(turn_rate > 0, turn_rate, 1),
+        np.inf,
+    )
+    stuck |= max_step < MIN_SEGMENT_RATIO * length
+    step, new_weights, edge = (
+        np.zeros(len(remaining)),
+        particles.weights.copy(),
+        np.full(len(remaining), -1),
+    )
+    pending = np.flatnonzero(~stuck)
+    for _ in range(MAX_HALVINGS):
+        trial = particles.take(pending)
+        z = corner_z[pending]
+        allowed = np.minimum(remaining, max_step)[pending]
+        midpoint = _moved_weights(
+            trial.weights, slope[pending], 0.5 * np.minimum(edge_distance[pending], allowed)
+        )
+        mid_member = nearest_member(
+            member[pending], np.einsum("nk,nk->n", midpoint, z), mesh.degree
+        )
+        mid_direction = rotation[pending] * mesh.directions_at(trial.triangle, midpoint, mid_member)
+        mid_slope = _barycentric_slopes(mesh, trial.triangle, mid_direction)
+        mid_edge_distance, mid_edge = _distance_to_edge(mesh, trial, mid_slope)
+        walked = np.minimum(mid_edge_distance, allowed)
+        end_weights = _moved_weights(trial.weights, mid_slope, walked)
+        end_member = nearest_member(mid_member, np.einsum("nk,nk->n", end_weights, z), mesh.degree)
+        cosine = np.minimum(
+            (end_member * mid_member.conj()).real, (member[pending] * mid_member.conj()).real
+        )
+        accepted = cosine >= np.cos(MAX_DIRECTION_ERROR)
+        done = pending[accepted]
+        step[done], new_weights[done], direction[done] = (
+            walked[accepted],
+            end_weights[accepted],
+            mid_direction[accepted],
+        )
+        edge[done] = np.where(mid_edge_distance <= allowed, mid_edge, -1)[accepted]
+        member[done] = mid_member[accepted]
+        pending = pending[~accepted]
+        if not len(pending):
+            break
+        # The field turns more than estimated. Try a shorter segment.
+        max_step[pending] = 0.5 * walked[~accepted]
+    stuck[pending] = True
+    return new_weights, direction, member, edge, step, stuck
+
+
+def _barycentric_slopes(
+    mesh: TangentMesh, triangle: np.ndarray, direction: np.ndarray
+) -> np.ndarray:
+    """Return the (n, 3) derivatives of the barycentric coordinates along unit directions."""
+    gradient = mesh.gradient[triangle]
+    return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]
+
+
+def _distance_to_edge(
+    mesh: TangentMesh, particles: SurfaceParticles, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the (n,) distances to the boundary of the triangle, and the (n,) edges there."""
+    decreasing = slope < -PARALLEL_EPS * np.abs(slope).max(axis=1, keepdims=True)
+    distances = np.where(decreasing, particles.weights / np.where(decreasing, -slope, 1), np.inf)
+    edge = np.argmin(distances, axis=1)
+    return np.take_along_axis(distances, edge[:, None], 1)[:, 0], edge
+
+
+def _moved_weights(weights: np.ndarray, slope: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Return the (n, 3) barycentric coordinates after a step, kept within the triangle."""
+    weights = np.maximum(weights + slope * step[:, None], 0)
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def _cross_edges(
+    mesh: TangentMesh,
+    particles: SurfaceParticles,
+    edge: np.ndarray,
+    rotation: np.ndarray | None = None,
+) -> np.ndarray:
+    """Move particles across the edges that they have reached, in place.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    particles : SurfaceParticles
+    edge : (n,) ndarray of int
+        The edge that each particle has reached, or -1.
+    rotation : (n,) complex128 ndarray, optional
+        Set to the transport across the edge for particles that cross one.
+
+    Returns
+    -------
+    (n,) bool ndarray
+        Whether the particle is stopped at a border or a crease.
+    """
+    reached = np.flatnonzero(edge >= 0)
+    stopped = np.zeros(len(edge), dtype=bool)
+    triangle, k = particles.triangle[reached], edge[reached]
+    neighbor = mesh.neighbor[triangle, k]
+    stopped[reached[neighbor < 0]] = True
+    crosses = neighbor >= 0
+    reached, triangle, k, neighbor = (
+        reached[crosses],
+        triangle[crosses],
+        k[crosses],
+        neighbor[crosses],
+    )
+    j = mesh.neighbor_edge[triangle, k].astype(np.intp)
+    transport = mesh.edge_transport[triangle, k]
+    weights = particles.weights[reached]
+    row = np.arange(len(reached))
+    new_weights = np.zeros_like(weights)
+    # Neighboring triangles have opposite directions along their common edge.
+    new_weights[row, (j + 1) % 3] = weights[row, (k + 2) % 3]
+    new_weights[row, (j + 2) % 3] = weights[row, (k + 1) % 3]
+    particles.weights[reached] = new_weights / new_weights.sum(axis=1, keepdims=True)
+    particles.triangle[reached] = neighbor
+    particles.member[reached] *= transport
+    if rotation is not None:
+        rotation[reached] = transport
+    return stopped

@@ -1,0 +1,426 @@
+"""`TangentMesh`: triangles with tangent frames, the field at their corners, and transport at edges.
+
+Streamlines are traced on this mesh. The field is the same as in pictures: `projection.corner_field`
+computes it at the corners, and the representation z is interpolated linearly in the plane of each
+triangle. Tangents are complex numbers in the frame of their triangle. At an edge, they are
+transported by unfolding the two triangles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..field.directional_field import evaluate_harmonics, field_symmetry
+from ..field.frames import dot, normalize, transport
+from ..field.representation import power, signed_power
+from ..field.surface import build_edges
+from ..progress import run_to_completion
+from ..projection.corner_field import cached_corner_field_task, rotation_order
+from ..projection.gbuffer import MeshInstance
+
+#: An edge across which normals are not interpolated is a crease if the normals of its triangles
+#: differ by at least this angle, in radians.
+CREASE_ANGLE = np.radians(30)
+
+#: The area of a triangle is set to 0 if it is below this fraction of its squared longest edge; the
+#: edges at the first corner are compared.
+MIN_AREA_RATIO = 1e-9
+
+#: The representation counts as zero where its magnitude is below this fraction of the largest one
+#: at the corners of the triangle.
+ZERO_FIELD_RATIO = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class TangentMesh:
+    """T triangles in world space and the field on them.
+
+    Edge k of a triangle is opposite to its corner k. The frame of a triangle is x and
+    y = normal cross x.
+
+    Attributes
+    ----------
+    degree : int
+        N of the field.
+    family_count : int
+        Number of lines M through a point: N, or N/2 if each direction has an opposite one.
+    points : (T, 3, 3) float64 ndarray
+        Corners.
+    x, y, normal : (T, 3) float64 ndarray
+        Unit tangent frames, and unit normals from the order of the corners.
+    corner_normal : (T, 3, 3) float64 ndarray
+        Shading normals at the corners.
+    face : (T,) int32 ndarray
+        Face of the surface.
+    gradient : (T, 3) complex128 ndarray
+        Gradients of the barycentric coordinates, in the frame.
+    z : (T, 3) complex128 ndarray
+        Representation of the field at the corners, in the frame.
+    harmonics : tuple of (int, (T, 3) complex128 ndarray)
+        For fields of free directions: pairs of j and C_j (see `field.directional_field`). Empty for
+        a RoSy field.
+    family_z : (T,) complex128 ndarray or None
+        For fields whose stored member is on the same line everywhere: the representation of that
+        line, of degree N / M. None for other fields.
+    neighbor : (T, 3) int32 ndarray
+        Triangle across edge k; -1 where strokes stop.
+    neighbor_edge : (T, 3) int8 ndarray
+        The number of that edge in the neighbor.
+    edge_transport : (T, 3) complex128 ndarray
+        Unit factors that transport tangents from the frame of the triangle to that of the neighbor.
+    area : (T,) float64 ndarray
+        World space; 0 for degenerate triangles.
+    triangle_vertex : (T, 3) int32 ndarray
+        Vertices of the surface.
+    """
+
+    degree: int
+    family_count: int
+    points: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    normal: np.ndarray
+    corner_normal: np.ndarray
+    face: np.ndarray
+    gradient: np.ndarray
+    z: np.ndarray
+    harmonics: tuple[tuple[int, np.ndarray], ...]
+    family_z: np.ndarray | None
+    neighbor: np.ndarray
+    neighbor_edge: np.ndarray
+    edge_transport: np.ndarray
+    area: np.ndarray
+    triangle_vertex: np.ndarray
+
+    @property
+    def is_directed(self) -> bool:
+        """Whether opposite members are on different lines, although N is even."""
+        return self.degree % 2 == 0 and self.family_count == self.degree
+
+    def points_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return the (n, 3) points at (n, 3) barycentric coordinates."""
+        return np.einsum("nk,nki->ni", weights, self.points[triangle])
+
+    def weights_at(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return the (n, 3) barycentric coordinates of points in triangles.
+
+        Points outside their triangle get coordinates on its boundary.
+        """
+        delta = points - self.points[triangle, 0]
+        planar = dot(delta, self.x[triangle]) + 1j * dot(delta, self.y[triangle])
+        weights = (self.gradient[triangle] * planar.conj()[:, None]).real
+        weights[:, 0] += 1
+        weights = np.maximum(weights, 0)
+        return weights / weights.sum(axis=1, keepdims=True)
+
+    def shading_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return the (n, 3) interpolated unit normals."""
+        return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
+
+    def to_world(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+        """Convert (n,) complex tangents in the frames of triangles to (n, 3) vectors."""
+        return tangent.real[:, None] * self.x[triangle] + tangent.imag[:, None] * self.y[triangle]
+
+    def transport_to_normal(
+        self, triangle: np.ndarray, tangent: np.ndarray, normal: np.ndarray
+    ) -> np.ndarray:
+        """Transport (n, 3) tangents from the planes of triangles to unit normals."""
+        return transport(tangent, self.normal[triangle], normal)
+
+    def members_at(
+        self, triangle: np.ndarray, weights: np.ndarray, reference: np.ndarray
+    ) -> np.ndarray:
+        """Return (n,) complex128: the unit member nearest to a unit tangent; 0 where z is 0."""
+        z = np.einsum("nk,nk->n", weights, self.z[triangle])
+        return nearest_member(reference, z, self.degree)
+
+    def is_same_family(
+        self,
+        member_a: np.ndarray,
+        normal_a: np.ndarray,
+        member_b: np.ndarray,
+        normal_b: np.ndarray,
+        tolerance: float = 0.0,
+    ) -> np.ndarray:
+        """Return (n,) bool: whether members at two points belong to the same line.
+
+        One member is transported to the normal of the other. They belong to the same line if the
+        angle between them is less than half the angle between two lines, plus a tolerance.
+
+        Parameters
+        ----------
+        member_a, member_b : (n, 3) ndarray
+            Unit members.
+        normal_a, normal_b : (n, 3) ndarray
+            Unit normals, perpendicular to the members.
+        tolerance : float
+            In radians.
+        """
+        cosine = dot(member_a, member_b) - dot(member_a, normal_b) * dot(
+            normal_a, member_b
+        ) / np.maximum(1 + dot(normal_a, normal_b), 1e-12)
+        if self.is_directed:
+            return cosine > np.cos(np.pi / self.degree + tolerance)
+        return np.abs(cosine) > np.cos(np.pi / (2 * self.family_count) + tolerance)
+
+    def directions_at(
+        self, triangle: np.ndarray, weights: np.ndarray, member: np.ndarray
+    ) -> np.ndarray:
+        """Return (n,) complex128: the unit direction of a member. For a RoSy it is the member."""
+        if not self.harmonics:
+            return member
+        harmonics = [
+            (j, np.einsum("nk,nk->n", weights, values[triangle])) for j, values in self.harmonics
+        ]
+        direction = member * evaluate_harmonics(harmonics, member)
+        norm = np.abs(direction)
+        return np.divide(direction, norm, out=member.copy(), where=norm > 0)
+
+
+def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndarray:
+    """Return (n,) complex128: the unit member of z nearest to a unit tangent; 0 where z is 0."""
+    angle = np.angle(z * power(reference, degree).conj()) / degree
+    return np.where(z != 0, reference * np.exp(1j * angle), 0)
+
+
+def build_tangent_mesh(
+    instance: MeshInstance,
+    *,
+    display: str = "smooth",
+    cross_creases: bool = False,
+    crease_angle: float = CREASE_ANGLE,
+    cache: Cache | None = None,
+) -> TangentMesh:
+    """Build the tangent mesh of a mesh instance.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+        With a field.
+    display : {"smooth", "flat"}
+        Whether the field is interpolated, or constant on each face.
+    cross_creases : bool
+        If true, strokes continue across creases along the nearest member. Otherwise they stop.
+    crease_angle : float
+        Smallest angle between the normals of the triangles at a crease, in radians.
+    cache : Cache, optional
+        Cache for corner fields.
+
+    Returns
+    -------
+    TangentMesh
+
+    Raises
+    ------
+    RosyError
+        If there is no field, the field has another number of faces, or it is zero on all triangles
+        with an area.
+    """
+    surface, field = instance.surface, instance.field
+    if field is None:
+        raise RosyError(f"{surface.name}: there is no field to draw strokes of")
+    if len(field.vectors) != surface.face_count:
+        raise RosyError(
+            f"{surface.name}: its field has {len(field.vectors)} vectors for "
+            f"{surface.face_count} faces"
+        )
+    carried = run_to_completion(
+        cached_corner_field_task(surface, instance.matrix, field, display, cache)
+    )
+    matrix = np.asarray(instance.matrix, dtype=np.float64)
+    vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    points = vertices[surface.triangle_vertex]
+    normal, x, y, area = _triangle_frames(points)
+    corner_normal = carried.corner_normals.astype(np.float64).transpose(2, 0, 1)
+    rotations = _rotations_to_planes(
+        carried.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
+    )
+    z = carried.representation.T.astype(np.complex128) * power(rotations, field.degree)
+    z *= (area > 0)[:, None]
+    if not z.any():
+        raise RosyError(f"{surface.name}: its field is zero all over")
+    harmonics, family_z = [], None
+    for trait, values in carried.channels.items():
+        values = values.T * signed_power(rotations, rotation_order(trait, field.degree))
+        if trait[0] == "deviation":
+            harmonics.append((trait[1], values))
+        else:
+            family_z = values.sum(axis=1)
+    neighbor, neighbor_edge, edge_transport = _adjacency(
+        surface, points, x, y, normal, (z != 0).any(axis=1), None if cross_creases else crease_angle
+    )
+    return TangentMesh(
+        degree=field.degree,
+        family_count=field_symmetry(field).line_count,
+        points=points,
+        x=x,
+        y=y,
+        normal=normal,
+        corner_normal=corner_normal,
+        face=surface.triangle_face,
+        gradient=_barycentric_gradients(points, x, y, area),
+        z=z,
+        harmonics=tuple(harmonics),
+        family_z=family_z,
+        neighbor=neighbor,
+        neighbor_edge=neighbor_edge,
+        edge_transport=edge_transport,
+        area=area,
+        triangle_vertex=surface.triangle_vertex,
+    )
+
+
+def corner_values(mesh: TangentMesh, values: np.ndarray | float, surface_name: str) -> np.ndarray:
+    """Return (T, 3) float64: values at the corners of triangles.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    values : float, or (V,) or (F,) ndarray
+        One value, or one for each vertex or face.
+    surface_name : str
+        For the error message.
+
+    Raises
+    ------
+    RosyError
+        If the number of values is that of neither the vertices nor the faces.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    shape = mesh.triangle_vertex.shape
+    if values.ndim == 0:
+        return np.full(shape, float(values))
+    face_count, vertex_count = int(mesh.face.max()) + 1, int(mesh.triangle_vertex.max()) + 1
+    if values.shape == (face_count,):
+        return np.repeat(values[mesh.face][:, None], 3, axis=1)
+    if values.ndim == 1 and len(values) >= vertex_count:
+        return values[mesh.triangle_vertex]
+    raise RosyError(
+        f"{surface_name}: {values.shape} values are neither one for each of {vertex_count} vertices "
+        f"nor for each of {face_count} faces"
+    )
+
+
+def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the normals, x axes, y axes and areas of triangles.
+
+    x points from the first corner to the second.
+    """
+    edge_a, edge_b = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+    cross = np.cross(edge_a, edge_b)
+    normal = normalize(cross)
+    x = normalize(edge_a)
+    area = np.sqrt(dot(cross, cross)) / 2
+    longest_squared = np.maximum(dot(edge_a, edge_a), dot(edge_b, edge_b))
+    area[area <= MIN_AREA_RATIO * longest_squared] = 0
+    return normal, x, np.cross(normal, x), area
+
+
+def _barycentric_gradients(
+    points: np.ndarray, x: np.ndarray, y: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Return the (T, 3) complex gradients of barycentric coordinates; 0 if there is no area."""
+    planar = np.stack(
+        [
+            dot(points[:, k] - points[:, 0], x) + 1j * dot(points[:, k] - points[:, 0], y)
+            for k in range(3)
+        ],
+        axis=1,
+    )
+    # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
+    edge = planar[:, [2, 0, 1]] - planar[:, [1, 2, 0]]
+    double_area = 2 * area[:, None]
+    return np.divide(1j * edge, double_area, out=np.zeros_like(edge), where=double_area > 0)
+
+
+def _rotations_to_planes(
+    axis: np.ndarray, corner_normal: np.ndarray, normal: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """Return (T, 3) complex128: the reference tangents of corner values, in the triangle's frame.
+
+    `CornerField` stores the values of all corners relative to one tangent at the first corner, to
+    which they were transported. This is undone: the tangent is transported from the first corner to
+    the corner of the value, and from there directly to the plane of the triangle. Then the values
+    along an edge depend only on its two ends.
+
+    Parameters
+    ----------
+    axis : (T, 3) ndarray
+        Unit reference tangent at the first corner.
+    corner_normal : (T, 3, 3) ndarray
+    normal, x, y : (T, 3) ndarray
+        As in `TangentMesh`.
+    """
+    rotations = np.empty((len(axis), 3), dtype=np.complex128)
+    for k in range(3):
+        corner_axis = axis if k == 0 else transport(axis, corner_normal[:, 0], corner_normal[:, k])
+        corner_axis = transport(corner_axis, corner_normal[:, k], normal)
+        rotation = dot(corner_axis, x) + 1j * dot(corner_axis, y)
+        norm = np.abs(rotation)
+        rotations[:, k] = np.divide(rotation, norm, out=np.zeros_like(rotation), where=norm > 0)
+    return rotations
+
+
+def _adjacency(
+    surface,
+    points: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    normal: np.ndarray,
+    defined: np.ndarray,
+    crease_angle: float | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
+
+    Strokes stop at triangles that are not `defined` (T,) and, unless `crease_angle` is None, at
+    creases.
+    """
+    count = len(points)
+    edges = build_edges(
+        surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
+    )
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    triangle_a, triangle_b = a // 3, b // 3
+    passable = defined[triangle_a] & defined[triangle_b]
+    if crease_angle is not None:
+        passable &= ~(
+            is_sharp_edge(surface, a, b)
+            & (dot(normal[triangle_a], normal[triangle_b]) < np.cos(crease_angle))
+        )
+    a, b, triangle_a, triangle_b = (values[passable] for values in (a, b, triangle_a, triangle_b))
+    neighbor = np.full((count, 3), -1, dtype=np.int32)
+    neighbor_edge = np.zeros((count, 3), dtype=np.int8)
+    edge_transport = np.ones((count, 3), dtype=np.complex128)
+    # The edge from corner c to the next is opposite to the corner before c.
+    edge_a, edge_b = (a + 2) % 3, (b + 2) % 3
+    edge_vector = points[triangle_a, (a + 1) % 3] - points[triangle_a, a % 3]
+    edge_in_a = dot(edge_vector, x[triangle_a]) + 1j * dot(edge_vector, y[triangle_a])
+    edge_in_b = dot(edge_vector, x[triangle_b]) + 1j * dot(edge_vector, y[triangle_b])
+    transport = edge_in_b * edge_in_a.conj()
+    norm = np.abs(transport)
+    transport = np.divide(transport, norm, out=np.ones_like(transport), where=norm > 0)
+    neighbor[triangle_a, edge_a], neighbor[triangle_b, edge_b] = triangle_b, triangle_a
+    neighbor_edge[triangle_a, edge_a], neighbor_edge[triangle_b, edge_b] = edge_b, edge_a
+    edge_transport[triangle_a, edge_a], edge_transport[triangle_b, edge_b] = (
+        transport,
+        transport.conj(),
+    )
+    return neighbor, neighbor_edge, edge_transport
+
+
+def is_sharp_edge(surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: whether normals are not interpolated across edges between triangles.
+
+    Parameters
+    ----------
+    surface : Surface
+    a, b : (n,) ndarray of int
+        The corners (3 t + k) at which the edge starts in the triangles on both sides.
+    """
+    fan = surface.corner_fan[surface.triangles].ravel()
+    next_a, next_b = a - a % 3 + (a + 1) % 3, b - b % 3 + (b + 1) % 3
+    return (fan[a] != fan[next_b]) | (fan[next_a] != fan[b])

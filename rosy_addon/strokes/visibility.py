@@ -1,0 +1,265 @@
+"""Visibility of strokes: projection to pixels, and clipping to the frame and by a depth buffer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.frames import dot, normalize
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.rasterizer import rasterize
+from .stroke_set import Strokes, arc_lengths
+
+#: Largest distance between the points of strokes at which visibility is tested, in pixels.
+SAMPLE_STEP_PX = 1.0
+
+#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of the
+#: rasterization.
+MIN_RUN_PX = 2.5
+
+#: A surface hides a point only if it is in front of it by more than this many pixels, as a length
+#: in world space at the depth of the point.
+DEPTH_BIAS_PX = 1.5
+
+#: Largest addition to this bias by the steepness of the surface, in pixels. Steepness is the
+#: tangent of the angle between the normal and the direction to the camera.
+MAX_STEEPNESS = 4.0
+
+
+def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Project points to pixel coordinates.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        World space.
+    camera : Camera
+
+    Returns
+    -------
+    pixels : (n, 2) float64 ndarray
+        Pixel coordinates from the lower left corner; NaN for points that are nearer than the near
+        plane or behind the camera.
+    depth : (n,) float64 ndarray
+        Depth along the axis of the camera.
+    """
+    clip = _to_clip(points, camera)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ndc = clip[:, :2] / clip[:, 3:]
+    pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
+    pixels[(clip[:, 3] <= 0) | (clip[:, 2] < -clip[:, 3])] = np.nan
+    depth_row = camera.view[2]
+    return pixels, -(points @ depth_row[:3] + depth_row[3])
+
+
+def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (n,) float64: the size of a pixel at points, in world space.
+
+    It is measured perpendicular to the axis of the camera, at the depth of the point.
+    """
+    if not camera.is_perspective:
+        return np.full(len(points), 1 / camera.pixels_per_unit)
+    depth_row = camera.view[2]
+    depth = -(points @ depth_row[:3] + depth_row[3])
+    return np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)) / camera.pixels_per_unit
+
+
+def clip_to_visible(
+    strokes: Strokes,
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    *,
+    remove_hidden: bool = True,
+) -> Strokes:
+    """Return the parts of strokes that are in the frame and not hidden.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    instances : sequence of MeshInstance
+        All occluders, with or without a field.
+    camera : Camera
+    remove_hidden : bool
+        If false, strokes are only clipped to the frame.
+
+    Returns
+    -------
+    Strokes
+        With points at most `SAMPLE_STEP_PX` pixels apart. Ends at occluding edges are free, ends at
+        the frame are not.
+
+    Notes
+    -----
+    A point is compared with the triangles that are visible at the four pixel centers around it. It
+    is hidden if the planes of all four are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
+    the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
+    differs from that at the point, by the slope times up to half a pixel. A point is also hidden if
+    it is behind only one of them, but one of the two faces the camera and the other faces away.
+    """
+    strokes = subdivide_to_pixels(strokes, camera)
+    pixels, _ = project_to_pixels(strokes.points, camera)
+    inside = in_frame(pixels, camera)
+    visible = inside.copy()
+    if remove_hidden:
+        visible[visible] = ~_is_hidden(
+            strokes, pixels, visible, rasterize_depth(instances, camera), camera
+        )
+        visible = _remove_specks(visible, pixels, strokes.start)
+    return strokes.runs_where(visible, free_at_removed=inside)
+
+
+def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (n,) bool: which of the (n, 2) pixels of `project_to_pixels` are in the frame."""
+    with np.errstate(invalid="ignore"):
+        return ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
+
+
+def subdivide_to_pixels(strokes: Strokes, camera: Camera) -> Strokes:
+    """Subdivide segments that are longer than `SAMPLE_STEP_PX` pixels."""
+    pixels, _ = project_to_pixels(strokes.points, camera)
+    pixel_distance = np.zeros(len(pixels))
+    pixel_distance[1:] = np.hypot(*np.diff(pixels, axis=0).T)
+    pixel_distance[strokes.start[:-1]] = 0
+    counts = np.where(np.isfinite(pixel_distance), np.ceil(pixel_distance / SAMPLE_STEP_PX), 1)
+    return strokes.subdivided(np.clip(counts, 1, 4096))
+
+
+@dataclass(frozen=True, eq=False)
+class DepthBuffer:
+    """The nearest of T triangles at the pixel centers of a camera, in camera space.
+
+    Attributes
+    ----------
+    triangle : (height, width) int32 ndarray
+        Visible triangle, -1 if there is none. Row 0 is at the bottom.
+    depth : (height, width) float64 ndarray
+        Depth along the axis of the camera; infinite if there is no triangle.
+    normal : (T, 3) float64 ndarray
+        Unit normals of the triangles, from the order of their corners.
+    offset : (T,) float64 ndarray
+        Distances of their planes from the origin along the normals.
+    """
+
+    triangle: np.ndarray
+    depth: np.ndarray
+    normal: np.ndarray
+    offset: np.ndarray
+
+
+def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthBuffer:
+    """Rasterize mesh instances to a depth buffer."""
+    corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
+    flat_corners = corners.reshape(-1, 3)
+    clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
+    indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
+    fragments = rasterize(clip, indices, camera.width, camera.height)
+    triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
+    triangle.flat[fragments.pixel] = fragments.triangle
+    depth = np.full(triangle.shape, np.inf)
+    depth.flat[fragments.pixel] = -dot(fragments.barycentric, corners[fragments.triangle, :, 2])
+    normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return DepthBuffer(triangle, depth, normal, dot(normal, corners[:, 0]))
+
+
+def _to_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (n, 4) clip coordinates of (n, 3) points in world space."""
+    matrix = camera.projection @ camera.view
+    return points @ matrix[:, :3].T + matrix[:, 3]
+
+
+def _is_hidden(
+    strokes: Strokes,
+    pixels: np.ndarray,
+    in_view: np.ndarray,
+    depth_buffer: DepthBuffer,
+    camera: Camera,
+) -> np.ndarray:
+    """Return which of the m points in the frame are hidden; see the notes of `clip_to_visible`.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    pixels : (n, 2) float64 ndarray
+        Pixel coordinates of all points.
+    in_view : (n,) bool ndarray
+        The points in the frame.
+    depth_buffer : DepthBuffer
+    camera : Camera
+
+    Returns
+    -------
+    (m,) bool ndarray
+    """
+    view = camera.view
+    points = strokes.points[in_view] @ view[:3, :3].T + view[:3, 3]
+    normals = strokes.normal[in_view] @ view[:3, :3].T
+    eye = -points if camera.is_perspective else np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+    footprint = pixel_size(strokes.points[in_view], camera)
+    # Outlines do not follow a member. They face neither toward the camera nor away from it.
+    facing = np.sign(dot(normals, eye)) * strokes.member[in_view].any(axis=1)
+    low_pixel = np.floor(pixels[in_view] - 0.5).astype(np.int64)
+    hidden, behind_front = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for right in (0, 1):
+        for up in (0, 1):
+            column = np.clip(low_pixel[:, 0] + right, 0, camera.width - 1)
+            row = np.clip(low_pixel[:, 1] + up, 0, camera.height - 1)
+            triangle = depth_buffer.triangle[row, column]
+            safe_triangle = np.maximum(triangle, 0)
+            facing_plane = dot(depth_buffer.normal[safe_triangle], eye)
+            # Distance of the point behind the plane: along the normal, then along the view ray.
+            behind_plane = depth_buffer.offset[safe_triangle] - dot(
+                depth_buffer.normal[safe_triangle], points
+            )
+            length = np.sqrt(dot(eye, eye))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                distance = np.where(facing_plane != 0, behind_plane / facing_plane, 0) * length
+                steepness = np.sqrt(np.maximum(length**2 / facing_plane**2 - 1, 0))
+            bias = footprint * (
+                DEPTH_BIAS_PX
+                + np.minimum(np.nan_to_num(steepness, posinf=MAX_STEEPNESS), MAX_STEEPNESS)
+            )
+            faces_away = np.sign(facing_plane) * facing < 0
+            hidden &= (triangle >= 0) & (distance > bias)
+            # A point that faces away is behind a triangle that does not, or the reverse: at a
+            # silhouette, one of the four pixels is enough, without a bias.
+            behind_front |= (triangle >= 0) & faces_away & (distance > 0)
+    return hidden | behind_front
+
+
+def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
+    """Return the (T, 3, 3) corners of triangles in camera space."""
+    matrix = camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+    vertices = instance.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return vertices[instance.surface.triangle_vertex]
+
+
+def _remove_specks(visible: np.ndarray, pixels: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Close short gaps in (n,) visibility, then remove short visible runs; see `MIN_RUN_PX`."""
+    arc = arc_lengths(np.nan_to_num(np.column_stack([pixels, np.zeros(len(pixels))])), start)
+    for value in (False, True):
+        visible = _flip_short_runs(visible, arc, start, value)
+    return visible
+
+
+def _flip_short_runs(
+    visible: np.ndarray, arc: np.ndarray, start: np.ndarray, value: bool
+) -> np.ndarray:
+    """Invert runs of `value` that are shorter than `MIN_RUN_PX`.
+
+    Hidden runs at the ends of strokes are kept: they are not gaps between visible runs.
+    """
+    starts_run = np.ones(len(visible), dtype=bool)
+    starts_run[1:] = visible[1:] != visible[:-1]
+    starts_run[start[:-1]] = True
+    first = np.flatnonzero(starts_run)
+    last = np.append(first[1:], len(visible)) - 1
+    flip = (visible[first] == value) & (arc[last] - arc[first] < MIN_RUN_PX)
+    if not value:
+        ends = np.zeros(len(visible) + 1, dtype=bool)
+        ends[start] = True
+        flip &= ~ends[first] & ~ends[last + 1]
+    run = np.cumsum(starts_run) - 1
+    return visible ^ flip[run]

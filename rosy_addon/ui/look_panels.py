@@ -1,0 +1,188 @@
+"""The panels of the look of pictures: presets, the settings of a look, and output."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import bpy
+
+from ..compositor.look import Look
+from ..settings import panel_settings, settings_of
+from . import preset_library
+from .sidebar import SidebarPanel, use_property_columns
+
+#: Labels of the panels of a look's settings by their keys, from top to bottom.
+LOOK_PANELS = {
+    "streaks": "Streaks",
+    "colour": "Color",
+    "light": "Light",
+    "tone": "Tone",
+    "ink": "Ink",
+    "quality": "Quality",
+}
+
+#: Settings of how the picture is made, stored and shown.
+OUTPUT_SETTINGS = (
+    "percentage",
+    "device",
+    "placement",
+    "emission",
+    "diffuse",
+    "store",
+    "directory",
+    "image_format",
+)
+
+
+#: Height of a preset's picture in the panel and in the selection, in units of Blender's layout: 128
+#: screen pixels, half the size of the picture, at a resolution scale of 1.
+THUMBNAIL_SCALE = 6.4
+
+#: Properties of the scene and of objects that say where the tone comes from, with the source that
+#: each belongs to.
+TONE_SOURCE_OF_SETTING = {
+    "tone_attribute": "attribute",
+    "tone_image": "image",
+    "tone_uv_map": "image",
+    "tone_picture": "picture",
+}
+
+#: Properties that name something of the active mesh, with the collection that they are chosen from.
+SEARCH_COLLECTIONS = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
+
+#: Labels of the scene's properties that are too long for the sidebar.
+SHORT_LABELS = {"undefined": "Skip Bad Vectors"}
+
+
+class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
+    """How fields are drawn."""
+
+    bl_label = "Look"
+    bl_parent_id = "VIEW3D_PT_rosy"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.rosy
+        column = self.layout.column(align=True)
+        column.template_icon_view(
+            settings, "preset", show_labels=True, scale=THUMBNAIL_SCALE, scale_popup=THUMBNAIL_SCALE
+        )
+        entry = preset_library.active_entry(settings)
+        row = column.row(align=True)
+        if entry is None:
+            row.label(text=f"{Path(settings.preset_name).stem}: not found")
+        else:
+            changed = preset_library.is_changed(settings)
+            row.label(text=f"{entry.preset.name}, changed" if changed else entry.preset.name)
+        row.operator("rosy.preset_save", text="", icon="ADD")
+        row.menu("VIEW3D_MT_rosy_presets", text="", icon="DOWNARROW_HLT")
+        if entry is not None:
+            lines = column.column(align=True)
+            lines.scale_y, lines.active = 0.8, False
+            for line in _wrap_to_sidebar(entry.preset.description, context):
+                lines.label(text=line)
+
+
+class VIEW3D_MT_rosy_presets(bpy.types.Menu):
+    """Commands for presets."""
+
+    bl_label = "Presets"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.rosy
+        entry = preset_library.active_entry(settings)
+        row = layout.row()
+        row.enabled = entry is not None and preset_library.is_changed(settings)
+        button = row.operator("rosy.preset_apply", text="Revert to Preset", icon="LOOP_BACK")
+        button.preset = settings.preset_name
+        layout.separator()
+        layout.operator("rosy.preset_save", text="Save Look as Preset...", icon="ADD")
+        column = layout.column()
+        column.enabled = entry is not None and entry.is_user
+        for verb, text, icon in (
+            ("rename", "Rename...", "GREASEPENCIL"),
+            ("remove", "Delete...", "TRASH"),
+        ):
+            operator = column.operator(f"rosy.preset_{verb}", text=text, icon=icon)
+            operator.preset = settings.preset_name
+        layout.separator()
+        layout.operator("rosy.preset_import", text="Import...", icon="IMPORT")
+        row = layout.row()
+        row.enabled = entry is not None
+        export = row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
+        export.preset = settings.preset_name
+        for error in preset_library.load_errors():
+            layout.label(text=error, icon="ERROR")
+
+
+def _wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
+    """Return a text as lines that fit into the sidebar."""
+    char_width = 6.5 * context.preferences.system.ui_scale  # pixels, average
+    return textwrap.wrap(text, max(int(context.region.width / char_width) - 6, 12))
+
+
+def _make_settings_panel(
+    label: str, parent: str, suffix: str, look_names: tuple[str, ...], names: tuple[str, ...] = ()
+) -> type:
+    """Return a closed subpanel with settings of a look, then properties of `Scene.rosy`."""
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        use_property_columns(layout)
+        column = layout.column()
+        settings = context.scene.rosy
+        for name in look_names:
+            setting = settings_of(Look)[name]
+            row = column.row()
+            row.active = setting.applies(settings.look)
+            row.prop(settings.look, name, text=setting.panel_label or None)
+            if name == "tone":
+                _draw_tone_source(column, context)
+        for name in names:
+            row = column.row()
+            row.active = name != "directory" or settings.store == "SAVED"
+            row.prop(settings, name, text=SHORT_LABELS.get(name))
+        if "tone" in look_names:
+            column.operator("rosy.occlusion", icon="SHADING_RENDERED")
+
+    namespace = {
+        "__doc__": f"{label}: settings of the picture.",
+        "bl_label": label,
+        "bl_parent_id": parent,
+        "bl_options": {"DEFAULT_CLOSED"},
+        "draw": draw,
+    }
+    return type(f"VIEW3D_PT_rosy_{suffix}", (SidebarPanel, bpy.types.Panel), namespace)
+
+
+def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings of the scene and of the active object that say where the tone comes from."""
+    settings, obj = context.scene.rosy, context.view_layer.objects.active
+    mesh_object = obj if obj is not None and obj.type == "MESH" else None
+    for name, source in TONE_SOURCE_OF_SETTING.items():
+        owner = settings if hasattr(settings, name) else getattr(mesh_object, "rosy", None)
+        if owner is None:
+            continue
+        row = column.row()
+        row.active = settings.look.tone == source
+        if name in SEARCH_COLLECTIONS and mesh_object is not None:
+            row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
+        elif name == "tone_image":
+            row.template_ID(owner, name, open="image.open", text="Image")
+        else:
+            row.prop(owner, name)
+
+
+CLASSES = (
+    VIEW3D_MT_rosy_presets,
+    VIEW3D_PT_rosy_look,
+    *(
+        _make_settings_panel(label, "VIEW3D_PT_rosy_look", f"look_{key}", panel_settings(Look, key))
+        for key, label in LOOK_PANELS.items()
+    ),
+    _make_settings_panel("Output", "VIEW3D_PT_rosy", "output", (), OUTPUT_SETTINGS),
+    _make_settings_panel(
+        "Advanced", "VIEW3D_PT_rosy", "advanced", panel_settings(Look, ""), ("undefined",)
+    ),
+)

@@ -1,0 +1,201 @@
+"""The main panel: make a field, bake its picture and look at it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.field_attributes import has_field
+from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS, BakeInfo, list_bakes
+from ..scene.scene_reader import field_objects
+from ..viewport import session
+from . import job_status, overlay
+from .generator_settings import generator_setting_names
+from .sidebar import SidebarPanel, draw_progress, use_property_columns
+
+#: Placeholders that empty settings of the generator show.
+PLACEHOLDERS = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
+
+
+class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
+    """Make a field, bake its picture and look at it."""
+
+    bl_label = "RoSy"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        use_property_columns(layout)
+        objects = field_objects(context.view_layer)
+        _draw_field_section(layout, context)
+        layout.separator()
+        _draw_picture_section(layout, context, objects)
+
+
+def _draw_field_section(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    obj = context.view_layer.objects.active
+    layout.label(text="1.  Field", icon="FORCE_VORTEX")
+    if obj is None or obj.type != "MESH":
+        layout.label(text="Select a mesh to draw on")
+    elif has_field(obj):
+        _draw_existing_field(layout, context, obj)
+    else:
+        layout.label(text=f"{obj.name} has no field yet")
+        _draw_generator_settings(layout, context)
+        layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
+
+
+def _draw_existing_field(
+    layout: bpy.types.UILayout, context: bpy.types.Context, obj: bpy.types.Object
+) -> None:
+    mesh = obj.data
+    box = layout.box().column(align=True)
+    box.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
+    has_attribute = mesh.rosy.attribute in mesh.attributes
+    box.label(
+        text=f"Attribute '{mesh.rosy.attribute}'" if has_attribute else "Attributes dir0, dir1 ..."
+    )
+    box.prop(obj.rosy, "include")
+    row = layout.row(align=True)
+    row.operator("rosy.field_import", text="Import", icon="IMPORT")
+    row.operator("rosy.field_export", text="Export", icon="EXPORT")
+    is_shown = overlay.is_shown(obj.name)
+    button = layout.operator(
+        "rosy.singularities",
+        text="Hide Singularities" if is_shown else "Show Singularities",
+        icon="OVERLAY",
+        depress=is_shown,
+    )
+    button.show = "NONE" if is_shown else "OVERLAY"
+    header, body = layout.panel("rosy_convert_field", default_closed=True)
+    header.label(text="Convert")
+    if body is not None:
+        _draw_convert_settings(body, context)
+    header, body = layout.panel("rosy_another_field", default_closed=True)
+    header.label(text="Another Field")
+    if body is not None:
+        _draw_generator_settings(body, context)
+
+
+def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings and the button of the conversion, and the menu of storage formats."""
+    settings = context.window_manager.operator_properties_last("rosy.field_convert")
+    column = layout.column()
+    for name in ("degree", "angle", "smooth", "magnitude"):
+        column.prop(settings, name)
+    if settings.magnitude == "values":
+        column.prop(settings, "values")
+    layout.operator("rosy.field_convert")
+    layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
+
+
+def _draw_generator_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings of the generator and its button."""
+    settings = context.window_manager.operator_properties_last("rosy.field_generate")
+    column = layout.column()
+    column.prop(settings, "kind")
+    column.prop(settings, "degree")
+    for name in generator_setting_names(settings):
+        column.prop(settings, name, placeholder=PLACEHOLDERS.get(name, ""))
+    row = layout.row()
+    row.scale_y = 1.5
+    row.operator("rosy.field_generate", icon="FORCE_VORTEX")
+    if settings.kind == "curvature" and settings.degree % 2:
+        row.enabled = False
+        layout.label(text="Curvature: even degrees only", icon="ERROR")
+
+
+def _draw_picture_section(
+    layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
+) -> None:
+    """Draw the list of baked pictures and the buttons that bake."""
+    layout.label(text="2.  Picture", icon="RENDER_STILL")
+    _draw_live_toggle(layout, context)
+    if job_status.current is not None:
+        draw_progress(layout)
+        return
+    bake_infos = list_bakes(context.scene)
+    for bake in bake_infos:
+        _draw_bake_info(layout, bake, several=len(bake_infos) > 1)
+    if objects:
+        layout.prop(context.scene.rosy, "camera")
+        if len(objects) > 1:
+            layout.label(text=f"Draws {len(objects)} objects")
+    row = layout.row()
+    row.scale_y = 1.5
+    row.operator("rosy.bake", text="Bake Again" if bake_infos else "Bake", icon="RENDER_STILL")
+    row = layout.row(align=True)
+    row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
+    row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
+    if not objects:
+        layout.label(text="Needs a field to draw", icon="INFO")
+    if bake_infos:
+        layout.operator("rosy.remove", icon="TRASH")
+        _draw_view_hints(layout, context, bake_infos)
+    if objects:
+        _draw_view_transform_warning(layout, context.scene)
+
+
+def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    enabled = session.is_live(context.space_data)
+    button = layout.operator(
+        "rosy.viewport",
+        text="Live in This View",
+        icon="HIDE_OFF" if enabled else "HIDE_ON",
+        depress=enabled,
+    )
+    button.show = "OFF" if enabled else "ON"
+
+
+def draw_overlay_popover(popover: bpy.types.Menu, context: bpy.types.Context) -> None:
+    """Draw the switch of the live view in Blender's popover of overlays."""
+    _draw_live_toggle(popover.layout, context)
+
+
+def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -> None:
+    box = layout.box().column(align=True)
+    box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
+    row = box.row()
+    row.label(text=f"{bake.width} x {bake.height} pixels")
+    if bake.frame_range:
+        box.label(text=f"Frames {bake.frame_range}", icon="RENDER_ANIMATION")
+    if several and bake.is_shown:
+        row.label(text="Shown", icon="HIDE_OFF")
+    elif several:
+        row.operator("rosy.show", text="Show").camera = bake.camera
+    if bake.stale_reason:
+        box.label(text="Out of date:", icon="ERROR")
+        box.label(text=bake.stale_reason)
+    elif not bake.frame_range:
+        box.label(text="Up to date", icon="CHECKMARK")
+
+
+def _draw_view_hints(
+    layout: bpy.types.UILayout, context: bpy.types.Context, bake_infos: list[BakeInfo]
+) -> None:
+    """Draw buttons that show the picture, in views that do not show materials or the camera's view."""
+    view, camera = context.space_data, context.scene.camera
+    column = layout.column(align=True)
+    if view.shading.type in {"WIREFRAME", "SOLID"}:
+        column.label(text="This view shows no materials", icon="INFO")
+        button = column.operator("wm.context_set_enum", text="Show the Picture Here")
+        button.data_path, button.value = "space_data.shading.type", "MATERIAL"
+    in_camera_view = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"
+    if (
+        not in_camera_view
+        and camera is not None
+        and any(bake.camera == camera.name for bake in bake_infos)
+    ):
+        column.operator("view3d.view_camera", text="Look Through the Camera")
+
+
+def _draw_view_transform_warning(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Warn if the view transform changes the tones of the picture."""
+    transform = scene.view_settings.view_transform
+    if transform not in NEUTRAL_VIEW_TRANSFORMS:
+        column = layout.column(align=True)
+        column.label(text=f"{transform} grays the lines", icon="ERROR")
+        button = column.operator("wm.context_set_enum", text="View Transform: Standard")
+        button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
+
+
+CLASSES = (VIEW3D_PT_rosy,)

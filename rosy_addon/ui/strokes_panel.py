@@ -1,0 +1,85 @@
+"""The panel of strokes."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..scene.stroke_objects import stroke_objects
+from ..settings import panel_settings, settings_of
+from ..strokes.style import StrokeStyle
+from . import job_status
+from .sidebar import SidebarPanel, draw_progress, use_property_columns
+
+#: Icons of stroke objects by type. The type of Grease Pencil was renamed in Blender 4.3.
+STROKE_ICONS = {
+    "GREASEPENCIL": "OUTLINER_OB_GREASEPENCIL",
+    "GPENCIL": "OUTLINER_OB_GREASEPENCIL",
+    "CURVES": "OUTLINER_OB_CURVES",
+}
+
+#: Subpanels of strokes with the names of their settings.
+STROKE_PANELS = {
+    "Density": panel_settings(StrokeStyle, "density"),
+    "Ends": panel_settings(StrokeStyle, "ends"),
+    "Inks": ("inks", "ink_colour", "outline_colour"),
+}
+
+
+class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
+    """Draw lines along the field, as scene objects or as a file."""
+
+    bl_label = "Strokes"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        use_property_columns(layout)
+        settings = context.scene.rosy.strokes
+        column = layout.column()
+        column.prop(settings, "kind")
+        column.prop(settings, "camera")
+        column.prop(settings, "selected")
+        column.separator()
+        column.prop(settings, "unit")
+        column.prop(settings, "spacing" if settings.unit == "pixels" else "distance")
+        column.prop(settings, "width")
+        column.prop(settings, "outline")
+        column.prop(settings, "hidden")
+        for title, names in STROKE_PANELS.items():
+            header, body = layout.panel(f"rosy_strokes_{title.lower()}", default_closed=True)
+            header.label(text=title)
+            if body is not None:
+                _draw_stroke_settings(body, settings, names)
+        if settings.kind == "SVG":
+            _draw_stroke_settings(layout, settings, ("filepath", "page", "paper", "plotter"))
+        if job_status.current is not None:
+            draw_progress(layout)
+            return
+        objects = stroke_objects(context.scene)
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("rosy.strokes", icon="GREASEPENCIL")
+        if objects:
+            layout.operator("rosy.strokes_remove", icon="TRASH")
+            for obj in objects:
+                layout.label(text=obj.name, icon=STROKE_ICONS[obj.type])
+
+
+def _draw_stroke_settings(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, names: tuple[str, ...]
+) -> None:
+    column = layout.column()
+    descriptions = settings_of(StrokeStyle)
+    active = {
+        "outline_colour": settings.inks != "ONE" and settings.outline,
+        "ink_colour": settings.inks == "ONE",
+        "paper": not settings.plotter,
+    }
+    for name in names:
+        row = column.row()
+        is_style = name in descriptions
+        row.active = descriptions[name].applies(settings) if is_style else active.get(name, True)
+        row.prop(settings, name)
+
+
+CLASSES = (VIEW3D_PT_rosy_strokes,)

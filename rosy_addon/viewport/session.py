@@ -1,0 +1,327 @@
+"""The session of all live views: handlers, timers and drawing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable
+from typing import Any
+
+import bpy
+
+from ..errors import DeviceError, RosyError
+from ..gpu.select import select_viewport_renderer
+from ..render.view_input import ViewInput
+from ..scene.cameras import camera_of_view
+from ..scene.lights import read_lights
+from ..scene.look_properties import read_look
+from ..scene.scene_cache import InstanceState
+from ..scene.tone_inputs import check_tones, make_tone_request
+from .layers import LayerStates
+from .messages import draw_messages
+from .progressive import ProgressiveRenderer
+from .references import ReferenceImages
+from .view3d import clip_planes, is_visible, open_view3d_spaces, redraw, shows_surfaces
+
+#: Seconds between two checks for views that were closed.
+CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
+
+#: Seconds for which a view shows why the CPU draws it.
+MESSAGE_SECONDS = 10.0
+
+#: Number of unreadable objects that a view names.
+MAX_OBJECT_ERRORS = 4
+
+#: Opacity of the picture. In edit mode the mesh shows through.
+OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
+
+#: Methods of the session that are called by timers.
+TIMER_METHODS = (
+    "_drop_closed_views",
+    "_tag_redraw",
+    "_resolve_topologies",
+    "_load_reference_images",
+)
+
+
+class ViewportSession:
+    """All live views, and everything that is registered with Blender for them.
+
+    `stop` removes all handlers and timers and frees all textures.
+
+    Parameters
+    ----------
+    device : {"auto", "cpu"}
+
+    Attributes
+    ----------
+    spaces : set of int
+        Pointers of the `SpaceView3D` that are live.
+    error : str or None
+        Why the view that was drawn last shows no picture.
+    fallback_reason : str or None
+        Why the CPU draws instead of the graphics card.
+
+    Raises
+    ------
+    DeviceError
+        If there is no graphics context.
+    """
+
+    def __init__(self, device: str = "auto") -> None:
+        self.progressive = ProgressiveRenderer(
+            select_viewport_renderer(device), self._schedule_redraw
+        )
+        self.spaces: set[int] = set()
+        self.error: str | None = None
+        self.fallback_reason: str | None = None
+        self._fallback_time = 0.0
+        self.layers = LayerStates(lambda: self._schedule(0.0, "_resolve_topologies"))
+        self._references = ReferenceImages(lambda: self._schedule(0.0, "_load_reference_images"))
+        self._draw_handlers = [
+            bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
+            bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
+        ]
+        self._app_handlers: list[tuple[list, Callable[..., None]]] = []
+        handlers = bpy.app.handlers
+        for handler_list, handler in (
+            (handlers.depsgraph_update_post, self._on_update),
+            (handlers.frame_change_post, self._on_update),
+            (handlers.undo_post, self._on_undo),
+            (handlers.redo_post, self._on_undo),
+            (handlers.load_pre, self._on_load),
+        ):
+            handler_list.append(handler)
+            self._app_handlers.append((handler_list, handler))
+        # Blender identifies a timer by its function object. Each access to a method makes a new one.
+        self._timers = {name: getattr(self, name) for name in TIMER_METHODS}
+        self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, "_drop_closed_views")
+
+    # --- switching -------------------------------------------------------------------------------
+
+    def add(self, space: bpy.types.SpaceView3D) -> None:
+        """Make a view live."""
+        self.spaces.add(space.as_pointer())
+        redraw()
+
+    def remove(self, space_pointer: int) -> None:
+        """Make a view no longer live, given its pointer."""
+        self.spaces.discard(space_pointer)
+        self.progressive.remove_space(space_pointer)
+        redraw()
+
+    def stop(self) -> None:
+        """Remove all handlers and timers, and free all resources."""
+        for handler in self._draw_handlers:
+            bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+        for handler_list, handler in self._app_handlers:
+            handler_list.remove(handler)
+        for timer in self._timers.values():
+            if bpy.app.timers.is_registered(timer):
+                bpy.app.timers.unregister(timer)
+        self._draw_handlers, self._app_handlers = [], []
+        self.layers.clear()
+        self.spaces.clear()
+        self.progressive.release()
+        redraw()
+
+    # --- handlers and timers ---------------------------------------------------------------------
+
+    def _on_update(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
+    ) -> None:
+        self.layers.invalidate(scene, depsgraph)
+
+    def _on_undo(self, *_: Any) -> None:
+        self.layers.clear()
+
+    def _on_load(self, *_: Any) -> None:
+        stop()
+
+    def _drop_closed_views(self) -> float | None:
+        """Remove views that were closed, and stop the session with the last one."""
+        open_spaces = {space.as_pointer() for space in open_view3d_spaces()}
+        for space_pointer in self.spaces - open_spaces:
+            self.remove(space_pointer)
+        if self.spaces:
+            return CLOSED_VIEWS_INTERVAL_SECONDS
+        stop()
+        return None
+
+    def _tag_redraw(self) -> None:
+        """Tag the live views for a redraw, in which rendering continues."""
+        redraw(self.spaces)
+
+    def _resolve_topologies(self) -> None:
+        """Read what cannot be read while Blender draws."""
+        self.layers.resolve_topologies()
+        redraw(self.spaces)
+
+    def _load_reference_images(self) -> None:
+        """Load the pictures that tones come from."""
+        self._references.load_pending()
+        redraw(self.spaces)
+
+    def _schedule(self, seconds: float, name: str) -> None:
+        """Have a method called by a timer, unless its timer is running already."""
+        timer = self._timers[name]
+        if not bpy.app.timers.is_registered(timer):
+            bpy.app.timers.register(timer, first_interval=seconds)
+
+    def _schedule_redraw(self, seconds: float) -> None:
+        self._schedule(seconds, "_tag_redraw")
+
+    # --- drawing ---------------------------------------------------------------------------------
+
+    def _draw(self) -> None:
+        context = bpy.context
+        space, region = context.space_data, context.region
+        if space.as_pointer() not in self.spaces or not shows_surfaces(space):
+            return
+        self.error = None
+        try:
+            self._draw_view(context, space, region)
+        except DeviceError as error:
+            self._fall_back_to_cpu(error)
+        except RosyError as error:
+            self.error = str(error)
+
+    def _fall_back_to_cpu(self, error: DeviceError) -> None:
+        """Continue with the CPU when the graphics card rejects a shader."""
+        renderer = select_viewport_renderer("cpu")
+        self.progressive = ProgressiveRenderer(renderer, self._schedule_redraw)
+        self.fallback_reason, self._fallback_time = str(error), time.monotonic()
+        self.layers.mark_all_stale()
+        self._schedule_redraw(0.0)
+
+    def _draw_view(
+        self,
+        context: bpy.types.Context,
+        space: bpy.types.SpaceView3D,
+        region: bpy.types.Region,
+    ) -> None:
+        """Update the picture of a view and composite it."""
+        depsgraph = context.evaluated_depsgraph_get()
+        instances, view_input = self._read_view(context, depsgraph, space, region)
+        if view_input is None:
+            return
+        renderer = self.progressive.renderer
+        draw_items = renderer.upload(view_input.instances, view_input.look.display)
+        view = self.progressive.update(
+            (space.as_pointer(), region.as_pointer()),
+            _picture_key(instances, view_input),
+            draw_items,
+            view_input,
+        )
+        if view.texture is not None:
+            editing = context.mode.startswith("EDIT")
+            opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
+            renderer.composite(view.texture, draw_items, view_input, opacity)
+
+    def _read_view(
+        self,
+        context: bpy.types.Context,
+        depsgraph: bpy.types.Depsgraph,
+        space: bpy.types.SpaceView3D,
+        region: bpy.types.Region,
+    ) -> tuple[list[InstanceState], ViewInput | None]:
+        """Read what a view shows; no input if there is nothing to draw, or not yet."""
+        look = read_look(context.scene.rosy)
+        include_occluders = self.progressive.renderer.needs_occluders or look.shadows
+        layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
+        camera = camera_of_view(region, context.region_data)
+        visible = [
+            entry
+            for entry in layer.instances
+            if is_visible(entry.visibility_object, depsgraph, space)
+        ]
+        with_field = [entry for entry in visible if entry.instance.field is not None]
+        if not with_field:
+            return visible, None
+        tone_request = make_tone_request(context.scene, look)
+        check_tones(tone_request, [(entry.instance.tone, entry.owner) for entry in with_field])
+        reference = self._references.current(context.scene, depsgraph, look)
+        if look.tone == "picture" and reference is None:
+            return visible, None  # not loaded yet
+        return visible, ViewInput(
+            instances=tuple(entry.instance for entry in visible),
+            camera=camera,
+            look=look,
+            lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
+            reference=reference,
+            clip_planes=clip_planes(context.region_data),
+        )
+
+    def _draw_text(self) -> None:
+        """Show why a field is not drawn."""
+        context = bpy.context
+        if context.space_data.as_pointer() not in self.spaces:
+            return
+        layer = self.layers.get(context.scene, context.view_layer)
+        lines = list(layer.scene_cache.errors.values())[:MAX_OBJECT_ERRORS] if layer else []
+        if self.error:
+            lines.insert(0, self.error)
+        if self.fallback_reason and time.monotonic() < self._fallback_time + MESSAGE_SECONDS:
+            lines.insert(0, f"drawn on the processor, at reduced size: {self.fallback_reason}")
+        draw_messages(lines, context.preferences.system.ui_scale)
+
+
+def _picture_key(instances: list[InstanceState], view_input: ViewInput) -> Hashable:
+    """Return a key that changes whenever the picture of a view would change."""
+    camera = view_input.camera
+    planes = view_input.clip_planes
+    return (
+        tuple(entry.version for entry in instances),
+        camera.view.tobytes(),
+        camera.projection.tobytes(),
+        (camera.width, camera.height),
+        view_input.look,
+        None if planes is None else planes.tobytes(),
+        tuple(
+            (light.kind, tuple(light.vector), tuple(light.colour), light.strength)
+            for light in view_input.lights
+        ),
+        view_input.reference,
+    )
+
+
+# --- the session of this Blender -----------------------------------------------------------------
+
+_session: ViewportSession | None = None
+
+
+def is_live(space: bpy.types.SpaceView3D) -> bool:
+    """Return whether a 3D view is live."""
+    return _session is not None and space.as_pointer() in _session.spaces
+
+
+def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
+    """Make a 3D view live.
+
+    Parameters
+    ----------
+    space : bpy.types.SpaceView3D
+    device : {"auto", "cpu"}
+        Used if this is the first live view; all others share its renderer. "auto" is the graphics
+        card, or the CPU at reduced size if the card rejects the shaders.
+
+    Raises
+    ------
+    DeviceError
+        If there is no graphics context.
+    """
+    global _session
+    if _session is None:
+        _session = ViewportSession(device)
+    _session.add(space)
+
+
+def stop(space: bpy.types.SpaceView3D | None = None) -> None:
+    """Make a 3D view no longer live; all of them if none is given."""
+    global _session
+    if _session is None:
+        return
+    if space is not None:
+        _session.remove(space.as_pointer())
+    if space is None or not _session.spaces:
+        _session.stop()
+        _session = None

@@ -1,0 +1,37 @@
+"""The main job from end to end, for every version of Blender: field, picture, strokes, removal."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import typing
+
+import numpy as np
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.draw_strokes import draw_strokes
+from rosy.rosy_addon.scene.pictures import remove_bakes
+from rosy.rosy_addon.scene.stroke_objects import remove_strokes
+from scenes import contents, member_vectors, pixels
+
+
+def test_field_picture_strokes_and_removal(scene, camera, monkey, tmp_path):
+    before = contents()
+    assert np.linalg.norm(member_vectors(monkey.data), axis=1).min() > 0
+    (baked,) = bake(scene)
+    assert pixels(baked.image)[..., 3].max() == 1
+    svg = draw_strokes(scene, kind="SVG", path=tmp_path / "strokes.svg")
+    assert svg.path.read_text().startswith("<?xml")
+    drawing = draw_strokes(scene, kind="PENCIL")
+    assert drawing.obj.name in scene.objects
+    assert remove_strokes(scene) == 1
+    remove_bakes(scene)
+    assert contents() == before
+
+
+def test_blender_can_read_the_properties_of_every_operator():
+    operators = importlib.import_module("rosy.operators")
+    classes = [cls for module in operators.MODULES for cls in module.CLASSES]
+    for cls in classes:
+        # As Blender does when it registers a class; it prints what fails and goes on without.
+        assert set(inspect.get_annotations(cls)) <= set(typing.get_type_hints(cls))
+    assert classes

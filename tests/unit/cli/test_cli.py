@@ -1,0 +1,469 @@
+"""The command line, in processes of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import zlib
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from shapes import icosphere, torus
+
+from rosy_addon.cli import main
+from rosy_addon.color import to_linear
+from rosy_addon.field.surface import Surface
+from rosy_addon.image_io.png import write_png
+
+
+def rosy(*words, **more) -> subprocess.CompletedProcess:
+    """Run ``python -m rosy_addon``."""
+    command = [sys.executable, "-m", "rosy_addon", *map(str, words)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **more)
+
+
+def write_off(path, surface: Surface):
+    sizes = np.diff(surface.face_start)
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    rows = [f"OFF\n{len(surface.vertices)} {len(sizes)} 0"]
+    rows += [" ".join(map(repr, row)) for row in surface.vertices.tolist()]
+    rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory):
+    return write_off(tmp_path_factory.mktemp("meshes") / "sphere.off", icosphere(3))
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory):
+    return write_off(tmp_path_factory.mktemp("meshes") / "torus.off", torus(24, 12))
+
+
+def size_of(path) -> tuple[int, int]:
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
+    return int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+
+
+def pixels_of(path) -> np.ndarray:
+    width, height = size_of(path)
+    data = path.read_bytes()
+    start = data.index(b"IDAT")
+    length = int.from_bytes(data[start - 4 : start])
+    rows = np.frombuffer(zlib.decompress(data[start + 4 : start + 4 + length]), np.uint8)
+    return rows.reshape(height, 1 + 4 * width)[:, 1:].reshape(height, width, 4)
+
+
+def assert_refused(done: subprocess.CompletedProcess, *wanted: str) -> None:
+    """Status 2 and one line of reason."""
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("rosy: ") and done.stderr.count("\n") == 1, done.stderr
+    assert done.stdout == ""
+    for words in wanted:
+        assert words in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--degree", "3", "--generate", "axis", "--axis", "-1,0.5,0"],
+        ["--preset", "plaid", "--set", "supersampling=2", "--set", "view_plane=off"],
+        ["--view", "-120,-30", "--ortho", "--set", "display=flat"],
+    ],
+    ids=["plain", "axis", "look", "view"],
+)
+def test_render_writes_a_picture(words, ring, tmp_path):
+    done = rosy("render", ring, "-o", tmp_path / "a.png", "--size", "96x64", *words)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert size_of(tmp_path / "a.png") == (96, 64)
+    covered = pixels_of(tmp_path / "a.png")[..., 3] == 255
+    assert 0.1 < covered.mean() < 0.9
+
+
+def test_same_command_same_bytes(ring, tmp_path):
+    for name in ("a.png", "b.png"):
+        assert main(["render", str(ring), "-o", str(tmp_path / name), "--size", "80x80"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_y_is_up_in_off_files_unless_said_otherwise(tmp_path):
+    tall = torus(24, 12)
+    path = write_off(tmp_path / "a.off", tall)  # around z
+    seen = {}
+    for up in ("y", "z"):
+        rendered = tmp_path / f"{up}.png"
+        words = ["--size", "64x64", "--up", up, "--view", "0,0", "--ortho"]
+        assert main(["render", str(path), "-o", str(rendered), *words]) == 0
+        seen[up] = pixels_of(rendered)[..., 3] > 0
+    # From the front a ring around the upward axis is seen edge on, one around y with its hole.
+    assert seen["z"].any(axis=1).mean() < 0.5
+    assert seen["y"].any(axis=1).mean() > 0.8 and not seen["y"][32, 32]
+
+
+@pytest.mark.parametrize("name", ["vase-7", "vase-2", "vase-4", "dome-6", "cheburashka"])
+def test_render_fields_of_others(name, shared_data, tmp_path):
+    mesh = shared_data / "meshes" / f"{name.partition('-')[0]}.off"
+    field = shared_data / "fields" / f"{name}.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "128x128")
+    assert done.returncode == 0, done.stderr
+    ink = pixels_of(tmp_path / "a.png")
+    assert ink[ink[..., 3] == 255][:, :3].std() > 15
+
+
+def test_what_is_not_a_rosy_is_drawn_but_not_written_as_one(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "cheburashka.off"
+    field = shared_data / "fields" / "cheburashka-cf.rawfield"
+    done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
+    assert done.returncode == 0, done.stderr
+    done = rosy("field", mesh, field, "-o", tmp_path / "a.rosy")
+    assert_refused(done, "a.rosy", "no RoSy")
+    assert not (tmp_path / "a.rosy").exists()
+
+
+def test_field_makes_converts_and_info_reads(sphere, tmp_path):
+    raw, rosy_file, again = (tmp_path / name for name in ("a.rawfield", "a.rosy", "b.rawfield"))
+    assert rosy("field", sphere, "-o", raw, "--degree", 6).returncode == 0
+    assert rosy("field", sphere, raw, "-o", rosy_file).returncode == 0
+    assert rosy("field", sphere, rosy_file, "-o", again).returncode == 0
+    assert raw.read_bytes() == again.read_bytes()
+    done = rosy("info", sphere, rosy_file, "--json")
+    facts = json.loads(done.stdout)
+    assert (facts["degree"], facts["faces"], facts["vertices"]) == (6, 1280, 642)
+    assert facts["euler_characteristic"] == 2
+    assert sum(index for _, index in facts["singularities"]) == 6 * 2
+    assert all(isinstance(part, int) for pair in facts["singularities"] for part in pair)
+    words = rosy("info", sphere, rosy_file)
+    assert words.returncode == 0
+    assert "degree 6" in words.stdout and "1280 faces" in words.stdout
+
+
+def test_the_torus_has_no_singularities_in_sum(ring):
+    facts = json.loads(rosy("info", ring, "--degree", 4, "--generate", "axis", "--json").stdout)
+    assert facts["euler_characteristic"] == 0
+    assert sum(index for _, index in facts["singularities"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("degree", "kind"), [(1, "axis"), (2, "curvature"), (4, "curvature"), (5, "axis")]
+)
+def test_the_generator_follows_the_degree(degree, kind, ring, tmp_path):
+    default, chosen = tmp_path / "a.rosy", tmp_path / "b.rosy"
+    common = ["field", str(ring), "--degree", str(degree), "-o"]
+    assert main([*common, str(default)]) == 0
+    assert main([*common, str(chosen), "--generate", kind]) == 0
+    assert default.read_bytes() == chosen.read_bytes()
+
+
+REFUSED = {
+    "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
+    "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
+    "kind of mesh": (["info", "a.vtk"], "not from '.vtk' files"),
+    "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
+    "degree -1": (["field", "{mesh}", "-o", "{out}", "--degree", "-1"], "degree -1 is not"),
+    "degree 1000": (["info", "{mesh}", "--degree", "1000"], "degree 1000 is not"),
+    "curvature 3": (
+        ["info", "{mesh}", "--degree", "3", "--generate", "curvature"],
+        "even degree, not 3",
+    ),
+    "axis": (["info", "{mesh}", "--generate", "axis", "--axis", "0,0,0"], "not a direction"),
+    "both": (["info", "{mesh}", "a.rosy", "--generate", "axis"], "not both"),
+    "size 0": (["render", "{mesh}", "-o", "{out}", "--size", "0x10"], "size 0x10: a side must be"),
+    "size 100000": (["render", "{mesh}", "-o", "{out}", "--size", "100000x100000"], "size 100000x"),
+    "preset": (
+        ["render", "{mesh}", "-o", "{out}", "--preset", "none"],
+        "no preset is named 'none'",
+    ),
+    "setting": (["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"], "no setting 'lenght'"),
+    "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "has no lights"),
+    "lights of a turntable": (
+        ["turntable", "{mesh}", "-o", "{out}.gif", "--set", "light=scene"],
+        "has no lights",
+    ),
+    "value": (
+        ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
+        "--set length=long: expected a whole",
+    ),
+    "range": (["render", "{mesh}", "-o", "{out}", "--set", "gain=-1"], "setting 'gain' is -1"),
+    "switch": (["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"], "not true or false"),
+    "no value": (["render", "{mesh}", "-o", "{out}", "--set", "gain"], "expected NAME=VALUE"),
+    "no folder": (["render", "{mesh}", "-o", "no/folder/a.png"], "there is no folder no/folder"),
+    "a folder": (["render", "{mesh}", "-o", "tests"], "tests: cannot be written: it is a folder"),
+    "format": (["field", "{mesh}", "-o", "{out}"], "not to '.png' files"),
+    "view": (["render", "{mesh}", "-o", "{out}", "--view", "nan,0"], "view nan,0"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    words, wanted = REFUSED[case]
+    out = tmp_path / "a.png"
+    words = [word.format(mesh=sphere, out=out) for word in words]
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("rosy: ") and said.err.count("\n") == 1
+    assert wanted in said.err
+    assert said.out == ""
+    assert not out.exists()
+
+
+def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
+    done = rosy("render", sphere, "-o", tmp_path / "a.png", "--degree", 0)
+    assert_refused(done, "degree 0 is not a whole number from 1 to 12")
+    (tmp_path / "a.rosy").write_text("2 4\n1 0 0\n")
+    assert_refused(rosy("info", sphere, tmp_path / "a.rosy"), "a.rosy: says 2 rows")
+
+
+def test_conflicting_degrees(sphere, tmp_path):
+    assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
+    done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
+    assert_refused(done, "a.rosy: holds a field of degree 6, not 4")
+
+
+def test_undefined_vectors_on_request(sphere, tmp_path):
+    path = tmp_path / "a.rosy"
+    assert main(["field", str(sphere), "-o", str(path)]) == 0
+    lines = path.read_text().splitlines()
+    lines[2 + 7] = "nan nan nan"
+    path.write_text("\n".join(lines))
+    assert_refused(rosy("info", sphere, path), "1 of 1280 vectors are not finite", "face 7")
+    facts = json.loads(rosy("info", sphere, path, "--undefined", "--json").stdout)
+    assert facts["undefined_faces"] >= 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["paint"],
+        ["render"],
+        ["render", "a.off"],
+        ["render", "a.off", "-o", "b", "--size", "big"],
+    ],
+)
+def test_wrong_usage_is_status_2(words):
+    done = rosy(*words)
+    assert done.returncode == 2
+    assert done.stderr.startswith("usage: python -m rosy_addon")
+    assert "Traceback" not in done.stderr
+
+
+def test_help_names_the_program_it_was_started_as(capsys):
+    assert rosy("--help").stdout.startswith("usage: python -m rosy_addon [-h] VERB")
+    assert main(["--help"]) == 0
+    assert capsys.readouterr().out.startswith("usage: blender -b --command rosy")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
+    command = [sys.executable, "-m", "rosy_addon", "render", str(sphere), "-o", "{}/a.png"]
+    command[-1] = str(tmp_path / "a.png")
+    command += ["--size", "1500x1500", "--set", "length=2000", "--set", "method=brute"]
+    process = subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+        # Tests that run in the background of a shell are made to ignore it, and so is what they run.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    try:
+        time.sleep(3)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert said == "rosy: stopped\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bake_without_blender_says_so(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
+    assert main(["bake", "--save"]) == 2
+    assert "bake needs Blender" in capsys.readouterr().err
+
+
+def test_bake_that_would_keep_nothing_is_refused(capsys):
+    assert main(["bake"]) == 2
+    assert "give --out DIR" in capsys.readouterr().err
+
+
+# --- fields made, converted and compared -----------------------------------------------------
+
+
+def facts_of(*arguments) -> dict:
+    done = rosy("info", *arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_field_converts(sphere, tmp_path):
+    made = tmp_path / "a.rosy"
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    converted = tmp_path / "b.npy"
+    done = rosy("field", sphere, made, "-o", converted, "--to-degree", 8, "--turn", 10,
+                "--smooth", 0.05, "--magnitude", "unit")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    facts = facts_of(sphere, converted)
+    assert facts["degree"] == 8 and np.allclose(facts["magnitude"], 1)
+    assert_refused(rosy("field", sphere, made, "-o", made, "--to-degree", 3), "neither a multiple")
+
+
+def test_info_compares(sphere, tmp_path):
+    made, turned, sings = (tmp_path / name for name in ("a.rosy", "b.rawfield", "a.sings"))
+    assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
+    assert rosy("field", sphere, made, "-o", turned, "--turn", 5).returncode == 0
+    assert rosy("field", sphere, made, "-o", sings).returncode == 0
+    facts = facts_of(sphere, made, "--against", turned)
+    assert np.isclose(facts["against"]["mean"], 5) and np.isclose(facts["against"]["max"], 5)
+    assert facts["is_rosy"] and facts["energy"] > 4 * np.pi * 4
+    facts = facts_of(sphere, turned, "--against", sings)
+    assert facts["against"] == {"same": 8, "only_here": [], "only_there": []}
+    done = rosy("info", sphere, made, "--against", turned)
+    assert "off by 5 degrees on average" in done.stdout
+
+
+def test_strokes_and_guides(sphere, tmp_path):
+    turn = np.linspace(0, 1.0, 30)
+    arc = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    rows = "\n".join(" ".join(map(str, point)) for point in arc)
+    (tmp_path / "strokes.txt").write_text(f"# one\n{rows}\n\n{rows}\n")
+    out = tmp_path / "a.rosy"
+    done = rosy("field", sphere, "-o", out, "--strokes", tmp_path / "strokes.txt", "--degree", 2)
+    assert done.returncode == 0, done.stderr
+    again = tmp_path / "b.rosy"
+    done = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--reach", 0.01)
+    assert done.returncode == 0, done.stderr
+    assert facts_of(sphere, again, "--against", out)["against"]["mean"] < 3
+    (tmp_path / "none.txt").write_text("1 2 3\n\n4 5 6\n")
+    assert_refused(
+        rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt"), "holds no stroke"
+    )
+    assert_refused(rosy("field", sphere, "-o", out, "--generate", "uv"), "has no UV map")
+
+
+def test_the_uv_map_of_a_file(shared_data, tmp_path):
+    mesh = shared_data / "meshes" / "spot.obj"
+    out = tmp_path / "a.rosy"
+    assert rosy("field", mesh, "-o", out, "--generate", "uv").returncode == 0
+    assert facts_of(mesh, out)["undefined_faces"] == 0
+    smooth = tmp_path / "b.rosy"
+    done = rosy("field", mesh, "-o", smooth, "--generate", "guided", "--uv", "--reach", "0.02")
+    assert done.returncode == 0, done.stderr
+    facts, rough = facts_of(mesh, smooth, "--against", out), facts_of(mesh, out)
+    assert facts["energy"] < rough["energy"] and facts["against"]["mean"] < 15
+
+
+# --- tones ----------------------------------------------------------------------------------------
+
+HATCHED = ("--preset", "cross-hatch", "--size", "128x128", "--generate", "axis")
+
+
+def write_ply(path, surface: Surface, **columns):
+    """With more numbers of vertices: bytes where they are whole, floats where they are not."""
+    kinds = {
+        name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
+    }
+    head = ["ply", "format ascii 1.0", f"element vertex {len(surface.vertices)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"property {kind} {name}" for name, kind in kinds.items()]
+    head += [f"element face {surface.face_count}", "property list uchar int vertex_indices"]
+    head.append("end_header")
+    rows = zip(surface.vertices.tolist(), *(v.tolist() for v in columns.values()), strict=True)
+    lines = [" ".join(map(repr, [*place, *more])) for place, *more in rows]
+    faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
+    lines += [" ".join(map(str, [len(face), *face])) for face in faces]
+    path.write_text("\n".join(head + lines) + "\n")
+    return path
+
+
+def halves_of(path) -> tuple[float, float]:
+    """How light the left and the right half of what is drawn is, linear."""
+    rgba = pixels_of(path) / 255
+    whole = rgba[..., 3] == 1
+    left, right = whole.copy(), whole.copy()
+    left[:, 58:], right[:, :70] = False, False
+    light = to_linear(rgba[..., 1])
+    return float(light[left].mean()), float(light[right].mean())
+
+
+@pytest.fixture(scope="module")
+def painted(tmp_path_factory):
+    """A ball, from the front dark to the left and light to the right, by a colour and by a number."""
+    ball = icosphere(4)
+    right = ball.vertices[:, 0] > 0
+    grey = np.where(right, 230, 60)
+    colours = dict.fromkeys(("red", "green", "blue"), grey)
+    path = tmp_path_factory.mktemp("painted") / "ball.ply"
+    return write_ply(path, ball, **colours, cavity=np.where(right, 0.8, 0.1))
+
+
+def test_tones_of_vertices(painted, tmp_path):
+    out = tmp_path / "a.png"
+    for name, dark, light in (("cavity", 0.1, 0.8), ("Color", 0.045, 0.79), ("red", 0.235, 0.9)):
+        done = main(["render", str(painted), *HATCHED, "-o", str(out), "--view", "0,0",
+                     "--tone-attribute", name])  # fmt: skip
+        assert done == 0
+        left, right = halves_of(out)
+        assert left == pytest.approx(dark, abs=0.08) and right == pytest.approx(light, abs=0.08)
+    done = main(["turntable", str(painted), "-o", str(tmp_path / "a.gif"), "--size", "64x64",
+                 "--pictures", "2", "--generate", "axis", "--tone-attribute", "cavity"])  # fmt: skip
+    assert done == 0
+
+
+def test_tones_of_pictures_and_images(sphere, tmp_path):
+    shown = np.ones((64, 64, 4), dtype=np.float32)
+    shown[:, :32, :3], shown[:, 32:, :3] = 0.2, 0.85
+    write_png(tmp_path / "shot.png", shown)
+    out = tmp_path / "a.png"
+    words = [*HATCHED, "-o", str(out), "--view", "0,0"]
+    assert main(["render", str(sphere), *words, "--tone-picture", str(tmp_path / "shot.png")]) == 0
+    left, right = halves_of(out)
+    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
+    # A square across the view, the image upright on it.
+    square = tmp_path / "square.obj"
+    square.write_text(
+        "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+        "f 1/1 2/2 3/3 4/4\n"
+    )
+    words = ["render", str(square), *words, "--axis", "1,0,0", "--degree", "2"]
+    assert main([*words, "--tone-image", str(tmp_path / "shot.png")]) == 0
+    left, right = halves_of(out)
+    assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
+
+
+def test_tones_that_are_not_there(painted, sphere, tmp_path):
+    write_png(tmp_path / "wide.png", np.ones((16, 64, 4), dtype=np.float32))
+    out = ("-o", tmp_path / "a.png", "--size", "64x64")
+    for mesh, words, wanted in (
+        (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
+        (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
+        (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
+        (sphere, ("--tone-picture", tmp_path / "none.png"), ("none.png", "no such file")),
+        (sphere, ("--tone-picture", tmp_path / "wide.png"), ("wide.png", "64 x 16")),
+        (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
+        (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("not both",)),
+    ):
+        assert_refused(rosy("render", mesh, *out, *words), *wanted)
+        assert not (tmp_path / "a.png").exists()
+
+
+def test_a_field_that_follows_says_so(sphere, tmp_path):
+    made = tmp_path / "sphere.rosy"
+    assert rosy("field", sphere, "-o", made).returncode == 0
+    cut = write_off(tmp_path / "cut.off", icosphere(4))
+    done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
+                "--field-mesh", sphere)  # fmt: skip
+    assert done.returncode == 0
+    assert "followed by position, from sphere.off" in done.stderr

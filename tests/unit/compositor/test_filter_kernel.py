@@ -1,0 +1,44 @@
+"""How the samples of streamlines are weighted, against sums written out."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rosy_addon.compositor.filter_kernel import full_sample_count, kernel_weights
+from rosy_addon.compositor.look import Look
+
+
+@st.composite
+def streamlines(draw):
+    reach = draw(st.integers(0, 400))
+    return draw(st.integers(0, reach)), draw(st.integers(0, reach)), reach
+
+
+@given(streamlines())
+def test_sums_of_tapered_weights_in_closed_form(streamline):
+    ahead, behind, reach = streamline
+    away = np.abs(np.arange(-behind, ahead + 1))
+    weight = 1 - away / (reach + 1)
+    found = kernel_weights(np.float64(ahead), np.float64(behind), reach, tapered=True)
+    np.testing.assert_allclose(found.total, weight.sum(), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.effective_samples, weight.sum() ** 2 / (weight**2).sum(), rtol=1e-9
+    )
+
+
+@given(streamlines())
+def test_without_taper_every_sample_counts_as_one(streamline):
+    ahead, behind, reach = streamline
+    found = kernel_weights(ahead, behind, reach, tapered=False)
+    assert found.total == found.effective_samples == ahead + behind + 1
+
+
+def test_tapered_streamlines_have_three_quarters_of_the_samples():
+    for length in (40, 400):
+        plain, tapered = (
+            full_sample_count(Look(length=length, taper=taper)) for taper in (False, True)
+        )
+        assert plain == 2 * length + 1
+        assert abs(tapered / plain - 0.75) < 0.01

@@ -1,0 +1,325 @@
+"""LIC images against integrators and statistics that were not written for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import long
+from planar_fields import pair_angle, pixel_centres, swirl_angle
+from scipy import ndimage
+
+from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.contrast import blend_gain, expected_std
+from rosy_addon.compositor.image_noise import image_noise
+from rosy_addon.compositor.lic import METHODS
+from rosy_addon.compositor.look import Look
+from rosy_addon.errors import RosyError
+
+#: These tests draw many pictures and measure them.
+pytestmark = pytest.mark.slow
+
+SIZE = 256
+PLAIN = Look(
+    gain=1.0, density=0.5, high_pass=0.0
+)  # the paper's noise, and the contrast of one member
+
+
+def plain(**settings):
+    """The plain look with some settings changed."""
+    return PLAIN.with_settings(settings)
+
+
+def tone(angles, degree, look=PLAIN, **more):
+    """(H, W) display values of a planar picture before clipping, one channel."""
+    picture = compose_planar(angles, degree, look, **more)
+    return picture.layers[0].tone[:, 0].reshape(angles.shape)
+
+
+def correlation(a, b):
+    return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
+
+
+def own_noise(size, grain=1.5, seed=0):
+    return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
+
+
+def window(length, taper):
+    """What the samples of a streamline weigh, from end to end."""
+    whole = np.arange(-length, length + 1)
+    return 1 - np.abs(whole) / (length + 1) if taper else np.ones(2 * length + 1)
+
+
+def plain_lic(angle, noise, size, length, step, taper=False):
+    """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
+    x, y = pixel_centres(size)
+    start = x + 1j * y
+
+    def direction(p):
+        return np.exp(1j * angle(p.real, p.imag, size))
+
+    def inside(p):
+        return (p.real >= 0) & (p.real < size) & (p.imag >= 0) & (p.imag < size)
+
+    def look_up(p):
+        column = np.clip(p.real.astype(int), 0, size - 1)
+        row = np.clip(p.imag.astype(int), 0, size - 1)
+        return noise[row, column]
+
+    total, count = noise.copy(), np.ones_like(noise)
+    for sign in (1, -1):
+        p, alive = start.copy(), np.ones(start.shape, dtype=bool)
+        for weight in window(length, taper)[length + 1 :]:
+            h = sign * step
+            k1 = direction(p)
+            k2 = direction(p + h / 2 * k1)
+            k3 = direction(p + h / 2 * k2)
+            k4 = direction(p + h * k3)
+            p = p + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            alive &= inside(p)
+            total += weight * np.where(alive, look_up(p), 0)
+            count += weight * alive
+    return total / count
+
+
+def whole(image, margin=50):
+    return image[margin:-margin, margin:-margin]
+
+
+@pytest.mark.parametrize("taper", [False, True])
+def test_one_direction_agrees_with_a_plain_integrator(taper):
+    x, y = pixel_centres(SIZE)
+    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
+    look = plain(method="members", taper=taper)
+    found = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
+    assert correlation(whole(found), whole(expected)) > 0.99
+
+
+@pytest.mark.parametrize("taper", [False, True])
+def test_one_direction_resembles_another_library(taper):
+    rlic = pytest.importorskip("rlic")
+    x, y = pixel_centres(SIZE)
+    angles = swirl_angle(x, y, SIZE)
+    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    length = PLAIN.length
+    expected = rlic.convolve(
+        noise, np.cos(angles), np.sin(angles), kernel=window(length, taper), iterations=1
+    )
+    found = tone(angles, 1, plain(taper=taper), noise=noise)
+    assert correlation(whole(found), whole(expected)) > 0.7
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
+def test_the_decomposition_agrees_with_brute_force(degree):
+    angles = pair_angle(*pixel_centres(SIZE), SIZE, degree)
+    members = tone(angles, degree, plain(method="members"))
+    brute = tone(angles, degree, plain(method="brute"))
+    assert correlation(members, brute) > 0.98
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_any_member_stands_for_the_field(degree, method):
+    size = 64
+    angles = pair_angle(*pixel_centres(size), size, degree)
+    turns = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
+    look = plain(method=method, length=10)
+    # A float that rounds to the other side of a pixel's border moves one sample of twenty-one.
+    difference = np.abs(tone(angles, degree, look) - tone(angles + turns, degree, look))
+    assert np.mean(difference > 1e-5) < 0.002
+
+
+@pytest.mark.parametrize("noise", [{}, {"high_pass": 16.0, "density": 0.1}, {"taper": True}])
+@pytest.mark.parametrize("degree", [7, *long(2, 3, 4, 5, 6)])
+@pytest.mark.parametrize("method", ["members", "sheets"])
+def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
+    size = 512
+    angles = np.full((size, size), 0.2)
+    layers = compose_planar(angles, degree, plain(method=method, **noise)).layers[0]
+    inner = whole(np.arange(size * size).reshape(size, size)).ravel()
+    one = np.mean([member[inner].std() for member in layers.images.members])
+    assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
+    assert layers.tone[inner].mean() == pytest.approx(0.5, abs=0.01)
+
+
+def test_independence_alone_would_overstate_the_contrast_of_seven():
+    # Equation 6 takes the images for independent; the correction for their crossing is a tenth.
+    gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
+    assert 0.87 < gain / np.sqrt(7) < 0.94
+
+
+@pytest.mark.parametrize("high_pass", [0.0, 8.0, 24.0])
+@pytest.mark.parametrize("grain", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize("length", [20, 80])
+@pytest.mark.parametrize("taper", [False, True])
+def test_deviation_of_one_member_is_as_theory_says(taper, grain, length, high_pass):
+    size = 512
+    look = plain(grain=grain, length=length, high_pass=high_pass, taper=taper)
+    spread = []
+    for angle in (0.1, 0.9, 1.7, 2.6):
+        image = tone(np.full((size, size), angle), 1, look)
+        spread.append(whole(image, length + 5).std())
+    assert np.mean(spread) == pytest.approx(expected_std(look), rel=0.05)
+
+
+def along_field_autocorrelation(image, angles, chosen, lag):
+    """Correlation of pixels with the points `lag` pixels away along the first member."""
+    row, column = np.nonzero(chosen)
+    r, c = row + lag * np.sin(angles[chosen]), column + lag * np.cos(angles[chosen])
+    there = ndimage.map_coordinates(image, [r, c], order=1, mode="nearest")
+    return correlation(image[row, column], there)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        {"method": "members", "weights": "cosine"},
+        {"method": "members", "weights": "binary"},
+        {"method": "sheets"},
+    ],
+)
+@pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
+def test_breaking_points_do_not_show(degree, way):
+    size, guides = 384, 4
+    x, _ = pixel_centres(size)
+    # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
+    angles = 3 * 2 * np.pi / degree * x / size
+    spread, alike = np.zeros(2), np.zeros(2)
+    # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
+    for guide in np.arange(guides) * 2 * np.pi / degree / guides:
+        image = tone(angles, degree, plain(guiding_angle=guide, **way))
+        turn = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
+        inner = np.zeros_like(x, dtype=bool)
+        inner[50:-50, 50:-50] = True
+        for place, chosen in enumerate((inner & (turn > 2.7), inner & (turn < 2.2))):
+            spread[place] += image[chosen].std()
+            alike[place] += along_field_autocorrelation(image, angles, chosen, 4)
+    assert spread[0] == pytest.approx(spread[1], rel=0.05)
+    assert alike[0] == pytest.approx(alike[1], rel=0.05)
+
+
+def test_one_set_alone_shows_the_breaking_points():
+    angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
+    brute = tone(angles, 4, plain(method="brute"))
+    both = tone(angles, 4, plain(method="members"))
+    one = tone(angles, 4, plain(method="members", weights="none"))
+    assert correlation(one, brute) < correlation(both, brute) - 0.01
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_short_streamlines_have_the_contrast_of_whole_ones(method):
+    look = plain(method=method)
+    size = 256
+    angles = np.full((size, size), 0.0)
+    angles[:, 100:112] = np.nan
+    image = tone(angles, 1, look)
+    # Ten pixels from a gap half of a streamline is missing.
+    beside, away = image[:, 112:122], image[:, 170:200]
+    assert beside.std() == pytest.approx(away.std(), rel=0.1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_undefined_pixels_end_streamlines_and_stay_grey(method):
+    look = plain(method=method)
+    angles = np.full((64, 64), 0.0)
+    angles[:, 32:] = np.nan
+    changed = np.full((64, 64), 0.0)
+    noise = own_noise(64).reshape(64, 64)
+    other = noise.copy()
+    other[:, 32:] = 1 - other[:, 32:]
+    assert np.array_equal(
+        tone(angles, 1, look, noise=noise)[:, :32], tone(angles, 1, look, noise=other)[:, :32]
+    )
+    assert not np.array_equal(
+        tone(changed, 1, look, noise=noise)[:, :32], tone(changed, 1, look, noise=other)[:, :32]
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_magnitude_drives_the_length_of_streaks(method):
+    size = 256
+    angles = np.zeros((size, size))
+    rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
+    look = plain(method=method, magnitude="length", magnitude_range=1.0)
+    image = tone(angles, 1, look, magnitude=rho)
+
+    def along(rows, lag):
+        return correlation(image[rows, :-lag], image[rows, lag:])
+
+    assert along(slice(0, 120), 20) > 0.6
+    assert along(slice(136, 256), 20) < 0.2
+    assert along(slice(136, 256), 3) > 0.5
+
+
+def test_colour_noise_is_three_pictures():
+    angles = pair_angle(*pixel_centres(128), 128, 4)
+    picture = compose_planar(angles, 4, plain(noise="colour"))
+    channels = picture.layers[0].tone
+    assert channels.shape == (128 * 128, 3)
+    assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
+    grey = tone(angles, 4)
+    assert np.allclose(channels[:, 0].reshape(128, 128), grey, atol=1e-6)
+
+
+def test_the_same_settings_give_the_same_bytes():
+    angles = pair_angle(*pixel_centres(128), 128, 4)
+    first, second = (compose_planar(angles, 4, Look()).rgba.tobytes() for _ in range(2))
+    assert first == second
+    assert compose_planar(angles, 4, Look(seed=1)).rgba.tobytes() != first
+
+
+def orientation_spectrum(image, bins=360):
+    """Power by direction of the streaks (a half turn from the wave vectors), smoothed a little."""
+    size = image.shape[0]
+    window = np.hanning(size)
+    power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(window, window))) ** 2
+    k = np.fft.fftfreq(size)
+    kx, ky = np.meshgrid(k, k)
+    ring = (np.hypot(kx, ky) > 0.05) & (np.hypot(kx, ky) < 0.35)
+    direction = (np.arctan2(ky, kx) + np.pi / 2) % np.pi
+    bin_of = (direction[ring] / np.pi * bins).astype(int) % bins
+    spectrum = np.bincount(bin_of, power[ring], bins) / np.maximum(
+        np.bincount(bin_of, None, bins), 1
+    )
+    kernel = np.array([1, 2, 3, 2, 1]) / 9
+    return np.convolve(np.tile(spectrum, 3), kernel, "same")[bins : 2 * bins]
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+def test_the_spectrum_peaks_at_the_members(degree):
+    size, angle = 512, 0.3
+    spectrum = orientation_spectrum(tone(np.full((size, size), angle), degree))
+    members = angle + 2 * np.pi * np.arange(degree) / degree
+    bins = len(spectrum)
+    expected = np.unique(np.rint(members % np.pi / np.pi * bins).astype(int) % bins)
+    peaks = []
+    remaining = spectrum.copy()
+    for _ in expected:
+        peak = int(remaining.argmax())
+        peaks.append(peak)
+        remaining[np.arange(peak - 12, peak + 13) % bins] = 0
+    apart = np.abs((np.sort(peaks) - np.sort(expected) + bins // 2) % bins - bins // 2)
+    assert apart.max() <= 4  # 2 degrees
+    assert remaining.max() < 0.2 * spectrum.max()
+
+
+@pytest.mark.parametrize("degree", [0, -1, 1000, 2.5])
+def test_impossible_degrees_are_refused(degree):
+    with pytest.raises(RosyError, match="degree"):
+        compose_planar(np.zeros((8, 8)), degree, Look())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"length": 0},
+        {"step": 2.0},
+        {"method": "magic"},
+        {"gain": "much"},
+        {"view_plane": 1},
+        {"x": 1},
+    ],
+)
+def test_impossible_settings_are_refused(settings):
+    with pytest.raises(RosyError, match="setting"):
+        Look().with_settings(settings)

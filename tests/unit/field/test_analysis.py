@@ -1,0 +1,71 @@
+"""How smooth a field is, and how far from another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import from_triangles, icosphere, plane, torus
+
+from rosy_addon.field.analysis import angle_errors, dirichlet_energy, error_statistics
+from rosy_addon.field.convert import rotate_field
+from rosy_addon.field.frames import normalize
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.rosy_field import RosyField
+
+
+def spin(surface, degree, rate):
+    """A field on a plane that turns by `rate` radians for each unit of x."""
+    angle = rate * surface.face_center[:, 0]
+    return RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_the_energy_of_a_field_that_turns_evenly(degree):
+    """|grad z|^2 is (N rate)^2: over the plane, but for the outer half rows, 4 of them."""
+    surface = plane(80, 80)
+    rate = 0.7
+    energy = dirichlet_energy(surface, spin(surface, degree, rate))
+    assert np.isclose(energy, 4 * (degree * rate) ** 2, rtol=0.02)
+    assert dirichlet_energy(surface, spin(surface, degree, 0.0)) < 1e-12
+
+
+def test_energy_does_not_depend_on_size_member_or_length():
+    surface = torus(48, 24)
+    field = axis_field(surface, 4, (0.2, 0.3, 1.0))
+    energy = dirichlet_energy(surface, field)
+    large = from_triangles(7 * surface.vertices, surface.triangle_vertex)
+    small = from_triangles(surface.vertices, surface.triangle_vertex)
+    same = [dirichlet_energy(one, axis_field(one, 4, (0.2, 0.3, 1.0))) for one in (large, small)]
+    assert np.isclose(*same)
+    number = np.random.default_rng(0).integers(0, 4, surface.face_count)
+    other = rotate_field(surface, RosyField(4, 3 * field.vectors), number * np.pi / 2)
+    assert np.isclose(dirichlet_energy(surface, other), energy)
+
+
+def test_the_smoothest_field_has_less_energy_than_others():
+    ball = icosphere(3)
+    smoothest = dirichlet_energy(ball, generate(ball, "smoothest", 4))
+    assert smoothest < dirichlet_energy(ball, generate(ball, "curvature", 4))
+    assert smoothest < dirichlet_energy(ball, axis_field(ball, 4))
+    # 4 pi N, and what singularities of index 1/4 add on so coarse a mesh.
+    assert 4 * np.pi * 4 < smoothest < 3 * 4 * np.pi * 4
+
+
+@pytest.mark.parametrize("degree", [1, 3, 6])
+def test_errors_are_angles_to_the_nearest_member(degree, error_of):
+    ball = icosphere(2)
+    field = RosyField(degree, normalize(axis_field(ball, degree).vectors))
+    number = np.arange(ball.face_count) % degree
+    angle = 0.4 / degree
+    other = rotate_field(ball, field, angle + 2 * np.pi * number / degree)
+    error = angle_errors(ball, field, other)
+    np.testing.assert_allclose(error, angle, atol=1e-9)
+    facts = error_statistics(ball, error)
+    for name in ("mean", "rms", "max"):
+        assert np.isclose(facts[name], np.degrees(angle))
+    vectors = field.vectors.copy()
+    vectors[:10] = 0
+    part = angle_errors(ball, RosyField(degree, vectors), other)
+    assert np.isnan(part[:10]).all() and np.isfinite(part[10:]).all()
+    assert np.isclose(error_statistics(ball, part)["compared"], 1 - 10 / ball.face_count)
+    assert "cannot be compared" in error_of(angle_errors, ball, field, axis_field(ball, 12))

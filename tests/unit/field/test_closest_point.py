@@ -1,0 +1,59 @@
+"""The nearest triangle to points, against looking at all of them and against another library."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapes import from_triangles, icosphere, torus
+
+from rosy_addon.field.closest_point import closest_triangles, point_triangle_distances
+
+
+def everywhere(surface, points):
+    """Distances from all triangles: (n, T)."""
+    corners = surface.vertices[surface.triangle_vertex]
+    pairs = np.repeat(points, len(corners), axis=0), np.tile(corners, (len(points), 1, 1))
+    return point_triangle_distances(*pairs).reshape(len(points), -1)
+
+
+@pytest.mark.parametrize("surface", [icosphere(3), torus(24, 12)], ids=["sphere", "torus"])
+@pytest.mark.parametrize("far", [0.02, 0.5, 8.0])
+def test_none_is_nearer(surface, far):
+    points = np.random.default_rng(1).standard_normal((200, 3)) * far + (0.9, 0.1, 0.2)
+    triangle, distance = closest_triangles(surface, points)
+    every = everywhere(surface, points)
+    assert np.allclose(distance, every.min(axis=1))
+    assert np.array_equal(triangle, np.argmin(every, axis=1)) or np.allclose(
+        every[np.arange(200), triangle], distance
+    )
+
+
+def test_large_triangles_among_small_ones():
+    ball = icosphere(3, 0.1)
+    floor = np.array([(-9.0, -9.0, -1.0), (9.0, -9.0, -1.0), (0.0, 9.0, -1.0)])
+    count = len(ball.vertices)
+    surface = from_triangles(
+        np.concatenate([ball.vertices, floor]),
+        np.concatenate([ball.triangle_vertex, [(count, count + 1, count + 2)]]),
+    )
+    triangle, distance = closest_triangles(surface, np.array([(3.0, -4.0, -0.9), (0.0, 0.0, 0.2)]))
+    assert triangle[0] == len(ball.triangles) and np.isclose(distance[0], 0.1)
+    assert triangle[1] < len(ball.triangles) and np.isclose(distance[1], 0.1, atol=0.002)
+
+
+@settings(max_examples=100)
+@given(st.lists(st.floats(-3, 3), min_size=12, max_size=12))
+def test_distances_are_those_of_a_fine_net_of_points(numbers):
+    point, corners = np.array(numbers[:3]), np.array(numbers[3:]).reshape(3, 3)
+    u, v = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
+    u, v = u[u + v <= 1], v[u + v <= 1]
+    net = (
+        corners[0] + u[:, None] * (corners[1] - corners[0]) + v[:, None] * (corners[2] - corners[0])
+    )
+    nearest = np.linalg.norm(net - point, axis=1).min()
+    found = point_triangle_distances(point[None], corners[None])[0]
+    size = np.abs(corners - corners[0]).max()
+    assert found <= nearest + 1e-9
+    assert found >= nearest - size / 10

@@ -1,0 +1,295 @@
+"""Directions that are no RoSy: what they deviate by, how they are carried, and how they are drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapes import icosphere, plane
+
+from rosy_addon.color import to_display
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.lic import METHODS
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.directional_field import (
+    closest_rosy,
+    field_directions,
+    field_from_directions,
+    field_harmonics,
+    field_matching,
+    field_symmetry,
+    ratios_from_harmonics,
+    tensor_field,
+)
+from rosy_addon.field.field_io import read_field
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.representation import face_frames
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.validate import validated_directions
+from rosy_addon.projection.camera import look_at, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from tools.gallery.measure import orientation_spectrum, peaks
+
+WEAVE = Look(shading=0.0, grain=1.5, length=30)
+
+
+def turned(vectors, normal, angle):
+    return np.cos(angle) * vectors + np.sin(angle) * np.cross(normal, vectors)
+
+
+def fan_of(surface, angles, lengths):
+    """(F, N, 3): on each face the same angles from its first edge."""
+    x, _ = face_frames(surface)
+    return np.stack(
+        [
+            length * turned(x, surface.face_normal, angle)
+            for angle, length in zip(angles, lengths, strict=True)
+        ],
+        axis=1,
+    )
+
+
+# --- the algebra ---------------------------------------------------------------------------------
+
+
+@settings(max_examples=200)
+@given(st.integers(2, 7), st.integers(0, 10**6), st.integers(0, 6))
+def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
+    random = np.random.default_rng(seed)
+    w = np.exp(2j * np.pi * random.random((1, degree))) * (0.2 + random.random((1, degree)))
+    first, rho, deviations = closest_rosy(w)
+    other_first, other_rho, other = closest_rosy(np.roll(w, shift, axis=1))
+    ours = field_harmonics(RosyField(degree, np.ones((1, 3)), deviations))
+    theirs = field_harmonics(RosyField(degree, np.ones((1, 3)), other))
+    # z, and C_j: coefficients relative to the member times exp(-i j t).
+    assert np.allclose(np.exp(1j * degree * first), np.exp(1j * degree * other_first))
+    assert np.allclose(rho, other_rho)
+    for j in {*ours, *theirs}:
+        if 2 * j == degree:
+            continue  # known up to the sign that exp(i N t / 2) has
+        a = ours.get(j, np.zeros(1)) * np.exp(-1j * j * first)
+        b = theirs.get(j, np.zeros(1)) * np.exp(-1j * j * other_first)
+        assert np.allclose(a, b, atol=2e-4)
+
+
+@settings(max_examples=200)
+@given(st.integers(1, 7), st.integers(0, 10**6))
+def test_what_is_taken_apart_comes_together(degree, seed):
+    surface = icosphere(1)
+    random = np.random.default_rng(seed)
+    angles, lengths = 6.28 * random.random(degree), 0.2 + random.random(degree)
+    given_ones = fan_of(surface, angles, lengths)
+    field = field_from_directions(surface, given_ones)
+    found = field_directions(surface, field)
+    order = np.argsort((angles - angles[0]) % (2 * np.pi))
+    assert np.allclose(found, given_ones[:, order], atol=1e-9)
+    if field.direction_ratios is not None:
+        again = ratios_from_harmonics(field_harmonics(field), degree)
+        assert np.abs(again - field.direction_ratios).max() < 1e-3
+
+
+def test_the_representation_is_the_product_of_the_directions():
+    random = np.random.default_rng(0)
+    for degree in range(1, 9):
+        w = np.exp(2j * np.pi * random.random((5, degree)))
+        first, _, _ = closest_rosy(w)
+        assert np.allclose(np.exp(1j * degree * first), (-1) ** (degree - 1) * w.prod(axis=1))
+
+
+def test_a_rosy_stays_one():
+    surface = icosphere(2)
+    angles = 0.3 + 2 * np.pi * np.arange(6) / 6
+    field = field_from_directions(surface, fan_of(surface, angles, np.full(6, 2.0)))
+    assert field.direction_ratios is None
+    assert np.allclose(field.magnitude, 2)
+
+
+def test_opposite_directions_are_paired():
+    surface = plane()
+    pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
+    even = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 2)))
+    assert field_symmetry(even).has_opposites
+    uneven = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 3)))
+    assert not field_symmetry(uneven).has_opposites
+    odd = field_from_directions(surface, fan_of(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
+    assert not field_symmetry(odd).has_opposites
+
+
+def test_directions_on_vertices_are_averaged_onto_faces():
+    surface = plane(6, 6)
+    angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
+    here = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
+    given_ones = np.tile(here, (len(surface.vertices), 1, 1))
+    # Whichever is listed first.
+    for vertex in range(len(given_ones)):
+        given_ones[vertex] = np.roll(given_ones[vertex], vertex, axis=0)
+    field = validated_directions(surface, given_ones, "test", domain="vertex")
+    for found in field_directions(surface, field):
+        nearest = np.abs(found[:, None] - here).max(axis=2).min(axis=1)
+        assert nearest.max() < 1e-9
+
+
+# --- matching and families -----------------------------------------------------------------------
+
+
+def test_matching_follows_the_stored_members():
+    surface = plane(5, 5)
+    random = np.random.default_rng(3)
+    number = random.integers(0, 4, surface.face_count)
+    vectors = turned(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
+    angle = number * np.pi / 2
+    vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    faces, slip = field_matching(surface, RosyField(4, vectors))
+    assert np.array_equal(slip, (number[faces[:, 0]] - number[faces[:, 1]]) % 4)
+
+
+def test_eigenvectors_of_a_tensor():
+    surface = icosphere(3)
+    random = np.random.default_rng(0)
+    matrix = random.standard_normal((3, 3))
+    matrix = matrix + matrix.T
+    field = tensor_field(surface, np.tile(matrix, (surface.face_count, 1, 1)))
+    assert (field.degree, field.family_count) == (4, 2)
+    x, y = face_frames(surface)
+    for face in range(0, surface.face_count, 37):
+        frame = np.stack([x[face], y[face]])
+        values, vectors = np.linalg.eigh(frame @ matrix @ frame.T)
+        major, minor = field_directions(surface, field)[face][:2]
+        assert np.isclose(abs(normalize(major) @ (vectors[:, 1] @ frame)), 1)
+        assert np.isclose(np.linalg.norm(major), abs(values[1]), rtol=1e-2)
+        assert np.isclose(np.linalg.norm(minor), abs(values[0]), rtol=1e-2)
+
+
+def test_lines_are_told_apart_where_their_numbers_are_consistent():
+    surface = plane(8, 8)
+    angles, lengths = (0.0, 1.0, np.pi, np.pi + 1.0), (1, 1, 1, 1)
+    given_ones = fan_of(surface, angles, lengths)
+    assert field_from_directions(surface, given_ones).family_count == 2
+    given_ones[::2] = np.roll(given_ones[::2], 1, axis=1)
+    assert field_from_directions(surface, given_ones).family_count == 1
+
+
+# --- drawing -------------------------------------------------------------------------------------
+
+
+def from_above(surface, field, size, display="smooth"):
+    camera = orthographic_camera(np.eye(4), size, size, scale=2.0, clip=(-10, 10))
+    return project([MeshInstance(surface, np.eye(4), field)], camera, display)
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+@pytest.mark.parametrize(
+    "angles",
+    [(20, 70, 200, 250), (10, 55, 130), (0, 40, 100, 150), (15, 195)],
+    ids=["paired", "three", "four", "line"],
+)
+def test_streaks_run_along_free_directions(method, angles):
+    surface = plane(7, 7, 2.2)
+    radians = np.radians(angles)
+    directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
+    directions = np.tile(directions, (surface.face_count, 1, 1))
+    for face in range(surface.face_count):  # no order may matter
+        directions[face] = np.roll(directions[face], face, axis=0)
+    field = field_from_directions(surface, directions)
+    picture = compose(from_above(surface, field, 256), WEAVE.with_settings({"method": method}))
+    tone = picture.layers[0].tone.reshape(256, 256)[32:-32, 32:-32]
+    found = np.array(peaks(orientation_spectrum(tone)))
+    wanted = np.unique(np.mod(angles, 180))
+    assert len(found) == len(wanted)
+    assert np.abs((found - wanted + 90) % 180 - 90).max() < 2
+
+
+@pytest.mark.parametrize("method", list(METHODS))
+def test_a_conjugate_field_of_another_library(method, shared_data):
+    surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
+    field = read_field(shared_data / "fields" / "cheburashka-cf.rawfield", surface)
+    assert (
+        field.degree == 4
+        and field_symmetry(field).has_opposites
+        and field.direction_ratios is not None
+    )
+    for face in calm_faces(surface, field, 10):
+        found, wanted = drawn_and_stored(surface, field, face, method)
+        assert len(found) == len(wanted), face
+        assert np.abs((found - wanted + 90) % 180 - 90).max() < 2, face
+
+
+def calm_faces(surface, field, count):
+    """Faces around which the field is the same within a degree and a half, all over the mesh."""
+    from rosy_addon.field.surface import build_edges
+
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    one, other = surface.corner_face[edges.halfedges].T
+    stored = normalize(field_directions(surface, field))
+    across = np.abs(np.einsum("ika,ila->ikl", stored[one], stored[other])).max(axis=2).min(axis=1)
+    turn = np.degrees(np.arccos(np.minimum(across, 1)))
+    worst = np.zeros(surface.face_count)
+    np.maximum.at(worst, one, turn)
+    np.maximum.at(worst, other, turn)
+    between = np.degrees(np.arccos(np.clip(np.abs(dot(stored[:, 0], stored[:, 1])), 0, 1)))
+    calm = np.flatnonzero((worst < 1.5) & (between > 25))
+    assert len(calm) >= count
+    return np.random.default_rng(4).choice(calm, count, replace=False)
+
+
+def drawn_and_stored(surface, field, face, method):
+    """Orientations, in degrees, of the streaks on a face and of its stored vectors, as projected."""
+    normal = surface.face_normal[face]
+    centre = surface.face_center[face]
+    x, _ = face_frames(surface)
+    back = normalize(normal + 0.4 * x[face])  # not straight from above
+    size = np.ptp(surface.vertices[surface.corner_vertex[3 * face : 3 * face + 3]], axis=0).max()
+    view = look_at(centre + 10 * back, centre)
+    camera = orthographic_camera(view, 320, 320, scale=1.2 * size, clip=(0.1, 20))
+    instance = MeshInstance(surface, np.eye(4), field)
+    look = WEAVE.with_settings({"method": method})
+    picture = compose(project([instance], camera), look)
+    frame = np.full(320 * 320, np.nan)
+    frame[picture.layers[0].pixel] = picture.layers[0].tone[:, 0]
+    tone = frame.reshape(320, 320)[96:-96, 96:-96]
+    assert np.isfinite(tone).all()
+    found = np.array(peaks(orientation_spectrum(tone)))
+    screen = field_directions(surface, field)[face] @ view[:3, :3].T
+    wanted = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
+    # The two of each pair differ by rounding.
+    wanted = np.sort(wanted[:2])
+    return found, wanted
+
+
+# --- hues ----------------------------------------------------------------------------------------
+
+
+def test_hues_tell_families_apart_and_leave_the_brightness_alone():
+    surface = plane(7, 7, 2.2)
+    tensor = np.diag([3.0, -1.0, 0.0])
+    field = tensor_field(surface, np.tile(tensor, (surface.face_count, 1, 1)))
+    seen = from_above(surface, field, 256)
+    grey = compose(seen, WEAVE).rgba[..., :3]
+    hues = compose(seen, WEAVE.with_settings({"hue": "families"}))
+    luminance = [
+        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, hues.rgba[..., :3])
+    ]
+    # Equation 6 for the grey picture; the hues leave it as it is.
+    relative = [image.std() / image.mean() for image in luminance]
+    assert 0.7 < relative[1] / relative[0] < 1.1
+    assert np.corrcoef(luminance[0].ravel(), luminance[1].ravel())[0, 1] > 0.97
+    # The major direction runs along x: its streaks are orange, those along y blue.
+    warm = (hues.rgba[..., 0] - hues.rgba[..., 2]).astype(float)
+    orange, blue = np.clip(warm, 0, None), np.clip(-warm, 0, None)
+    along = [peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)]
+    assert np.abs((np.array(along[0]) + 90) % 180 - 90).max() < 3
+    assert np.abs(np.array(along[1]) - 90).max() < 3
+    # As much of the one as of the other, and clearly coloured.
+    shares = [np.mean(warm > 0.05), np.mean(warm < -0.05)]
+    assert min(shares) > 0.3
+
+
+def test_one_family_stays_grey():
+    surface = plane(7, 7, 2.2)
+    field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
+    seen = from_above(surface, field, 64)
+    colours = compose(seen, WEAVE.with_settings({"hue": "families"})).rgba
+    assert np.array_equal(colours, compose(seen, WEAVE).rgba)

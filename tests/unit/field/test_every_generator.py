@@ -1,0 +1,69 @@
+"""Every kind of field on every awkward mesh, from the command line."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from awkward import AWKWARD
+
+from rosy_addon.cli import main
+from rosy_addon.field.generate import GENERATORS
+
+#: Degrees of which the edges around each square, or each equilateral triangle, cancel out.
+CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
+
+
+@pytest.fixture(scope="module")
+def meshes(tmp_path_factory):
+    """.obj files, with a UV map that looks at them askew from above."""
+    folder = tmp_path_factory.mktemp("awkward")
+    for name, make in AWKWARD.items():
+        points, faces = make()
+        rows = [f"v {x} {y} {z}" for x, y, z in points]
+        rows += [f"vt {x + 0.2 * z} {y - 0.3 * z}" for x, y, z in points]
+        rows += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in face) for face in faces]
+        (folder / f"{name}.obj").write_text("\n".join(rows) + "\n")
+    (folder / "stroke.txt").write_text("0.2 0.2 0\n0.4 0.3 0\n0.5 0.3 0\n")
+    return folder
+
+
+@pytest.mark.parametrize("degree", [1, 3, 4, 12])
+@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.parametrize("kind", GENERATORS)
+def test_every_kind_on_every_mesh(meshes, tmp_path, capsys, kind, name, degree):
+    mesh, out = str(meshes / f"{name}.obj"), str(tmp_path / "a.rosy")
+    options = ["--uv", "--reach", "0.1"] if kind == "guided" else []
+    command = ["field", mesh, "-o", out, "--generate", kind, "--degree", str(degree), *options]
+    status = main(command)
+    said = capsys.readouterr()
+    if kind == "curvature" and degree % 2:
+        assert status == 2 and "a curvature field has an even degree" in said.err
+        return
+    if kind == "features" and degree in CANCELLED.get(name, ()):
+        assert status == 2 and "contradict each other" in said.err
+        return
+    assert status == 0, said.err
+    assert ("Möbius" in said.err) == (name == "moebius")
+    assert said.err.count("\n") == (name == "moebius")
+    assert main(["info", mesh, out, "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["degree"] == degree and np.isfinite(facts["energy"])
+    low, high = facts["magnitude"]
+    assert 0 <= low <= high <= 1 + 1e-6
+    flat = 1000 if name == "faces_without_area" else 0
+    if kind == "smoothest":
+        assert facts["undefined_faces"] == flat
+    assert facts["undefined_faces"] >= flat
+
+
+@pytest.mark.parametrize("name", ["cube", "moebius", "grid", "pieces", "triangle"])
+def test_strokes_on_every_mesh(meshes, tmp_path, capsys, name):
+    mesh, out = str(meshes / f"{name}.obj"), str(tmp_path / "a.rosy")
+    status = main(["field", mesh, "-o", out, "--strokes", str(meshes / "stroke.txt")])
+    said = capsys.readouterr()
+    if name == "moebius":  # around which the stroke is far away
+        assert status == 2 and "no stroke comes near it" in said.err
+    else:
+        assert status == 0, said.err

@@ -1,0 +1,241 @@
+"""Fields in the formats of other programs: there and back, and from a mesh to one like it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from shapes import from_triangles, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.directional_field import field_directions
+from rosy_addon.field.field_io import load_field, read_field, write_field
+from rosy_addon.field.formats.sings import read_sings
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.representation import face_representation
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.surface import build_surface
+
+BALL = icosphere(2)
+
+
+def free_directions(degree, seed=0):
+    """(F, N, 3) on the ball, no RoSy."""
+    random = np.random.default_rng(seed)
+    field = axis_field(BALL, 1, (0.1, 0.2, 1.0))
+    across = np.cross(BALL.face_normal, field.vectors)
+    angle = np.sort(random.random(degree)) * 2 * np.pi
+    length = 0.5 + random.random((BALL.face_count, degree))
+    turn = (np.exp(1j * angle) * length)[..., None]
+    return turn.real * field.vectors[:, None] + turn.imag * across[:, None]
+
+
+def write_off(path, surface):
+    rows = ["OFF", f"{len(surface.vertices)} {surface.face_count} 0"]
+    rows += [" ".join(map(repr, point)) for point in surface.vertices.tolist()]
+    starts = surface.face_start.tolist()
+    for start, stop in pairwise(starts):
+        rows.append(f"{stop - start} " + " ".join(map(str, surface.corner_vertex[start:stop])))
+    path.write_text("\n".join(rows) + "\n")
+
+
+# --- there and back --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", [".rosy", ".rawfield", ".txt", ".npy"])
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 7, 12])
+def test_members_come_back_to_the_last_bit(ending, degree, tmp_path):
+    field = axis_field(BALL, degree, (0.3, -0.2, 1.0))
+    path = tmp_path / f"a{ending}"
+    write_field(path, field, BALL)
+    again = read_field(path, BALL, degree)
+    assert again.degree == degree and again.direction_ratios is None
+    assert np.array_equal(again.vectors, field.vectors)
+
+
+@pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
+@pytest.mark.parametrize("degree", [2, 4, 5])
+def test_free_directions_come_back_to_the_last_bit(ending, degree, tmp_path):
+    stored = free_directions(degree)
+    np.save(tmp_path / "first.npy", stored)
+    field = read_field(tmp_path / "first.npy", BALL)
+    assert field.degree == degree and field.direction_ratios is not None
+    write_field(tmp_path / f"a{ending}", field, BALL)
+    again = read_field(tmp_path / f"a{ending}", BALL)
+    assert np.array_equal(again.source_directions, stored)
+    assert np.array_equal(again.vectors, field.vectors)
+    assert np.array_equal(again.direction_ratios, field.direction_ratios)
+
+
+@pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka-cf"])
+@pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
+def test_files_of_others_keep_every_number(name, ending, shared_data, tmp_path):
+    surface = read_mesh(shared_data / "meshes" / f"{name.partition('-')[0]}.off")
+    source = shared_data / "fields" / f"{name}.rawfield"
+    write_field(tmp_path / f"a{ending}", read_field(source, surface), surface)
+    wanted = np.array(source.read_text().split(), dtype=float)[2:]
+    if ending == ".npy":
+        found = np.load(tmp_path / "a.npy").ravel()
+    else:
+        words = (tmp_path / f"a{ending}").read_text().split()
+        found = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
+    assert np.array_equal(found, wanted)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_fieldgen_files_hold_the_mesh_and_a_field_on_vertices(degree, tmp_path):
+    surface = icosphere(4)
+    field = axis_field(surface, degree, (0.0, 0.0, 1.0))
+    field = RosyField(degree, normalize(field.vectors))
+    path = tmp_path / "a.obj"
+    write_field(path, field, surface)
+    mesh = read_mesh(path)
+    assert np.array_equal(mesh.vertices, surface.vertices)
+    assert np.array_equal(mesh.corner_vertex, surface.corner_vertex)
+    again = read_field(path, mesh)
+    assert again.degree == degree
+    z, wanted = face_representation(surface, again), face_representation(surface, field)
+    away = np.abs(surface.face_center[:, 2]) < 0.9  # of the poles, where it is singular
+    off = np.abs(np.angle(z[away] * wanted[away].conj())) / degree
+    assert np.degrees(off).max() < 1
+
+
+def test_what_fieldgen_explains_at_its_top_is_no_field(tmp_path, error_of):
+    path = tmp_path / "a.obj"
+    write_field(path, axis_field(BALL, 2), BALL)
+    head = "# written as\n#    degree n\n#    field i x y z\n#    singularity i s\n"
+    path.write_text(head + path.read_text() + "# singularity 3 0.5\n")
+    assert read_field(path, BALL).degree == 2
+    path.write_text("\n".join(x for x in path.read_text().splitlines() if " field 7 " not in x))
+    assert "one of each is wanted" in error_of(read_field, path, BALL)
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert "a mesh without a field" in error_of(read_field, path, BALL)
+
+
+def test_singularities_come_back(tmp_path, error_of):
+    surface = torus(32, 16)
+    field = curvature_field(BALL, 4)
+    write_field(tmp_path / "a.sings", field, BALL)
+    degree, vertex, index = read_sings(tmp_path / "a.sings")
+    wanted = find_singularities(BALL, field)
+    assert degree == 4 and np.array_equal(vertex, wanted[0]) and np.array_equal(index, wanted[1])
+    assert "holds singularities" in error_of(read_field, tmp_path / "a.sings", surface)
+    (tmp_path / "b.sings").write_text("4 3\n1 1\n2 1\n")
+    assert "says 3 singularities, but holds 2" in error_of(read_sings, tmp_path / "b.sings")
+
+
+def test_tensors_are_told_from_three_directions(tmp_path):
+    random = np.random.default_rng(0)
+    matrices = random.standard_normal((BALL.face_count, 3, 3))
+    matrices += matrices.swapaxes(1, 2)
+    np.save(tmp_path / "a.npy", matrices)
+    field = read_field(tmp_path / "a.npy", BALL)
+    assert (field.degree, field.family_count) == (4, 2)
+    np.savetxt(tmp_path / "a.txt", matrices.reshape(-1, 9), delimiter=",")
+    assert np.allclose(read_field(tmp_path / "a.txt", BALL).vectors, field.vectors)
+    np.save(tmp_path / "b.npy", free_directions(3))
+    assert read_field(tmp_path / "b.npy", BALL).degree == 3
+
+
+WRONG = {
+    "a.txt": ("1 2 3\n1 2\n", "a.txt:2: has 2 numbers, the rows above have 3"),
+    "b.txt": ("1 2\n3 4\n", "has 2 numbers a row"),
+    "c.txt": ("", "holds no numbers"),
+    "d.txt": ("1 2 x\n", "d.txt:1: found 'x', wanted a number"),
+    "e.txt": ("1 2 3\n", "holds 1 rows, but the mesh"),
+    "f.npy": ("hello", "is no .npy file"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
+    text, wanted = WRONG[name]
+    (tmp_path / name).write_text(text)
+    message = error_of(read_field, tmp_path / name, BALL)
+    assert wanted in message and str(tmp_path / name) in message and "\n" not in message
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([".obj", ".txt", ".npy"]))
+def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path, garbage, place, ending):
+    path = tmp_path / f"damaged{ending}"
+    write_field(path, axis_field(BALL, 4), BALL)
+    data = path.read_bytes()
+    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    try:
+        read_field(path, BALL)
+    except RosyError as error:
+        assert "\n" not in str(error) and str(path) in str(error)
+
+
+# --- by position -----------------------------------------------------------------------------
+
+
+def quads_and_triangles():
+    """A torus of quads, and the same triangulated, its vertices and faces in another order."""
+    quads = torus(48, 24)
+    random = np.random.default_rng(5)
+    new = random.permutation(len(quads.vertices))
+    vertices = np.empty_like(quads.vertices)
+    vertices[new] = quads.vertices
+    triangles = new[quads.triangle_vertex]
+    return quads, from_triangles(vertices, triangles[random.permutation(len(triangles))])
+
+
+@pytest.mark.parametrize("degree", [1, 4, 6])
+def test_a_field_follows_by_position_and_says_so(degree, tmp_path):
+    quads, triangles = quads_and_triangles()
+    field = axis_field(quads, degree, (0.0, 0.0, 1.0))
+    write_off(tmp_path / "a.off", quads)
+    write_field(tmp_path / "a.rosy", field, quads)
+    again, note = load_field(tmp_path / "a.rosy", triangles)
+    assert "followed by position, from a.off" in note and "1,152" in note and "2,304" in note
+    wanted = axis_field(triangles, degree, (0.0, 0.0, 1.0))
+    z, right = (face_representation(triangles, one) for one in (again, wanted))
+    certain = wanted.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
+    assert np.degrees(np.abs(np.angle(z * right.conj()))[certain]).max() / degree < 8
+    assert np.median(np.abs(np.angle(z * right.conj()))[certain]) / degree < np.radians(1)
+
+
+def test_other_faces_of_the_same_number_follow_a_mesh_that_is_named(tmp_path):
+    order = np.random.default_rng(1).permutation(BALL.face_count)
+    mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
+    field = axis_field(BALL, 4, (0.0, 0.0, 1.0))
+    write_field(tmp_path / "a.rosy", field, BALL)
+    write_off(tmp_path / "own.off", BALL)
+    again = read_field(tmp_path / "a.rosy", mixed, mesh=tmp_path / "own.off")
+    assert np.allclose(again.vectors, field.vectors[order], atol=1e-12)
+
+
+def test_free_directions_follow_too(tmp_path):
+    order = np.random.default_rng(1).permutation(BALL.face_count)[:-2]
+    mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
+    np.save(tmp_path / "a.npy", free_directions(3))
+    write_off(tmp_path / "a.off", BALL)
+    again = read_field(tmp_path / "a.npy", mixed)
+    whole = read_field(tmp_path / "a.npy", BALL)
+    assert np.allclose(
+        field_directions(mixed, again), field_directions(BALL, whole)[order], atol=1e-9
+    )
+
+
+def test_another_shape_is_refused(tmp_path, error_of):
+    write_off(tmp_path / "a.off", BALL)
+    write_field(tmp_path / "a.rosy", axis_field(BALL, 4), BALL)
+    far = build_surface(plane(5, 5).vertices + 3, plane(5, 5).corner_vertex, plane(5, 5).face_start)
+    message = error_of(read_field, tmp_path / "a.rosy", far)
+    assert "it is another shape, or in another place" in message
+
+
+def test_vectors_that_follow_lie_in_their_planes(tmp_path):
+    quads, triangles = quads_and_triangles()
+    write_off(tmp_path / "a.off", quads)
+    write_field(tmp_path / "a.rosy", axis_field(quads, 2), quads)
+    again = read_field(tmp_path / "a.rosy", triangles)
+    assert np.abs(dot(again.vectors, triangles.face_normal)).max() < 1e-12

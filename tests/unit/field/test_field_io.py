@@ -1,0 +1,330 @@
+"""Fields from files and to files, and the check of vectors that come from outside."""
+
+from __future__ import annotations
+
+import os
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from shapes import cylinder, from_quads, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.directional_field import field_directions
+from rosy_addon.field.field_io import read_field, write_field
+from rosy_addon.field.frames import dot
+from rosy_addon.field.generate import axis_field
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.representation import face_representation
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.validate import validated_field
+
+SQUARES = plane(3, 2)  # 6 faces, 12 vertices, facing +z
+WEST = np.tile((-2.0, 0.0, 0.0), (6, 1))
+
+
+def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
+    head = form.format(count=len(rows) if count is None else count, degree=degree)
+    return head + "".join(" ".join(map(str, row)) + "\n" for row in rows)
+
+
+# --- reading and writing ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "form", ["{count}\n{degree}\n", "{count} {degree}\n", "\t{count}\r\n\n {degree} "]
+)
+def test_count_and_degree_may_stand_on_one_line_or_two(form, tmp_path):
+    (tmp_path / "a.rosy").write_text(rosy_text(WEST, form=form))
+    field = read_field(tmp_path / "a.rosy", SQUARES)
+    assert field.degree == 4
+    assert np.array_equal(field.vectors, WEST)
+
+
+def test_rows_may_be_broken_anywhere(tmp_path):
+    words = rosy_text(WEST).split()
+    (tmp_path / "a.rosy").write_text("\n".join(words))
+    assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
+
+
+def test_rows_tell_when_the_vertex_count_stands_over_face_rows(tmp_path, error_of):
+    (tmp_path / "a.rosy").write_text(rosy_text(WEST, count=12))
+    assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
+    (tmp_path / "b.rosy").write_text(rosy_text(np.tile(WEST, (2, 1)), count=6))
+    assert "says 6 rows of 3 numbers, but holds 12" in error_of(
+        read_field, tmp_path / "b.rosy", SQUARES
+    )
+
+
+def test_rows_for_vertices_are_averaged_onto_faces(tmp_path):
+    # Members of a vertex may be any: those of a square alternate between two of the four.
+    members = np.where(np.arange(12)[:, None] % 2, (0.0, 3.0, 0.0), (3.0, 0.0, 0.0))
+    (tmp_path / "a.rosy").write_text(rosy_text(members))
+    field = read_field(tmp_path / "a.rosy", SQUARES)
+    assert field.vectors.shape == (6, 3)
+    # A mean of the vectors would be shorter, and at 45 degrees to all of them.
+    assert np.allclose(face_representation(SQUARES, field), 3)
+
+
+finite = st.floats(-1e150, 1e150, allow_subnormal=False)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.integers(1, 12),
+    st.lists(st.tuples(finite, finite), min_size=6, max_size=6),
+    st.sampled_from([".rosy", ".rawfield"]),
+)
+def test_what_is_written_is_read_to_the_last_bit(tmp_path, degree, vectors, ending):
+    vectors = np.concatenate([np.array(vectors), np.zeros((6, 1))], axis=1)
+    field = RosyField(degree, vectors)
+    path = tmp_path / f"field{ending}"
+    write_field(path, field, SQUARES)
+    again = read_field(path, SQUARES, degree)
+    assert again.degree == degree
+    assert np.array_equal(again.vectors, field.vectors)
+
+
+@pytest.mark.parametrize("ending", [".rosy", ".rawfield"])
+@pytest.mark.parametrize("degree", [1, 3, 6])
+def test_round_trip_on_a_curved_surface(degree, ending, tmp_path):
+    surface = icosphere(2)
+    field = axis_field(surface, degree, (0.3, -0.2, 1.0))
+    write_field(tmp_path / f"a{ending}", field, surface)
+    again = read_field(tmp_path / f"a{ending}", surface)
+    assert np.array_equal(again.vectors, field.vectors)
+
+
+def test_rawfield_members_run_counter_clockwise_from_the_stored_one(tmp_path):
+    write_field(tmp_path / "a.rawfield", RosyField(4, WEST), SQUARES)
+    lines = (tmp_path / "a.rawfield").read_text().splitlines()
+    assert lines[0] == "4 6"
+    members = np.array(lines[1].split(), dtype=float).reshape(4, 3)
+    assert np.allclose(members, [(-2, 0, 0), (0, -2, 0), (2, 0, 0), (0, 2, 0)], atol=1e-15)
+
+
+def test_members_may_be_listed_in_any_order(tmp_path):
+    members = np.array([(-2, 0, 0), (0, 2, 0), (2, 0, 0), (0, -2, 0)], dtype=float)
+    rows = np.tile(members.reshape(1, 12), (6, 1))
+    (tmp_path / "a.rawfield").write_text(rosy_text(rows, form="{degree} {count}\n"))
+    assert np.array_equal(read_field(tmp_path / "a.rawfield", SQUARES).vectors, WEST)
+
+
+@pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka"])
+def test_fields_of_others(name, shared_data):
+    mesh, _, degree = name.partition("-")
+    surface = read_mesh(shared_data / "meshes" / f"{mesh}.off")
+    field = read_field(shared_data / "fields" / f"{name}.rawfield", surface)
+    assert field.degree == int(degree or 4)
+    assert np.allclose(field.magnitude, 1, atol=1e-4)
+    assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
+    if name == "cheburashka":  # the one that is closed
+        _, index = find_singularities(surface, field)
+        assert index.sum() == field.degree * euler_characteristic(surface)
+
+
+def test_directions_that_are_no_rosy_keep_their_angles_and_lengths(shared_data, tmp_path, error_of):
+    surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
+    path = shared_data / "fields" / "cheburashka-cf.rawfield"
+    field = read_field(path, surface)
+    stored = np.array(path.read_text().split()[2:], dtype=float).reshape(-1, 4, 3)
+    assert np.allclose(field_directions(surface, field), stored, atol=1e-5)
+    message = error_of(write_field, tmp_path / "a.rosy", field, surface)
+    assert "the directions of this field are no RoSy" in message
+
+
+@pytest.mark.parametrize(
+    ("angle", "longer", "rosy"), [(0.9, 0.009, True), (1.2, 0.0, False), (0.0, 0.02, False)]
+)
+def test_a_degree_and_a_hundredth_are_allowed(angle, longer, rosy, tmp_path):
+    turn = np.radians([0, 120 + angle, 240])
+    members = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    members[2] *= 1 + longer
+    rows = np.tile(members.reshape(1, 9), (6, 1))
+    (tmp_path / "a.rawfield").write_text(rosy_text(rows, degree=3, form="{degree} {count}\n"))
+    field = read_field(tmp_path / "a.rawfield", SQUARES)
+    assert field.degree == 3
+    assert (field.direction_ratios is None) == rosy
+
+
+DAMAGED = {
+    "empty.rosy": (b"", "ends before the count"),
+    "count.rosy": (b"6\n", "ends before the degree"),
+    "truncated.rosy": (rosy_text(WEST)[:32].encode(), "says 6 rows of 3 numbers, but holds 2"),
+    "torn.rosy": (rosy_text(WEST)[:-5].encode(), "but holds 5 and a part of one"),
+    "claims.rosy": (b"178956970 4\n1 0 0\n", "says 178956970 rows of 3 numbers, but holds 1"),
+    "claims.rawfield": (b"12 59652323\n1 0 0\n", "says 59652323 rows of 36 numbers, but holds 0"),
+    "binary.rosy": (bytes(range(200)), "holds binary data, text is wanted"),
+    "binary.rawfield": (b"\x89PNG\r\n\x1a\n\xff\xfe", "binary.rawfield:1: found"),
+    "word.rosy": (rosy_text(WEST).replace("-2.0", "two", 2).replace("two", "-2.0", 1).encode(),
+                  "word.rosy:4: found 'two', wanted a number"),
+    "zero.rosy": (rosy_text(WEST, degree=0).encode(), "zero.rosy:2: degree 0 is not"),
+    "minus.rosy": (rosy_text(WEST, degree=-1).encode(), "minus.rosy:2: degree -1 is not"),
+    "thousand.rosy": (rosy_text(WEST, degree=1000).encode(), "thousand.rosy:2: degree 1000 is not"),
+    "half.rosy": (rosy_text(WEST, degree=2.5).encode(), "half.rosy:2: found '2.5', wanted the degree"),
+    "zero.rawfield": (b"0 6\n", "zero.rawfield:1: degree 0 is not a whole number from 1 to 12"),
+    "negative.rosy": (b"-6 4\n", "says -6 rows"),
+    "many.rosy": (rosy_text(np.ones((7, 3))).encode(), "holds 7 rows, but the mesh plane has 6 faces and 12 v"),
+    "nan.rosy": (rosy_text(np.where(np.arange(6)[:, None] == 4, np.nan, WEST)).encode(),
+                 "1 of 6 vectors are not finite, the first on face 4"),
+    "inf.rawfield": (rosy_text(np.tile((np.inf, 0, 0), (6, 1)), degree=1, form="{degree} {count}\n").encode(),
+                     "6 of 6 vectors are not finite, the first on face 0"),
+    "upright.rosy": (rosy_text(np.tile((0, 0, 1), (6, 1))).encode(), "worst on face 0 by 90.0 degrees"),
+    "a.vtk": (b"", "'.vtk' files"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
+    data, wanted = DAMAGED[name]
+    (tmp_path / name).write_bytes(data)
+    SQUARES.face_normal  # noqa: B018  not to be counted below
+    tracemalloc.start()
+    message = error_of(read_field, tmp_path / name, SQUARES)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert wanted in message
+    assert str(tmp_path / name) in message
+    assert peak < 1e6, "a claim in a header must not be believed"
+
+
+def test_a_huge_binary_file_is_refused_before_it_is_read(tmp_path, error_of):
+    with open(tmp_path / "huge.rosy", "wb") as file:
+        file.truncate(2 << 30)  # a hole: takes no space
+    tracemalloc.start()
+    assert "binary data" in error_of(read_field, tmp_path / "huge.rosy", SQUARES)
+    assert tracemalloc.get_traced_memory()[1] < 1e6
+    tracemalloc.stop()
+
+
+def test_missing_file_and_conflicting_degree(tmp_path, error_of):
+    assert "no such file" in error_of(read_field, tmp_path / "none.rosy", SQUARES)
+    (tmp_path / "a.rosy").write_text(rosy_text(WEST))
+    message = error_of(read_field, tmp_path / "a.rosy", SQUARES, 6)
+    assert "holds a field of degree 4, not 6" in message
+
+
+@given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
+def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, place, ending):
+    path = tmp_path_factory.getbasetemp() / f"damaged{ending}"
+    write_field(path, RosyField(4, WEST), SQUARES)
+    data = path.read_bytes()
+    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    try:
+        read_field(path, SQUARES)
+    except RosyError as error:
+        assert "\n" not in str(error) and str(path) in str(error)
+
+
+def test_unwritable_output_is_an_error_and_leaves_what_was_there(tmp_path, error_of, monkeypatch):
+    field = RosyField(4, WEST)
+    assert "there is no folder" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
+    (tmp_path / "b.rosy").mkdir()
+    assert "is a folder" in error_of(write_field, tmp_path / "b.rosy", field, SQUARES)
+    assert "'.vtk' files" in error_of(write_field, tmp_path / "a.vtk", field, SQUARES)
+
+    (tmp_path / "c.rosy").write_text("old")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    assert "no space left" in error_of(write_field, tmp_path / "c.rosy", field, SQUARES)
+    assert (tmp_path / "c.rosy").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b.rosy", "c.rosy"]
+
+
+# --- vectors from outside ----------------------------------------------------------------------
+
+
+def test_small_deviations_are_turned_into_the_plane_with_their_length():
+    vectors = WEST + (0, 0, 0.1)
+    field = validated_field(SQUARES, vectors, 4, "here")
+    assert np.allclose(field.vectors, (-np.hypot(2, 0.1), 0, 0), atol=1e-14)
+
+
+def test_vectors_clearly_off_the_surface_are_refused_naming_the_worst(error_of):
+    surface = torus()
+    field = axis_field(surface, 4)
+    vectors = field.vectors + surface.face_normal * 0.05 * field.magnitude[:, None]
+    few = np.array([7, 100, 2000])
+    vectors[few] += 0.3 * surface.face_normal[few] * field.magnitude[few, None]
+    assert np.allclose(
+        face_representation(surface, validated_field(surface, vectors, 4, "here"))
+        / face_representation(surface, field),
+        np.where(np.isin(np.arange(surface.face_count), few), np.hypot(1, 0.35), np.hypot(1, 0.05)),
+    )
+    many = np.arange(0, surface.face_count, 50)
+    vectors[many] += 0.3 * surface.face_normal[many] * field.magnitude[many, None]
+    vectors[500] += 2 * surface.face_normal[500] * field.magnitude[500, None]
+    message = error_of(validated_field, surface, vectors, 4, "there")
+    assert message.startswith("there: ")
+    assert "worst on face 500" in message
+    assert f"{np.degrees(np.arctan(2.35)):.1f} degrees" in message
+
+
+def test_not_finite_vectors_are_undefined_on_request():
+    vectors = WEST.copy()
+    vectors[1, 2], vectors[4] = np.nan, np.inf
+    field = validated_field(SQUARES, vectors, 3, "here", nonfinite="zero")
+    assert field.magnitude.tolist() == [2, 0, 2, 2, 0, 2]
+
+
+def test_on_faces_without_area_the_field_is_undefined():
+    quads = np.array([(0, 1, 2, 3), (1, 1, 2, 2)])
+    surface = from_quads(np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), quads)
+    field = validated_field(surface, np.ones((2, 3)) * (1, 1, 0), 4, "here")
+    assert field.magnitude.tolist() == [np.sqrt(2), 0]
+
+
+def test_wrong_count_and_wrong_degree(error_of):
+    message = error_of(validated_field, SQUARES, np.ones((5, 3)), 4, "mesh 'A', attribute 'rosy'")
+    assert (
+        "mesh 'A', attribute 'rosy': holds 5 vectors, but the mesh plane has 6 faces and 12"
+        in message
+    )
+    for degree in (0, -1, 1000, 2.5):
+        assert f"degree {degree} is not" in error_of(validated_field, SQUARES, WEST, degree, "here")
+
+
+def test_where_counts_agree_the_domain_decides(error_of):
+    surface = torus(24, 12)  # as many faces as vertices
+    assert surface.face_count == len(surface.vertices)
+    angle = np.arctan2(surface.vertices[:, 1], surface.vertices[:, 0])
+    around = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    exact = np.cross((0, 0, 1.0), surface.face_center)
+    exact /= np.linalg.norm(exact, axis=1, keepdims=True)
+    field = validated_field(surface, around, 4, "here", domain="vertex")
+    z, wanted = (face_representation(surface, some) for some in (field, RosyField(4, exact)))
+    assert np.abs(np.angle(z / wanted)).max() < 1e-9
+    assert "off the surface" in error_of(validated_field, surface, around, 4, "here")
+
+
+def test_vertex_members_do_not_matter_to_the_mean():
+    surface = icosphere(2)
+    normal = surface.vertices
+    tangent = np.cross(normal, (0.2, 0.5, 1.0))
+    generator = np.random.default_rng(1)
+    for degree in (2, 3, 4, 5):
+        turn = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
+        others = np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent)
+        first, second = (
+            face_representation(surface, validated_field(surface, vectors, degree, "here"))
+            for vectors in (tangent, others)
+        )
+        # The vertex normals are those of the polyhedron, so the turns are off by a little.
+        assert np.abs(first - second).max() < 2e-3
+
+
+def test_a_field_belongs_to_the_shape_at_rest():
+    tube = cylinder(24, 4)
+    field = axis_field(tube, 4)
+    bent = replace(
+        tube, vertices=tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0), rest_vertices=tube.vertices
+    )
+    again = validated_field(bent, field.vectors, 4, "here")
+    assert np.array_equal(again.vectors, field.vectors)

@@ -1,0 +1,265 @@
+"""Fields against closed forms, invariances and the theorem of Poincare and Hopf."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shapes import cylinder, from_quads, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
+from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
+from rosy_addon.field.generate import axis_field, curvature_field, generate
+from rosy_addon.field.representation import (
+    face_frames,
+    face_representation,
+    from_representation,
+    power,
+    to_representation,
+)
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.surface import build_surface
+
+coordinate = st.floats(-1, 1, allow_nan=False)
+vector = st.tuples(coordinate, coordinate, coordinate).filter(lambda v: np.linalg.norm(v) > 0.1)
+
+
+def rotated(field: RosyField, surface, turns) -> RosyField:
+    """The same field, another member stored on each face."""
+    normal = surface.face_normal
+    angle = (2 * np.pi / field.degree * turns)[:, None]
+    vectors = np.cos(angle) * field.vectors + np.sin(angle) * np.cross(normal, field.vectors)
+    return RosyField(field.degree, vectors)
+
+
+def random_field(surface, degree, seed=0) -> RosyField:
+    rng = np.random.default_rng(seed)
+    x, y = face_frames(surface)
+    angle = rng.uniform(-np.pi, np.pi, surface.face_count)[:, None]
+    return RosyField(
+        degree, (np.cos(angle) * x + np.sin(angle) * y) * rng.uniform(0.5, 2, (len(x), 1))
+    )
+
+
+@given(vector, vector, coordinate)
+def test_carrying_is_the_shortest_rotation(a, b, angle):
+    s, t = normalize(np.array(a)), normalize(np.array(b))
+    if s @ t < -0.9:
+        return
+    x, y = tangent_frame(s)
+    v = np.cos(3 * angle) * x + np.sin(3 * angle) * y
+    moved = transport(v, s, t)
+    assert abs(moved @ t) < 1e-12
+    assert np.linalg.norm(moved) == pytest.approx(1)
+    assert np.allclose(transport(moved, t, s), v)
+    axis = np.cross(s, t)  # left alone by the rotation that takes s to t
+    assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
+
+
+@given(vector)
+def test_tangent_frames_are_right_handed(a):
+    n = normalize(np.array(a))
+    x, y = tangent_frame(n)
+    assert np.allclose(np.cross(x, y), n)
+    assert x @ y == pytest.approx(0, abs=1e-12)
+
+
+@given(vector.filter(lambda v: v[2] / np.linalg.norm(v) > -0.5))
+def test_view_frames_are_the_cameras_axes_carried(a):
+    w = normalize(np.array(a))
+    x, y = view_frame(w)
+    camera = np.array([0.0, 0.0, 1.0])
+    assert np.allclose(x, transport(np.array([1.0, 0.0, 0.0]), camera, w))
+    assert np.allclose(y, transport(np.array([0.0, 1.0, 0.0]), camera, w))
+
+
+@given(st.floats(-3, 3), st.floats(0.1, 5), st.integers(1, 12), st.integers(0, 11))
+def test_all_members_have_one_representation(angle, rho, degree, k):
+    x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
+    turned = angle + 2 * np.pi * k / degree
+    member = rho * (np.cos(turned) * x + np.sin(turned) * y)
+    z = to_representation(member, x, y, degree)
+    assert z == pytest.approx(rho * np.exp(1j * degree * angle), abs=1e-9)
+    again = to_representation(from_representation(z, x, y, degree), x, y, degree)
+    assert again == pytest.approx(z, abs=1e-9)
+
+
+@given(st.integers(1, 40))
+def test_powers_are_powers(degree):
+    number = np.exp(0.7j) * np.ones(1)
+    assert power(number, degree) == pytest.approx(number**degree)
+
+
+def test_corner_turns_are_what_carrying_does():
+    surface = torus(12, 8)
+    x, y = face_frames(surface)
+    face = surface.corner_face
+    turn = corner_rotations(surface.face_normal, x, face, surface.corner_normal)
+    member = normalize(0.3 * x + 0.8 * y)
+    moved = transport(member[face], surface.face_normal[face], surface.corner_normal)
+    cx, cy = tangent_frame(surface.corner_normal)
+    w = dot(member, x) + 1j * dot(member, y)
+    assert np.allclose(w[face] * turn, dot(moved, cx) + 1j * dot(moved, cy))
+
+
+def test_fans_mix_within_themselves_only():
+    box = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
+    quads = np.array(
+        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    )
+    values = np.arange(24) + 1j
+    sharp = from_quads(box, quads, sharp_angle=0.5)
+    assert np.array_equal(average_over_fans(values, np.ones(24), sharp.corner_fan), values)
+    smooth = from_quads(box, quads)
+    mixed = average_over_fans(values, np.ones(24), smooth.corner_fan)
+    for v in range(8):
+        at = smooth.corner_vertex == v
+        assert np.allclose(mixed[at], values[at].mean())
+
+
+def test_sharp_edges_and_flat_faces_part_the_fans():
+    quads = plane(2, 1)
+    ends = quads.corner_vertex
+    arrays = (quads.vertices, ends, quads.face_start)
+    shared = [v for v in range(6) if np.sum(ends == v) == 2]
+    assert len(np.unique(build_surface(*arrays).corner_fan)) == 6
+    assert len(np.unique(build_surface(*arrays, sharp_edges=[shared]).corner_fan)) == 8
+    assert len(np.unique(build_surface(*arrays, flat_faces=[True, False]).corner_fan)) == 8
+
+
+def test_corner_angles_of_polygons():
+    surface = plane(3, 3)
+    assert np.allclose(corner_angles(surface), np.pi / 2)
+    assert corner_angles(icosphere(0)) == pytest.approx(np.pi / 3)
+
+
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_indices_sum_to_the_euler_characteristic(degree):
+    for surface, characteristic in ((icosphere(2), 2), (torus(20, 12), 0)):
+        assert euler_characteristic(surface) == characteristic
+        _, index = find_singularities(surface, random_field(surface, degree))
+        assert index.sum() == degree * characteristic
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_planar_singularity_has_its_index(degree, sign):
+    surface = plane(21, 21)
+    # The singular point stands on a vertex near the middle.
+    vertex = int(np.argmin(np.linalg.norm(surface.vertices - [0.02, 0.03, 0], axis=1)))
+    way = surface.face_center - surface.vertices[vertex]
+    angle = sign * np.arctan2(way[:, 1], way[:, 0]) / degree + 0.4
+    field = RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    found, index = find_singularities(surface, field)
+    assert found.tolist() == [vertex]
+    assert index.tolist() == [sign]
+
+
+@pytest.mark.parametrize("degree", [1, 3, 4, 7])
+def test_the_stored_member_makes_no_difference(degree):
+    surface = torus(20, 12)
+    field = random_field(surface, degree)
+    turns = np.random.default_rng(3).integers(0, degree, surface.face_count)
+    other = rotated(field, surface, turns)
+    assert np.allclose(face_representation(surface, field), face_representation(surface, other))
+    for a, b in zip(
+        find_singularities(surface, field), find_singularities(surface, other), strict=True
+    ):
+        assert np.array_equal(a, b)
+
+
+def test_principal_directions_of_a_torus():
+    surface = torus(128, 64, 1.0, 0.4)
+    centre = surface.face_center
+    along = normalize(np.stack([-centre[:, 1], centre[:, 0], 0 * centre[:, 0]], axis=1))
+    across = np.cross(surface.face_normal, along)
+    two = curvature_field(surface, 2)
+    # The tube bends more than the ring everywhere.
+    angle = np.degrees(np.arccos(np.abs(dot(normalize(two.vectors), across)).clip(0, 1)))
+    assert angle.max() < 0.5
+    # |k1 - k2| / (|k1| + |k2|) with k1 = 1 / r, k2 = cos v / (R + r cos v)
+    ring = np.hypot(centre[:, 0], centre[:, 1])
+    k1, k2 = 1 / 0.4, (ring - 1) / 0.4 / ring
+    expected = np.abs(k1 - k2) / (np.abs(k1) + np.abs(k2))
+    assert np.abs(two.magnitude - expected).max() < 0.03
+    four = curvature_field(surface, 4)
+    x, y = along, across
+    z = to_representation(four.vectors, x, y, 4)
+    assert np.degrees(np.abs(np.angle(z)).max() / 4) < 0.5
+
+
+def test_curvature_of_a_cylinder_and_confidence():
+    field = curvature_field(cylinder(), 2)
+    surface = cylinder()
+    inner = np.abs(surface.face_center[:, 2]) < 0.8
+    assert np.abs(field.vectors[inner, 2]).max() < 1e-6
+    assert field.magnitude[inner].min() > 0.97
+    assert curvature_field(icosphere(4), 4).magnitude.max() < 0.05
+    assert curvature_field(plane(8, 8), 4).magnitude.max() < 1e-9
+
+
+def test_curvature_follows_a_rotation_of_the_mesh():
+    surface = torus(24, 12)
+    rotation = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    rotation *= np.sign(np.linalg.det(rotation))
+    turned = build_surface(surface.vertices @ rotation.T, surface.corner_vertex, surface.face_start)
+    for degree in (2, 4):
+        here = curvature_field(surface, degree)
+        there = RosyField(degree, curvature_field(turned, degree).vectors @ rotation)
+        z = face_representation(surface, here)
+        assert np.allclose(face_representation(surface, there), z, atol=1e-9)
+
+
+def test_an_axis_is_projected():
+    surface = icosphere(2)
+    field = axis_field(surface, 3, (0, 0, 5))
+    normal = surface.face_normal
+    assert np.abs(dot(field.vectors, normal)).max() < 1e-12
+    assert np.allclose(field.magnitude, np.sqrt(1 - normal[:, 2] ** 2))
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 0), (np.nan, 0, 1), (1, 2)])
+def test_an_axis_without_a_direction_is_refused(axis):
+    with pytest.raises(RosyError, match="axis"):
+        axis_field(plane(), 4, axis)
+
+
+def test_generators_are_refused_by_name():
+    with pytest.raises(RosyError, match="even degree, not 3"):
+        generate(plane(), "curvature", 3)
+    with pytest.raises(RosyError, match="magic"):
+        generate(plane(), "magic", 4)
+
+
+def test_degenerate_and_non_manifold_meshes_have_fields():
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0.2], [2, 0, 0]]
+    triangles = np.array(
+        [[0, 1, 2], [0, 1, 3], [1, 0, 4], [0, 1, 5]]
+    )  # three on one edge, a sliver
+    surface = build_surface(vertices, triangles.ravel(), np.arange(0, 13, 3))
+    with np.errstate(all="raise"):
+        for degree in (2, 4):
+            assert np.isfinite(curvature_field(surface, degree).vectors).all()
+        field = axis_field(surface, 4)
+        assert not field.vectors[3].any()
+        find_singularities(surface, field)
+
+
+@pytest.mark.parametrize("degree", [0, -1, 1000, 1.5])
+def test_impossible_degrees(degree):
+    with pytest.raises(RosyError, match="degree"):
+        RosyField(degree, np.zeros((1, 3)))
+
+
+def test_impossible_meshes():
+    with pytest.raises(RosyError, match="no faces"):
+        build_surface(np.zeros((3, 3)), [], [0])
+    with pytest.raises(RosyError, match="corners"):
+        build_surface(np.zeros((3, 3)), [0, 1], [0, 2])
+    with pytest.raises(RosyError, match="not exist"):
+        build_surface(np.zeros((3, 3)), [0, 1, 3], [0, 3])
+    with pytest.raises(RosyError, match="vertex 1"):
+        build_surface([[0, 0, 0], [0, np.nan, 0], [1, 0, 0]], [0, 1, 2], [0, 3])

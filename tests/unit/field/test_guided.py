@@ -1,0 +1,225 @@
+"""Fields that follow guides: exactly, nearly, and the same however a mesh is numbered."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+from field_helpers import MESHES, angles_apart, as_scipy, bumpy
+from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
+from shapes import cube, from_quads, from_triangles, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.guided import guided_field
+from rosy_addon.field.guides import feature_edges, guides_from_edges
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.representation import face_frames, to_representation
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.smoothest import corner_frame_angles
+
+BUNNY = MESHES / "stanford-bunny.obj"
+
+
+def some_guides(surface, count, seed=0):
+    """Unit tangents on a few faces that are far from each other."""
+    random = np.random.default_rng(seed)
+    chosen = random.choice(surface.face_count, count, replace=False)
+    guides = np.zeros((surface.face_count, 3))
+    guides[chosen] = normalize(
+        np.cross(surface.face_normal[chosen], random.standard_normal((count, 3)))
+    )
+    return guides
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+def test_hard_guides_are_met_exactly(degree):
+    for surface in (bumpy(icosphere(4)), torus(40, 20)):
+        guides = some_guides(surface, 12)
+        hard = guides.any(axis=1)
+        field = guided_field(surface, degree, guides, 0.0, hard)
+        assert angles_apart(surface, field.vectors, guides, degree)[hard].max() < 1e-9
+        np.testing.assert_allclose(np.linalg.norm(field.vectors, axis=1), 1, atol=1e-9)
+        assert find_singularities(surface, field)[1].sum() == degree * euler_characteristic(surface)
+
+
+@pytest.mark.parametrize("degree", [1, 4])
+def test_soft_guides_are_a_linear_system(degree):
+    surface = bumpy(icosphere(4))
+    guides, weight = some_guides(surface, 30), 40.0
+    x, y = face_frames(surface)
+    connection = build_connection(surface)
+    turn = corner_frame_angles(surface, connection, x, y)
+    # A column for each corner of a face with a guide, a row for each node: the normal equations.
+    corner = np.flatnonzero(np.repeat(guides.any(axis=1), 3))
+    shape = len(corner), connection.node_count
+    ends = np.arange(len(corner)), connection.corner_node[corner]
+    root = np.sqrt(weight * np.repeat(connection.area / 3, 3)[corner])
+    carry = sparse.csr_matrix((root * np.exp(1j * degree * turn[corner]), ends), shape)
+    wish = root * np.repeat(to_representation(guides, x, y, degree), 3)[corner]
+    matrix = as_scipy(laplacian(connection, degree)) + carry.getH() @ carry
+    z = spsolve(matrix.tocsc(), carry.getH() @ wish)
+    on_corner = (z[connection.corner_node] * np.exp(1j * degree * turn)).reshape(-1, 3)
+    found = guided_field(surface, degree, guides, weight).vectors
+    angle = np.angle(to_representation(found, x, y, degree) * on_corner.mean(axis=1).conj())
+    assert np.abs(angle).max() < 1e-5
+
+
+def test_a_field_follows_strokes_within_two_degrees():
+    surface = icosphere(5)
+    centre = normalize(surface.face_center)
+    random = np.random.default_rng(2)
+    guides = np.zeros((surface.face_count, 3))
+    stroke = np.full(surface.face_count, -1)
+    for start in normalize(random.standard_normal((40, 3))):
+        axis = normalize(np.cross(start, random.standard_normal(3))[None])[0]
+        near = (np.abs(centre @ axis) < 0.02) & (centre @ start > np.cos(0.25))
+        around = (np.abs(centre @ axis) < 0.2) & (centre @ start > np.cos(0.5))
+        if stroke.max() < 9 and (stroke[around] < 0).all():
+            guides[near] = normalize(np.cross(axis, centre[near]))
+            stroke[near] = stroke.max() + 1
+    assert stroke.max() == 9
+    for degree in (1, 4):
+        field = guided_field(surface, degree, guides, 1 / 0.01**2)
+        apart = angles_apart(surface, field.vectors, guides, degree)
+        for number in range(10):
+            assert np.degrees(apart[stroke == number]).mean() < 2
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not BUNNY.exists(), reason="the bunny is not here")
+@pytest.mark.long
+def test_ten_strokes_on_the_bunny():
+    surface = read_mesh(BUNNY)
+    centre, size = surface.face_center, np.ptp(surface.vertices, axis=0).max()
+    random = np.random.default_rng(0)
+    guides = np.zeros((surface.face_count, 3))
+    stroke = np.full(surface.face_count, -1)
+    while stroke.max() < 9:
+        start = random.integers(surface.face_count)
+        normal = surface.face_normal[start]
+        along = normalize(np.cross(normal, random.standard_normal(3))[None])[0]
+        away = centre - centre[start]
+        length = np.sqrt(dot(away, away))
+        aside = np.abs(away @ np.cross(normal, along))
+        near = (
+            (aside < 0.004 * size) & (length < 0.05 * size) & (surface.face_normal @ normal > 0.5)
+        )
+        if near.sum() < 20 or (stroke[length < 0.1 * size] >= 0).any():
+            continue
+        tangent = along - (surface.face_normal[near] @ along)[:, None] * surface.face_normal[near]
+        guides[near], stroke[near] = normalize(tangent), stroke.max() + 1
+    for degree in (1, 4):
+        field = guided_field(surface, degree, guides, 1 / (0.002 * size) ** 2)
+        apart = np.degrees(angles_apart(surface, field.vectors, guides, degree))
+        for number in range(10):
+            assert apart[stroke == number].mean() < 2
+        field = guided_field(surface, degree, guides, 0.0, stroke >= 0)
+        assert angles_apart(surface, field.vectors, guides, degree)[stroke >= 0].max() < 1e-6
+
+
+@pytest.mark.parametrize("degree", [2, 5])
+@pytest.mark.parametrize("hard", [False, True])
+def test_the_field_does_not_depend_on_numbers_or_place(degree, hard):
+    surface = bumpy(icosphere(3))
+    guides = some_guides(surface, 10)
+    chosen = guides.any(axis=1) if hard else None
+
+    def found(other, turned=None):
+        vectors = guides if turned is None else guides @ turned.T
+        return guided_field(other, degree, vectors, 10.0, chosen).vectors
+
+    expected = found(surface)
+    triangles = surface.corner_vertex.reshape(-1, 3)
+    order = np.random.default_rng(5).permutation(len(surface.vertices))
+    renumbered = from_triangles(surface.vertices[order], np.argsort(order)[triangles])
+    assert angles_apart(surface, found(renumbered), expected, degree).max() < 1e-5
+    first = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
+    assert angles_apart(surface, found(first), expected, degree).max() < 1e-5
+    turn = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+    moved = from_triangles(surface.vertices @ turn.T + (1, 2, 3), triangles)
+    assert angles_apart(surface, found(moved, turn) @ turn, expected, degree).max() < 1e-5
+
+
+def test_a_piece_without_guides_has_no_field():
+    ball = icosphere(2)
+    points = np.concatenate([ball.vertices, ball.vertices + 5])
+    triangles = ball.corner_vertex.reshape(-1, 3)
+    both = from_triangles(points, np.concatenate([triangles, triangles + len(ball.vertices)]))
+    guides = np.zeros((both.face_count, 3))
+    guides[0] = normalize(np.cross(both.face_normal[0], [0.0, 0.0, 1.0])[None])[0]
+    field = guided_field(both, 4, guides, 1.0)
+    length = np.linalg.norm(field.vectors, axis=1)
+    np.testing.assert_allclose(length, np.arange(both.face_count) < ball.face_count, atol=1e-9)
+
+
+def test_no_guide_at_all_is_an_error():
+    with pytest.raises(RosyError, match="no guide"):
+        guided_field(plane(), 4, np.zeros((16, 3)), 1.0)
+
+
+# --- edges -----------------------------------------------------------------------------------------
+
+
+def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
+    box = cube()
+    ends = feature_edges(box, 0.5)
+    assert len(ends) == 12
+    guides = guides_from_edges(box, ends, 4)
+    along = np.abs(guides).max(axis=1)
+    np.testing.assert_allclose(along, 1, atol=1e-12)
+    # Of degree 2 the edges of a square contradict each other.
+    assert not guides_from_edges(box, ends, 2).any()
+    assert not len(feature_edges(box, 2.0))
+
+
+def test_borders_are_features():
+    square = plane(6, 6)
+    ends = feature_edges(square, 0.5)
+    assert len(ends) == 24
+    guides = guides_from_edges(square, ends, 4)
+    field = guided_field(square, 4, guides, 0.0, guides.any(axis=1))
+    np.testing.assert_allclose(np.abs(field.vectors).max(axis=1), 1, atol=1e-6)
+
+
+def test_guides_lie_in_their_faces():
+    points = np.array([[0, 0, 0], [1, 0, 0.2], [1, 1, 0], [0, 1, 0.3]], dtype=float)
+    bent = from_quads(points, np.array([[0, 1, 2, 3]]))
+    guides = guides_from_edges(bent, [[1, 0]], 3)
+    assert abs(dot(guides, bent.face_normal)[0]) < 1e-12
+    assert guides[0] @ [1, 0, 0] > 0.9
+
+
+def test_curvature_reaches_into_what_is_flat():
+    """A cylinder between two flat caps' worth of plane: the flat parts take its directions."""
+    count, turns = 60, np.linspace(0, np.pi / 2, 13)
+    # A quarter of a tube along y, with flat flaps on both sides, three units long.
+    flap = np.linspace(3, 0, 16)[:-1]
+    x = np.concatenate([-flap, np.sin(turns), np.full(15, 1.0)])
+    z = np.concatenate([np.full(15, 1.0), np.cos(turns), -flap[::-1]])
+    y = np.linspace(0, 6, count)
+    points = np.stack(np.broadcast_arrays(x[:, None], y, z[:, None]), axis=-1).reshape(-1, 3)
+    here = np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)
+    quads = np.stack([here, here + 1, here + count + 1, here + count], axis=-1).reshape(-1, 4)
+    surface = from_quads(points, quads)
+    flat = surface.face_center[:, 0] < -1
+    plain = generate(surface, "curvature", 4)
+    assert plain.magnitude[flat].max() < 1e-3
+    field = generate(surface, GeneratorSettings("curvature", smoothing_length=0.05), 4)
+    np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
+    assert np.abs(field.vectors[flat]).max(axis=1).min() > np.cos(np.radians(1))
+
+
+@pytest.mark.parametrize("degree", [1, 4, 6])
+def test_features_of_a_cube(degree):
+    box = icosphere(3)
+    points = box.vertices / np.abs(box.vertices).max(axis=1)[:, None]
+    cubic = from_triangles(points, box.corner_vertex.reshape(-1, 3))
+    field = generate(cubic, GeneratorSettings("features", sharp_angle=0.9), degree)
+    # The corners are cut off, and on the triangles there it is singular by symmetry.
+    assert (field.magnitude < 0.5).sum() in (0, 8)
+    with pytest.raises(RosyError, match="no border or sharp edge"):
+        generate(icosphere(3), "features", degree)

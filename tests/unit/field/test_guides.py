@@ -1,0 +1,202 @@
+"""What is at hand as guides: strokes, empties' axes, UV maps, vectors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import long
+from shapes import from_quads, from_triangles, icosphere, plane, torus
+
+from rosy_addon.field.analysis import dirichlet_energy
+from rosy_addon.field.closest_point import closest_triangles
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.representation import face_frames, face_representation, to_representation
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import build_surface, count_inconsistent_edges, orientation_warning
+
+BALL = icosphere(4)
+
+
+def great_circles(count, seed=2, tremble=0.0):
+    """Arcs on the unit sphere, as an artist might draw them."""
+    random = np.random.default_rng(seed)
+    strokes = []
+    for _ in range(count):
+        a, b = np.linalg.qr(random.standard_normal((3, 2)))[0].T
+        angle = np.linspace(0, 0.8, 40)[:, None]
+        arc = np.cos(angle) * a + np.sin(angle) * b
+        strokes.append(arc + random.normal(0, tremble, arc.shape))
+    return strokes
+
+
+def off_stroke(surface, field, stroke):
+    """Mean angle, degrees, between a stroke and the field along it."""
+    middle, way = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
+    face = surface.triangle_face[closest_triangles(surface, middle)[0]]
+    x, y = face_frames(surface)
+    wish = to_representation(normalize(way), x[face], y[face], field.degree)
+    z = to_representation(field.vectors[face], x[face], y[face], field.degree)
+    return abs(np.degrees(np.angle((z * wish.conj()).sum())) / field.degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_strokes_on_a_sphere_are_followed(degree):
+    strokes = great_circles(5)
+    field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)
+    assert max(off_stroke(BALL, field, stroke) for stroke in strokes) < 2
+    soft = generate(
+        BALL, GeneratorSettings("guided", strokes=strokes, smoothing_length=0.005), degree
+    )
+    assert max(off_stroke(BALL, soft, stroke) for stroke in strokes) < 2
+
+
+@pytest.mark.parametrize("reach", long(0.0, 0.003))
+def test_ten_strokes_on_the_bunny(shared_data, reach):
+    bunny = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
+    random = np.random.default_rng(3)
+    size = np.ptp(bunny.vertices, axis=0).max()
+    strokes = []
+    while len(strokes) < 10:
+        face = random.integers(bunny.face_count)
+        # Straight on, put down on the surface point by point, where it does not leave it.
+        way = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
+        line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * way
+        triangle, distance = closest_triangles(bunny, line)
+        if distance.max() > 0.006 * size:
+            continue
+        normal = bunny.face_normal[bunny.triangle_face[triangle]]
+        corner = bunny.vertices[bunny.triangle_vertex[triangle, 0]]
+        strokes.append(line - dot(line - corner, normal)[:, None] * normal)
+    field = generate(bunny, GeneratorSettings("guided", strokes=strokes, smoothing_length=reach), 4)
+    off = [off_stroke(bunny, field, stroke) for stroke in strokes]
+    assert max(off) < 2, off
+
+
+def test_a_trembling_hand_is_smoothed():
+    strokes, trembling = great_circles(1), great_circles(1, tremble=0.004)
+    straight, shaken = (guides_from_strokes(BALL, some, 2) for some in (strokes, trembling))
+    both = straight.any(axis=1) & shaken.any(axis=1)
+    off = np.degrees(np.arccos(np.abs(dot(straight, shaken)[both]).clip(0, 1)))
+    assert both.sum() > 5 and np.median(off) < 8
+
+
+def test_pieces_without_a_guide_are_smooth():
+    points = np.concatenate([BALL.vertices, BALL.vertices + 5])
+    triangles = np.concatenate([BALL.triangle_vertex, BALL.triangle_vertex + len(BALL.vertices)])
+    both = from_triangles(points, triangles)
+    field = generate(both, GeneratorSettings("guided", strokes=great_circles(2)), 4)
+    np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
+    alone = generate(BALL, "smoothest", 4)
+    other = RosyField(4, field.vectors[BALL.face_count :])
+    assert np.isclose(
+        dirichlet_energy(BALL, other), dirichlet_energy(BALL, alone), rtol=0.1
+    )  # several are
+
+
+def test_strokes_elsewhere_are_refused(error_of):
+    assert "no stroke comes near it" in error_of(
+        guides_from_strokes, BALL, [np.ones((4, 3)) * 9], 4
+    )
+    assert "no stroke comes near it" in error_of(guides_from_strokes, BALL, [np.ones((4, 3))], 4)
+
+
+def test_handles_guide_around_them():
+    place, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
+    guides = guides_from_axes(BALL, place, axis, np.array([0.3, 0.0]), 2)
+    near = np.linalg.norm(BALL.face_center - place[0], axis=1) < 0.3
+    assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
+    assert (np.abs(guides[near, 0]) > 0.9).all()
+    recipe = GeneratorSettings(
+        "guided", axis_guides=list(zip(place, axis, (0.3, 0.0), strict=True))
+    )
+    field = generate(BALL, recipe, 2)
+    np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
+
+
+def uv_of(surface, matrix):
+    """A map of a plane: (u, v) = matrix (x, y) + an offset."""
+    return surface.vertices[surface.corner_vertex][:, :2] @ np.transpose(matrix) + (3.0, -1.0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("degree", [1, 2, 4, 6, 8])
+def test_a_uv_map_is_followed(degree, mirrored):
+    surface = plane(4, 3)
+    turn = np.array([(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))])  # u at 0.4 radians
+    matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ turn
+    guides = guides_from_uv(surface, uv_of(surface, matrix), degree)
+    np.testing.assert_allclose(np.linalg.norm(guides, axis=1), 1)
+    angle = np.arctan2(guides[:, 1], guides[:, 0])
+    np.testing.assert_allclose(np.exp(1j * degree * angle), np.exp(1j * degree * 0.4), atol=1e-9)
+
+
+def test_a_skewed_map_is_followed_on_both_axes_alike():
+    surface = plane(3, 3)
+    # dP/du = (1, 0), dP/dv = (1, 1): the nearest cross halves the difference.
+    guides = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 4)
+    angle = np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90
+    np.testing.assert_allclose(np.minimum(angle, 90 - angle), 22.5, atol=1e-6)
+    assert np.allclose(angle, 67.5)
+    along_u = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 2)
+    np.testing.assert_allclose(np.abs(along_u[:, 0]), 1, atol=1e-9)
+
+
+def test_maps_without_area_are_undefined():
+    surface = plane(3, 3)
+    uv = uv_of(surface, np.eye(2))
+    uv[:8] = 0.5
+    uv[8:12, 1] = 0.0
+    guides = guides_from_uv(surface, uv, 4)
+    assert guides.any(axis=1).tolist() == [False] * 3 + [True] * 6
+
+
+def test_guides_of_several_kinds_go_together(error_of):
+    surface = torus(48, 24)
+    vectors = np.zeros((surface.face_count, 3))
+    vectors[5] = 3 * face_frames(surface)[0][5]
+    edges = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
+    recipe = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
+    field = generate(surface, recipe, 4)
+    assert np.isclose(abs(dot(normalize(vectors[5]), field.vectors[5])), 1)
+    assert (field.magnitude > 0.99).all()
+    assert "there is nothing to follow" in error_of(generate, surface, "guided", 4)
+    assert "no UV map" in error_of(generate, surface, "uv", 4)
+
+
+# --- surfaces with one side ------------------------------------------------------------------
+
+
+def moebius(columns=60, rows=6):
+    turn = np.arange(columns) * (2 * np.pi / columns)
+    across = np.linspace(-0.3, 0.3, rows + 1)[:, None]
+    out = 1 + across * np.cos(turn / 2)
+    points = np.stack([out * np.cos(turn), out * np.sin(turn), across * np.sin(turn / 2)], axis=-1)
+    here = np.arange(rows)[:, None] * columns + np.arange(columns - 1)
+    quads = np.stack([here, here + 1, here + columns + 1, here + columns], axis=-1).reshape(-1, 4)
+    # Where it comes round, bottom and top change places.
+    last = np.arange(rows) * columns + columns - 1
+    first = (rows - np.arange(rows)) * columns
+    closing = np.stack([last, first, first - columns, last + columns], axis=-1)
+    return from_quads(points.reshape(-1, 3), np.concatenate([quads, closing]))
+
+
+def test_a_moebius_strip_is_named():
+    strip = moebius()
+    assert count_inconsistent_edges(strip) == 6
+    assert "Möbius strip" in orientation_warning(strip) and "along 6 edges" in orientation_warning(
+        strip
+    )
+    field = generate(strip, "smoothest", 4)
+    assert np.allclose(field.magnitude, 1)
+    assert not orientation_warning(BALL)
+
+
+def test_flipped_faces_are_told_too():
+    corners = BALL.corner_vertex.reshape(-1, 3).copy()
+    corners[7] = corners[7][::-1]
+    surface = build_surface(BALL.vertices, corners, BALL.face_start)
+    assert count_inconsistent_edges(surface) == 3
+    assert np.isfinite(face_representation(surface, generate(surface, "smoothest", 4))).all()

@@ -1,0 +1,278 @@
+"""Meshes from files: every format, and what is wrong with damaged ones."""
+
+from __future__ import annotations
+
+import struct
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shapes import torus
+
+from rosy_addon.field.formats.stl import weld
+from rosy_addon.field.mesh_io import read_mesh
+
+# A square, and a triangle that stands on its side from 1 to 2.
+VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
+FACES = [(0, 1, 2, 3), (2, 1, 4)]
+
+OBJ = """\
+# a comment
+mtllib none.mtl
+v 0 0 0
+v 1 0 0  # and one here
+v 1 1 0 1.0 0.5 0.5 0.5
+v 0 1 0
+vt 0 0
+vn 0 0 1
+usemtl paint
+f 1/1/1 2/1/1 3/1/1 4/1/1
+v 1 0.5 1e-3
+s off
+f -3//1 2//1 -1//1
+"""
+OFF = """\
+OFF 5 2 0
+# vertices
+0 0 0
+1 0 0
+1 1 0
+
+0 1 0
+1 .5 1e-3
+4 0 1 2 3 255 0 0
+3 2 1 4
+"""
+PLY_HEADER = """\
+ply
+format {format} 1.0
+comment made by hand
+element vertex 5
+property float x
+property float y
+property float z
+property uchar red
+element face 2
+property list uchar int vertex_indices
+property float quality
+element edge 1
+property int vertex1
+property int vertex2
+end_header
+"""
+PLY_BODY = """\
+0 0 0 9
+1 0 0 9
+1 1 0 9
+0 1 0 9
+1 0.5 0.001 9
+4 0 1 2 3 0.5
+3 2 1 4 0.5
+0 1
+"""
+
+
+def binary_ply(order: str, faces=FACES) -> bytes:
+    name = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    header = PLY_HEADER.format(format=name).replace("face 2", f"face {len(faces)}")
+    instance = b"".join(struct.pack(order + "3fB", *point, 9) for point in VERTICES)
+    for face in faces:
+        instance += struct.pack(f"{order}B{len(face)}if", len(face), *face, 0.5)
+    return header.encode() + instance + struct.pack(order + "2i", 0, 1)
+
+
+FILES = {
+    "a.obj": OBJ.encode(),
+    "dos.obj": OBJ.replace("\n", "\r\n").encode(),
+    "a.off": OFF.encode(),
+    "split.off": OFF.replace("OFF 5", "OFF\n5").encode(),
+    "bare.off": OFF.replace("OFF 5", "5").encode(),
+    "coloured.off": OFF.replace("OFF", "COFF").replace(" 0\n", " 0 0 0 255\n").encode(),
+    "a.ply": (PLY_HEADER.format(format="ascii") + PLY_BODY).encode(),
+    "dos.ply": (PLY_HEADER.format(format="ascii") + PLY_BODY).replace("\n", "\r\n").encode(),
+    "little.ply": binary_ply("<"),
+    "big.ply": binary_ply(">"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_polygons_are_read_in_their_order(name, tmp_path):
+    (tmp_path / name).write_bytes(FILES[name])
+    surface = read_mesh(tmp_path / name)
+    assert np.allclose(surface.vertices, VERTICES, atol=1e-9)
+    assert surface.corner_vertex.tolist() == [*FACES[0], *FACES[1]]
+    assert surface.face_start.tolist() == [0, 4, 7]
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_binary_ply_of_equal_faces(order, tmp_path):
+    triangles = [(0, 1, 2), (2, 3, 0), (2, 1, 4)]
+    (tmp_path / "a.ply").write_bytes(binary_ply(order, triangles))
+    surface = read_mesh(tmp_path / "a.ply")
+    assert surface.corner_vertex.reshape(-1, 3).tolist() == [list(face) for face in triangles]
+
+
+TRIANGLES = VERTICES[[(0, 1, 2), (2, 3, 0), (2, 1, 4)]].astype(np.float32)
+
+
+def binary_stl(count: int | None = None) -> bytes:
+    count = len(TRIANGLES) if count is None else count
+    rows = b"".join(struct.pack("<12fH", 0, 0, 1, *points.ravel(), 0) for points in TRIANGLES)
+    return b"solid in name only".ljust(80) + struct.pack("<I", count) + rows
+
+
+def text_stl() -> bytes:
+    lines = ["solid thing"]
+    for points in TRIANGLES:
+        lines += ["facet normal 0 0 1", "outer loop"]
+        lines += [f"vertex {x!r} {y!r} {z!r}" for x, y, z in points.astype(float).tolist()]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid thing", ""]).encode()
+
+
+@pytest.mark.parametrize("data", [binary_stl(), text_stl()], ids=["binary", "text"])
+def test_stl_corners_at_one_place_are_one_vertex(data, tmp_path):
+    (tmp_path / "a.stl").write_bytes(data)
+    surface = read_mesh(tmp_path / "a.stl")
+    assert len(surface.vertices) == 5
+    assert surface.corner_vertex.tolist() == [0, 1, 2, 2, 3, 0, 2, 1, 4]
+    assert np.array_equal(surface.vertices[surface.corner_vertex], TRIANGLES.reshape(-1, 3))
+
+
+@given(st.lists(st.tuples(*3 * [st.sampled_from([-1.0, -0.0, 0.0, 1e-300, 2.5])]), max_size=40))
+def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
+    points = np.array(points, dtype=float).reshape(-1, 3)
+    vertices, index = weld(points)
+    assert np.array_equal(vertices[index], points)
+    assert len({tuple(vertex + 0.0) for vertex in vertices}) == len(vertices)
+    first = [index.tolist().index(number) for number in range(len(vertices))]
+    assert first == sorted(first)
+
+
+def test_meshes_of_others(shared_data):
+    found = {
+        path.name: (len(surface.vertices), surface.face_count)
+        for path in sorted((shared_data / "meshes").iterdir())
+        for surface in [read_mesh(path)]
+    }
+    assert found["stanford-bunny.obj"][1] == 69451
+    assert found["spot.obj"][1] == 5856
+    assert found["cheburashka.off"] == (6669, 13334)
+    assert found["vase.off"] == (1274, 2404)
+    assert found["dome.off"] == (5000, 9635)
+
+
+def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
+    # Three squares around z, a corner of 90 degrees and one of 45.
+    (tmp_path / "bent.off").write_text(
+        "OFF 8 3 0\n0 0 0\n0 0 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1\n0 2 0\n0 2 1\n"
+        "4 0 2 3 1\n4 2 4 5 3\n4 4 6 7 5\n"
+    )
+    surface = read_mesh(tmp_path / "bent.off")
+    fans = [
+        len(set(surface.corner_fan[surface.corner_vertex == vertex].tolist())) for vertex in (2, 4)
+    ]
+    assert fans == [2, 1]
+
+
+DAMAGED = {
+    "empty.obj": (b"", "no faces"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
+    "word.obj": (b"v 0 0 0\nv 1 zero 0\n", "word.obj:2: found 'zero', wanted a number"),
+    "short.obj": (b"v 0 0\n", "short.obj:1: vertex has 2 coordinates"),
+    "edge.obj": (b"v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has 2 corners"),
+    "far.obj": (OBJ.encode() + b"f 1 2 9\n", "far.obj:14: a face refers to vertex 9, there are 5"),
+    "zero.obj": (OBJ.encode() + b"f 0 1 2\n", "zero.obj:14: a face refers to vertex 0"),
+    "back.obj": (OBJ.encode() + b"f 1 2 -6\n", "back.obj:14: a face refers to vertex -6"),
+    "huge.obj": (OBJ.encode() + b"f 1 2 99999999999999999999\n", "huge.obj:14:"),
+    "nan.obj": (b"v 0 0 0\nv 1 nan 0\n", "nan.obj:2: vertex 1 has a coordinate that is not finite"),
+    "binary.obj": (b"v 0 0 0\n\0\1\2", "binary data"),
+    "latin.obj": (b"v 0 0 \xff\n", "latin.obj:1: found"),
+    "truncated.off": (OFF[:60].encode(), "says 5 vertices and 2 faces, but ends after"),
+    "torn.off": (OFF.encode()[:-3], "torn.off:10: face 1 has 2 of its 3 corners"),
+    "claims.off": (b"OFF 90000000 180000000 0\n0 0 0\n", "says 90000000 vertices"),
+    "far.off": (OFF.replace("3 2 1 4", "3 2 1 5").encode(), "far.off:10: a face refers to vertex 5"),
+    "pair.off": (OFF.replace("3 2 1 4", "2 2 1").encode(), "pair.off:10: face 1 has 2 corners"),
+    "other.off": (b"MESH 1 2 3\n", "other.off:1: found 'MESH', wanted OFF"),
+    "only.off": (b"OFF\n", "ends before the counts"),
+    "minus.off": (b"OFF -1 2 0\n", "minus.off:1: the counts"),
+    "inf.off": (OFF.replace("1e-3", "inf").encode(), "inf.off:8: vertex 4"),
+    "truncated.ply": (binary_ply("<")[:-20], "says 2 rows of element 'face', but ends after 1"),
+    "cut.ply": (binary_ply(">")[:-80], "says 5 rows of element 'vertex', but ends after"),
+    "text.ply": (FILES["a.ply"][:-9], "text.ply:22: face 1 has 4 values, 5 are wanted"),
+    "ascii.ply": (FILES["a.ply"][:-20], "says 2 rows of element 'face', but ends after 1"),
+    "header.ply": (FILES["a.ply"][:100], "the header has no end"),
+    "kind.ply": (FILES["a.ply"].replace(b"float z", b"real z"), "kind.ply:7: found"),
+    "noz.ply": (FILES["a.ply"].replace(b"float z", b"float w"), "has no 'z' of vertices"),
+    "far.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"3 2 1 7"), "face 1 refers to vertex 7"),
+    "claims.ply": (binary_ply("<").replace(b"vertex 5", b"vertex 190000000"), "says 190000000 rows"),
+    "faces.ply": (binary_ply("<").replace(b"face 2", b"face 500000000"), "says 500000000 rows"),
+    "nomesh.ply": (PLY_HEADER.format(format="ascii").split("element face")[0].encode()
+                   + b"end_header\n" + PLY_BODY[:50].encode(), "no faces"),
+    "signal.ply": (binary_ply(">").replace(struct.pack(">f", 0.001), b"\x7f\x81\0\0"), "vertex 4 has"),
+    "signal.stl": (binary_stl().replace(struct.pack("<f", 0.001), b"\0\0\x81\x7f"), "not finite"),
+    "not.ply": (b"solid\n", "found 'sol', wanted 'ply'"),
+    "truncated.stl": (binary_stl()[:-30], "says 3 triangles, but ends after 2"),
+    "claims.stl": (binary_stl(40_000_000), "says 40000000 triangles, but ends after 3"),
+    "torn.stl": (text_stl()[:-60], "corners in 2 whole triangles"),
+    "none.stl": (b"solid nothing\nendsolid nothing\n", "no faces"),
+    "garbage.stl": (b"\x89PNG", "is no .stl file"),
+    "mesh.step": (b"", "not from '.step' files"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
+    data, wanted = DAMAGED[name]
+    (tmp_path / name).write_bytes(data)
+    tracemalloc.start()
+    message = error_of(read_mesh, tmp_path / name)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert wanted in message
+    assert str(tmp_path / name) in message
+    assert peak < 10e6, "a claim in a header must not be believed"
+
+
+def test_missing_files_and_folders(tmp_path, error_of):
+    assert "no such file" in error_of(read_mesh, tmp_path / "none.obj")
+    (tmp_path / "folder.obj").mkdir()
+    assert "is a directory" in error_of(read_mesh, tmp_path / "folder.obj")
+
+
+@given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
+def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, name, place):
+    from rosy_addon.errors import RosyError
+
+    path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
+    data = FILES[name]
+    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    try:
+        read_mesh(path)
+    except RosyError as error:
+        assert "\n" not in str(error) and str(path) in str(error)
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9))
+def test_off_coordinates_are_read_to_the_last_bit(tmp_path_factory, numbers):
+    path = tmp_path_factory.getbasetemp() / "exact.off"
+    rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
+    path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
+    with np.errstate(all="ignore"):  # such extremes overflow in the normal
+        surface = read_mesh(path)
+    assert surface.vertices.ravel().tolist() == numbers
+
+
+def test_a_torus_is_closed_when_read_from_stl(tmp_path):
+    """Welding leaves no seam: every edge of the triangles has two sides."""
+    from rosy_addon.field.singularities import euler_characteristic
+
+    shape = torus(12, 8)
+    points = shape.vertices[shape.corner_vertex[shape.triangles]].astype("<f4")
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *three.ravel(), 0) for three in points)
+    (tmp_path / "t.stl").write_bytes(bytes(80) + struct.pack("<I", len(points)) + rows)
+    surface = read_mesh(tmp_path / "t.stl")
+    assert len(surface.vertices) == 96
+    assert euler_characteristic(surface) == 0

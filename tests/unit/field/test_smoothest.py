@@ -1,0 +1,284 @@
+"""Smoothest fields: closed forms, SciPy's solvers, invariances, and meshes that nobody wants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+from awkward import AWKWARD
+from conftest import long
+from field_helpers import MESHES, angles_apart, as_scipy, bumpy
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.sparse.linalg import eigsh, spsolve
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+from shapes import from_triangles, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.frames import dot
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.smoothest import smallest_eigenvectors_task, smoothest_field, smoothest_task
+from rosy_addon.field.sparse_multigrid import from_coo, hierarchy_task, matrix_product, w_cycle
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+
+
+def random_sphere(count, seed=1):
+    points = np.random.default_rng(seed).standard_normal((count, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    triangles = ConvexHull(points).simplices
+    a, b, c = points[triangles].swapaxes(0, 1)
+    inward = dot(np.cross(b - a, c - a), a) < 0
+    triangles[inward] = triangles[inward, ::-1]
+    return from_triangles(points, triangles)
+
+
+# --- matrices --------------------------------------------------------------------------------------
+
+
+def random_rows(rows, columns, seed):
+    random = np.random.default_rng(seed)
+    count = 4 * rows
+    row = np.concatenate([np.arange(rows), random.integers(rows, size=count)])
+    column = random.integers(columns, size=len(row))
+    value = random.standard_normal(len(row)) + 1j * random.standard_normal(len(row))
+    return from_coo(row, column, value, rows, columns)
+
+
+def test_products_of_sparse_matrices():
+    a, b = random_rows(60, 40, 0), random_rows(40, 25, 1)
+    dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
+    np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
+    vector = np.arange(40) * (1 + 2j)
+    np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
+
+
+def test_the_adjoint():
+    a = random_rows(60, 20, 2)
+    np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
+
+
+@pytest.mark.parametrize("degree", [4, *long(1, 6)])
+def test_cycles_of_multigrid_approach_the_solution(degree):
+    connection = build_connection(bumpy(icosphere(5)))
+    matrix = laplacian(connection, degree, 0.1)
+    levels = run_to_completion(hierarchy_task(matrix))
+    assert len(levels) > 2
+    right = np.random.default_rng(0).standard_normal(len(matrix)) + 0j
+    expected = spsolve(as_scipy(matrix).tocsc(), right)
+    found = np.zeros_like(right)
+    errors = []
+    for _ in range(12):
+        found += w_cycle(levels, right - matrix @ found)
+        errors.append(np.linalg.norm(found - expected))
+    assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
+
+
+# --- the connection --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 4, 7])
+def test_a_constant_direction_in_the_plane_costs_nothing(degree):
+    surface = plane(6)
+    random = np.random.default_rng(3)
+    inside = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
+    moved = surface.vertices + inside[:, None] * (0.05, 0.05, 0) * random.standard_normal((1, 3))
+    surface = build_surface(moved, surface.corner_vertex, surface.face_start)
+    connection = build_connection(surface)
+    edge = np.roll(surface.vertices[surface.triangle_vertex], -1, axis=1)
+    edge = (edge - surface.vertices[surface.triangle_vertex]).reshape(-1, 3)
+    # In the map of a node the x axis lies as far from an edge as it does in the plane.
+    angle = connection.edge_direction - np.arctan2(edge[:, 1], edge[:, 0])
+    z = np.empty(connection.node_count, dtype=complex)
+    z[connection.corner_node] = np.exp(1j * degree * angle)
+    np.testing.assert_allclose(z[connection.corner_node], np.exp(1j * degree * angle), atol=1e-9)
+    np.testing.assert_allclose(laplacian(connection, degree) @ z, 0, atol=1e-9)
+
+
+def test_vertices_where_umbrellas_meet_are_cut():
+    bowtie = from_triangles(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]]
+    )
+    assert build_connection(bowtie).node_count == 6
+
+
+# --- fields ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_energies_on_the_unit_sphere():
+    """The smallest eigenvalue on the round sphere is N."""
+    connection = build_connection(random_sphere(25_000))
+    for degree in (1, 4):
+        _, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+        assert energy == pytest.approx(degree, rel=0.01)
+
+
+def simple_shapes():
+    yield "ball", bumpy(icosphere(4))
+    yield "torus", bumpy(torus(60, 30))
+
+
+def shapes_of_others():
+    for name in ("spot.obj", "vase.off", "dome.off", "cheburashka.off", "stanford-bunny.obj"):
+        if (MESHES / name).exists():
+            yield name, read_mesh(MESHES / name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [1, 4])
+@pytest.mark.parametrize("shapes", [simple_shapes, *long(shapes_of_others)])
+def test_the_eigenvector_is_that_of_scipy(shapes, degree):
+    for name, surface in shapes():
+        connection = build_connection(surface)
+        z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+        below = -1e-6 / connection.mass.sum()
+        found, vectors = eigsh(
+            as_scipy(laplacian(connection, degree)),
+            k=2,
+            M=sparse.diags(connection.mass),
+            sigma=below,
+        )
+        order = np.argsort(found)  # of complex matrices they come in any
+        found, vectors = found[order], vectors[:, order]
+        assert energy[0] == pytest.approx(found[0], rel=1e-4), name
+        if found[1] > 1.03 * found[0]:
+            overlap = np.abs(np.vdot(vectors[:, 0], connection.mass * z))
+            assert overlap / np.sqrt(connection.mass @ np.abs(z) ** 2) > 1 - 1e-5, name
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_the_field_of_another_library(degree):
+    """geometry-central's connection Laplacian, raised to N; it shares no code with this one.
+
+    It flips edges to be Delaunay, and lays out borders differently: so a closed Delaunay mesh.
+    """
+    potpourri3d = pytest.importorskip("potpourri3d")
+    surface = bumpy(icosphere(4), 0.08, (1.0, 1.05, 1.1))
+    triangles = surface.corner_vertex.reshape(-1, 3)
+    connection = build_connection(surface)
+    assert connection.weight.min() > 0
+    vertex = np.empty(connection.node_count, dtype=int)
+    vertex[connection.corner_node] = triangles.ravel()
+    solver = potpourri3d.MeshVectorHeatSolver(surface.vertices, triangles)
+    theirs = sparse.csr_matrix(solver.get_connection_laplacian())
+    here, there = vertex[connection.tail], vertex[connection.head]
+    entry = np.asarray(theirs[here, there]).ravel()
+    np.testing.assert_allclose(np.abs(entry), connection.weight, rtol=1e-6)
+
+    # Their frames differ from these by an angle at each vertex, found along a tree of edges.
+    count = connection.node_count
+    ends = np.concatenate([here, there]), np.concatenate([there, here])
+    turn = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
+    between = sparse.csr_matrix((np.concatenate([turn, turn.conj()]), ends), (count, count))
+    frames = np.ones(count, dtype=complex)
+    order, before = breadth_first_order(abs(between), 0, directed=False)
+    ours = sparse.csr_matrix(
+        (
+            np.exp(1j * np.concatenate([connection.transport_angle, -connection.transport_angle])),
+            ends,
+        ),
+        (count, count),
+    )
+    for one in order[1:]:
+        toward = ours[one, before[one]]
+        there_too = between[one, before[one]] * toward
+        frames[one] = there_too * frames[before[one]] * toward.conj()
+    carried = frames[here] * np.exp(1j * connection.transport_angle) * frames[there].conj()
+    np.testing.assert_allclose(-entry / np.abs(entry), carried, atol=1e-6)
+
+    turned = np.concatenate([carried**degree, carried.conj() ** degree])
+    weight = np.tile(np.abs(entry), 2)
+    raised = sparse.diags(theirs.diagonal()) - sparse.csr_matrix((weight * turned, ends))
+    mass = np.empty(count)
+    mass[vertex] = connection.mass
+    found, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
+    expected = vectors[:, np.argmin(found)]
+    z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+    assert energy[0] == pytest.approx(found.min(), rel=1e-5)
+    mine = np.empty(count, dtype=complex)
+    mine[vertex] = z
+    apart = mine * frames**degree * expected.conj()
+    apart *= np.conj(apart.sum()) / abs(apart.sum())
+    # Close to singularities both are small, and their angles anything.
+    clear = np.abs(mine) > 0.02 * np.abs(mine).max()
+    assert clear.mean() > 0.9
+    assert np.degrees(np.abs(np.angle(apart[clear]))).max() / degree < 1
+
+
+@pytest.mark.parametrize("degree", range(1, 13))
+def test_indices_add_up_to_the_euler_characteristic(degree):
+    for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
+        _, index = find_singularities(surface, smoothest_field(surface, degree))
+        assert index.sum() == degree * euler_characteristic(surface)
+
+
+@pytest.mark.parametrize("degree", range(1, 7))
+def test_a_sphere_has_no_more_singularities_than_it_must(degree):
+    _, index = find_singularities(icosphere(4), smoothest_field(icosphere(4), degree))
+    assert (index == 1).all()
+    assert len(index) == 2 * degree
+
+
+@pytest.mark.parametrize("degree", [2, 4, 5])
+def test_the_field_does_not_depend_on_numbers_or_place(degree):
+    surface = bumpy(icosphere(3))
+    expected = smoothest_field(surface, degree).vectors
+    triangles = surface.corner_vertex.reshape(-1, 3)
+
+    order = np.random.default_rng(5).permutation(len(surface.vertices))
+    place = np.argsort(order)
+    renumbered = from_triangles(surface.vertices[order], place[triangles])
+    found = smoothest_field(renumbered, degree).vectors
+    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+
+    turned = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
+    found = smoothest_field(turned, degree).vectors
+    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+
+    rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+    moved = from_triangles(3 * surface.vertices @ rotation.T + (1, 2, 3), triangles)
+    found = smoothest_field(moved, degree).vectors @ rotation
+    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+
+
+def test_each_piece_has_its_own():
+    one, other = bumpy(icosphere(3)), bumpy(torus(24, 12))
+    points = np.concatenate([one.vertices, 0.3 * other.vertices + 5])
+    corners = np.concatenate([one.corner_vertex, other.corner_vertex + len(one.vertices)])
+    starts = np.concatenate([one.face_start, other.face_start[1:] + one.face_start[-1]])
+    both = build_connection(build_surface(points, corners, starts))
+    _, energy = run_to_completion(smallest_eigenvectors_task(both, 4))
+    alone = [
+        run_to_completion(smallest_eigenvectors_task(build_connection(surface), 4))[1][0]
+        for surface in (one, other)
+    ]
+    np.testing.assert_allclose(energy, [alone[0], alone[1] / 0.09], rtol=1e-4)
+
+
+@pytest.mark.parametrize("degree", [1, 3, 4, 12])
+@pytest.mark.parametrize("name", AWKWARD)
+def test_meshes_that_are_not_closed_smooth_manifolds(name, degree):
+    points, faces = AWKWARD[name]()
+    starts = np.cumsum([0, *map(len, faces)])
+    surface = build_surface(points, np.concatenate(faces), starts)
+    field = smoothest_field(surface, degree)
+    length = np.linalg.norm(field.vectors, axis=1)
+    has_area = surface.face_normal.any(axis=1)
+    np.testing.assert_allclose(length, has_area, atol=1e-6)
+    assert np.abs(dot(field.vectors, surface.face_normal)).max() < 1e-6
+
+
+def test_no_area_at_all_is_an_error():
+    flat = from_triangles([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
+    with pytest.raises(RosyError, match="no face has an area"):
+        smoothest_field(flat, 4)
+
+
+def test_progress_never_steps_back():
+    fractions = [step.fraction for step in smoothest_task(icosphere(4), 4)]
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0] <= fractions[-1] <= 1
+    assert len(fractions) > 20

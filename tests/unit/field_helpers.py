@@ -1,0 +1,33 @@
+"""Surfaces, matrices and measures that several tests of fields use."""
+
+from __future__ import annotations
+
+import numpy as np
+from conftest import ROOT
+from scipy import sparse
+
+from rosy_addon.field.representation import face_frames, to_representation
+from rosy_addon.field.surface import build_surface
+
+#: Meshes that other programs made, where they lie beside the repository.
+MESHES = ROOT.parent / "shared" / "data" / "meshes"
+
+
+def as_scipy(matrix):
+    shape = len(matrix), matrix.column_count
+    return sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=shape)
+
+
+def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
+    """Without any symmetry, so that the smallest eigenvalue is a single one."""
+    x, y, z = surface.vertices.T
+    out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
+    points = surface.vertices * out[:, None] * stretch
+    return build_surface(points, surface.corner_vertex, surface.face_start)
+
+
+def angles_apart(surface, one, other, degree):
+    """(F,) radians between members of two arrays of vectors on the faces."""
+    x, y = face_frames(surface)
+    z, w = (to_representation(vectors, x, y, degree) for vectors in (one, other))
+    return np.abs(np.angle(z * w.conj())) / degree

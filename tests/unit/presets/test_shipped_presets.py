@@ -1,0 +1,51 @@
+"""Presets as files: those that ship with RoSy, and what is wrong with one."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.presets.store import SHIPPED_FOLDER, load_preset, preset_keys
+
+
+def test_presets_that_come_with_rosy_load():
+    assert {"paper", "plaid", "pen-and-ink", "magnitude-map"} <= set(preset_keys())
+    for name in preset_keys():
+        preset = load_preset(name)
+        assert preset.name and preset.description
+        wanted = json.loads((SHIPPED_FOLDER / f"{name}.json").read_text())["look"]
+        assert {key: getattr(preset.look, key) for key in wanted} == wanted
+        assert preset.look == Look(**wanted)
+
+
+BAD = {
+    "{": ":1: expecting",
+    '{\n "name": "a",\n "look" {}\n}': ":3: expecting",
+    "[1]": "a preset is an object",
+    "\0\1": "binary data",
+    '{"name": "a", "description": "b"}': "a preset needs a 'look'",
+    '{"name": "a", "description": "b", "look": 3}': "'look' is not an object",
+    '{"name": "a", "description": "b", "look": {}, "author": "c"}': "has no 'author'",
+    '{"name": "a", "description": "b", "look": {"lenght": 3}}': "no setting 'lenght'",
+    '{"name": "a", "description": "b", "look": {"length": -3}}': "setting 'length' is -3",
+    '{"name": "a", "description": "b", "look": {"length": "long"}}': "setting 'length' is 'long'",
+    '{"name": "a", "description": "b", "look": {"gain": NaN}}': "setting 'gain' is nan",
+    '{"name": "a", "description": "b", "look": {"noise": "brown"}}': "setting 'noise' is 'brown'",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_what_is_wrong_with_a_preset_is_said(text, tmp_path, error_of):
+    path = tmp_path / "mine.json"
+    path.write_text(text)
+    message = error_of(load_preset, path)
+    assert str(path) in message
+    assert BAD[text] in message
+
+
+def test_missing_presets(tmp_path, error_of):
+    message = error_of(load_preset, "papier")
+    assert "no preset is named 'papier'" in message and "paper" in message
+    assert "no such file" in error_of(load_preset, tmp_path / "none.json")

@@ -1,0 +1,154 @@
+"""Break the code on purpose, one fault at a time, and check that the tests notice.
+
+    python tools/run_faults.py [NAME...] [--jobs N] [--baseline | --check]
+
+The faults are listed in tests/faults.toml. Each is applied in a temporary copy of the working tree,
+and its tests have to fail there. The exit status is 0 only if every fault is caught.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+#: The interpreter of each lane. The tests of lane "blender" run in a full Blender, from a zip.
+PYTHON = {"unit": ".venv", "bpy42": ".venv-bpy42", "blender": ".venv-bpy42"}
+
+#: Seconds after which the tests of a fault are stopped; the fault then counts as missed.
+TIME_LIMIT = 900
+
+#: Exit status of pytest when tests ran and failed. Other values mean that they did not run.
+TESTS_FAILED = 1
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault: the text `find` in `file` becomes `replace`, and `tests` have to fail."""
+
+    name: str
+    room: str
+    what: str
+    file: str
+    find: str
+    replace: str
+    tests: list[str]
+    lane: str
+
+
+def read_faults() -> list[Fault]:
+    """Return the faults of tests/faults.toml, in the order of the file."""
+    tables = tomllib.loads((ROOT / "tests/faults.toml").read_text(encoding="utf-8"))["fault"]
+    return [Fault(**table) for table in tables]
+
+
+def broken_text(fault: Fault, root: Path) -> str | None:
+    """Return the file with the fault in it; None unless `find` occurs there exactly once."""
+    path = root / fault.file
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    return text.replace(fault.find, fault.replace) if text.count(fault.find) == 1 else None
+
+
+def copy_tree(folder: Path) -> Path:
+    """Copy the working tree to `folder`/main, with links to what the tests expect around it."""
+    listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    copy = folder / "main"
+    for name in filter(None, names.split("\0")):
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    for environment in ROOT.glob(".venv*"):
+        (copy / environment.name).symlink_to(environment)
+    if (ROOT.parent / "shared").is_dir():
+        (folder / "shared").symlink_to(ROOT.parent / "shared")
+    return copy
+
+
+def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
+    """Run the tests of a fault in a copy; return the exit status and the last line of output."""
+    python = str(copy / PYTHON[fault.lane] / "bin/python")
+    command = [python, "-m", "pytest", "-x", "-p", "no:cacheprovider", *fault.tests]
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    options = {"cwd": copy, "env": environment, "capture_output": True, "text": True}
+    try:
+        if fault.lane == "blender":
+            shutil.rmtree(copy / "dist", ignore_errors=True)
+            subprocess.run([python, "tools/build_zip.py", "dist"], check=True, **options)
+            (zipped,) = (copy / "dist").glob("*.zip")
+            lane = [sys.executable, "tests/blender/run.py", "stable", str(zipped), "--no-window"]
+            command = [*lane, *fault.tests]
+        done = subprocess.run(command, check=False, timeout=TIME_LIMIT, **options)
+    except subprocess.TimeoutExpired:
+        return -1, f"stopped after {TIME_LIMIT} s"
+    except subprocess.CalledProcessError as error:
+        return -1, f"the zip could not be built: {error.stderr.strip()}"
+    said = done.stdout.strip() or done.stderr.strip() or "no output"
+    return done.returncode, said.splitlines()[-1].strip("= ")
+
+
+def try_fault(fault: Fault, copies: queue.Queue[Path], baseline: bool) -> bool:
+    """Run the tests of a fault, print a line, and return whether the outcome is the wanted one."""
+    copy = copies.get()
+    start = time.monotonic()
+    path = copy / fault.file
+    whole, broken = path.read_bytes() if path.is_file() else b"", broken_text(fault, copy)
+    good, verdict, said = False, "does not apply", f"`find` is not in {fault.file} exactly once"
+    try:
+        if broken is not None and baseline:
+            status, said = run_tests(fault, copy)
+            good = status == 0 and "passed" in said and "skipped" not in said
+            verdict = "passes" if good else "DOES NOT PASS"
+        elif broken is not None:
+            path.write_text(broken, encoding="utf-8")
+            status, said = run_tests(fault, copy)
+            good = status == TESTS_FAILED and "failed" in said
+            verdict = "caught" if good else "MISSED"
+    finally:
+        if broken is not None:
+            path.write_bytes(whole)
+        copies.put(copy)
+    print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {said}", flush=True)
+    return good
+
+
+def main() -> int:
+    """Run the chosen faults; 0 if all are caught."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help="all faults if not given")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies used side by side")
+    mode = parser.add_mutually_exclusive_group()
+    mode.add_argument("--baseline", action="store_true", help="the tests pass without the faults")
+    mode.add_argument("--check", action="store_true", help="only check that each fault applies")
+    options = parser.parse_args()
+    faults = read_faults()
+    if unknown := set(options.names) - {fault.name for fault in faults}:
+        parser.error(f"no fault is named {', '.join(sorted(unknown))}")
+    faults = [fault for fault in faults if not options.names or fault.name in options.names]
+    if options.check:
+        lost = [fault.name for fault in faults if broken_text(fault, ROOT) is None]
+        print("\n".join([*(f"does not apply  {name}" for name in lost), f"{len(faults)} checked"]))
+        return 1 if lost else 0
+    with tempfile.TemporaryDirectory(prefix="rosy-faults-") as name:
+        copies: queue.Queue[Path] = queue.Queue()
+        for number in range(options.jobs):
+            copies.put(copy_tree(Path(name) / str(number)))
+        with ThreadPoolExecutor(options.jobs) as pool:
+            good = list(pool.map(lambda each: try_fault(each, copies, options.baseline), faults))
+    print(f"{sum(good)} of {len(good)} {'pass' if options.baseline else 'caught'}")
+    return 0 if all(good) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

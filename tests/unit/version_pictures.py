@@ -32,7 +32,7 @@ def draw() -> dict[str, np.ndarray]:
         "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
-        "magnitude": (torus(40, 20), "axis", 3, Look(magnitude="both", supersampling=2)),
+        "magnitude": (icosphere(3), "axis", 3, Look(magnitude="both", supersampling=2)),
     }
     for name, (surface, kind, degree, drawn) in shapes.items():
         size = 160 * drawn.supersampling

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from field_helpers import bumpy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
@@ -359,9 +361,13 @@ def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase
 
 
 def test_singularities_are_found():
-    """Their indices sum up to what Poincare and Hopf say."""
+    """Their indices sum up to what Poincare and Hopf say.
+
+    The surface has no symmetry, so that no zero lies on an edge.
+    """
+    surface = bumpy(icosphere(4))
     for degree in (1, 2, 3, 4, 6):
-        ground = build_tangent_mesh(body_of(icosphere(3), degree, kind="smoothest"))
+        ground = build_tangent_mesh(body_of(surface, degree, kind="smoothest"))
         assert np.isclose(singularities(ground)[2].sum(), 2)
 
 
@@ -829,7 +835,7 @@ def write_ball(path):
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_command_line(tmp_path, capsys):
+def test_command_line(tmp_path, capsys, monkeypatch):
     mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
     write_ball(mesh)
     command = [
@@ -857,9 +863,11 @@ def test_command_line(tmp_path, capsys):
     ):
         assert main([*command, "-o", str(out), *words]) == 2
         assert wanted in capsys.readouterr().err
-    for wanted, words in (("give a mesh file", []), ("needs Blender", ["scene.blend"])):
-        assert main(["strokes", *words, "-o", str(out)]) == 2
-        assert wanted in capsys.readouterr().err
+    assert main(["strokes", "-o", str(out)]) == 2
+    assert "give a mesh file" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    assert main(["strokes", "scene.blend", "-o", str(out)]) == 2
+    assert "needs Blender" in capsys.readouterr().err
 
 
 # --- what is wrong is said ---------------------------------------------------------------------------

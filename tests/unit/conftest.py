@@ -17,8 +17,17 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def long(*cases):
-    """Cases of a test that `make test-long` adds to the usual ones."""
-    return [pytest.param(case, marks=pytest.mark.long) for case in cases]
+    """Cases of a test that `make test-long` adds to the usual ones. A tuple has several arguments."""
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
+        for case in cases
+    ]
+
+
+def mainly(kept, cases):
+    """All cases, of which `make test` runs those kept and `make test-long` the others."""
+    kept, cases = set(kept), list(cases)
+    return [*(case for case in cases if case in kept), *long(*(c for c in cases if c not in kept))]
 
 
 def pytest_collection_modifyitems(items):

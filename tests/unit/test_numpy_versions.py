@@ -11,6 +11,7 @@ import version_pictures
 from conftest import ROOT
 
 
+@pytest.mark.slow
 def test_another_numpy_draws_the_same(tmp_path):
     other = os.environ.get("ROSY_OTHER_PYTHON")
     if not other:
@@ -27,6 +28,7 @@ def test_another_numpy_draws_the_same(tmp_path):
         assert (difference > 0).mean() <= 1e-3, name
 
 
+@pytest.mark.slow
 def test_two_runs_draw_the_same():
     first, second = version_pictures.draw(), version_pictures.draw()
     assert all(np.array_equal(first[name], second[name]) for name in first)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import mainly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
@@ -202,7 +203,8 @@ def test_streaks_run_along_free_directions(method, angles):
     assert np.abs((found - wanted + 90) % 180 - 90).max() < 2
 
 
-@pytest.mark.parametrize("method", list(METHODS))
+@pytest.mark.slow
+@pytest.mark.parametrize("method", mainly(["sheets"], METHODS))
 def test_a_conjugate_field_of_another_library(method, shared_data):
     surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
     field = read_field(shared_data / "fields" / "cheburashka-cf.rawfield", surface)

@@ -151,6 +151,7 @@ def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
     assert first == sorted(first)
 
 
+@pytest.mark.slow
 def test_meshes_of_others(shared_data):
     found = {
         path.name: (len(surface.vertices), surface.face_count)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import mainly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -201,6 +202,7 @@ ANYTHING = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.fixed_dictionaries(
@@ -270,6 +272,7 @@ def test_what_a_preset_is_called_by_is_the_name_of_a_file_anywhere(name):
 # --- one's own -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_saved_and_found_again(own):
     assert save_preset(MINE, own) == "my-ink"
     assert load_preset("my-ink", own) == load_preset("My Ink", own) == MINE
@@ -378,7 +381,7 @@ def test_where_ones_own_are_without_blender(platform, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", preset_keys())
+@pytest.mark.parametrize("name", mainly(preset_keys()[::4], preset_keys()))
 def test_pictures_of_presets_are_of_their_looks(name):
     """If a look or how it is drawn has changed: `python -m tools.gallery preset-pictures`."""
     path = preset_files()[name]
@@ -391,6 +394,7 @@ def test_pictures_of_presets_are_of_their_looks(name):
     assert np.corrcoef(shown.ravel(), drawn.ravel())[0, 1] > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "look",
     [
@@ -413,6 +417,7 @@ def test_every_look_has_a_picture(look):
     np.testing.assert_array_equal(picture, draw_preview(look))
 
 
+@pytest.mark.slow
 def test_pictures_tell_looks_apart():
     plain, long = draw_preview(Look()), draw_preview(Look(length=120))
     assert np.abs(plain - long).mean() > 0.01

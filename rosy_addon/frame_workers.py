@@ -182,7 +182,7 @@ def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Ite
     except ImportError:
         raise RosyError("--scheduler needs Dask: pip install distributed") from None
     try:
-        client = Client(address, timeout="20s")
+        client = Client(address)
     except (OSError, ValueError) as reason:
         raise RosyError(f"--scheduler {address}: no answer: {reason}") from None
     failures = []

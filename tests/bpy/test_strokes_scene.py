@@ -21,7 +21,7 @@ from rosy.rosy_addon.strokes.svg import Pen
 from rosy.rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
 
-PLAIN = StrokeStyle(spacing=6, outline=True)
+PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
 
 #: Type of a Grease Pencil object: Blender 4.3 replaced Grease Pencil by a new one.
@@ -282,7 +282,7 @@ def test_deleted_by_the_user_it_is_made_anew(monkey, camera, scene):
 def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
     side = add_camera("Side", (5.0, 0.0, 0.5))
     made = [
-        draw_strokes(scene, kind=kind, camera=source, style=PLAIN).obj
+        draw_strokes(scene, kind=kind, camera=source, style=StrokeStyle(spacing=12)).obj
         for kind in ("PENCIL", "CURVES")
         for source in (camera, side, camera)
     ]
@@ -309,26 +309,26 @@ def test_chosen_objects_are_drawn_on_and_the_others_hide(monkey, camera, scene):
     instances = read_scene(bpy.context.evaluated_depsgraph_get()).instances
     assert len(instances) == 2
     made = draw_strokes(
-        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=6)
+        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=12)
     )
     assert np.allclose(made.drawing.strokes.points[:, 1], -2.0)
     alone = len(
         draw_strokes(
-            scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=6)
+            scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=12)
         ).drawing.strokes
     )
     wall.hide_render = True
     assert (
-        len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6)).drawing.strokes)
+        len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12)).drawing.strokes)
         > alone
     )
 
 
 def test_what_was_made_of_strokes_hides_nothing(monkey, camera, scene):
     """Geometry Nodes may make meshes of them; these are not what is drawn on."""
-    wanted = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6))
+    wanted = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
     thicken(wanted.obj, 0.3)
-    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=6))
+    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
     np.testing.assert_array_equal(again.drawing.strokes.points, wanted.drawing.strokes.points)
 
 
@@ -351,11 +351,11 @@ def thicken(thing, radius):
 def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, tmp_path):
     settings = scene.rosy.strokes
     settings.kind, settings.filepath = "SVG", str(tmp_path / "a.svg")
-    settings.spacing, settings.taper, settings.width = 6.3, 0.4, 0.7
+    settings.spacing, settings.taper, settings.width = 9.3, 0.4, 0.7
     settings.tone, settings.light, settings.outline = True, "lamp", True
     settings.inks, settings.outline_colour = "FAMILIES", (1.0, 0.0, 0.0)
     assert draw_strokes(scene).path == tmp_path / "a.svg"
-    style = StrokeStyle(spacing=6.3, taper=0.4, tone=True, light="lamp", outline=True)
+    style = StrokeStyle(spacing=9.3, taper=0.4, tone=True, light="lamp", outline=True)
     pen = Pen(width=0.7, colours=["#db8021", "#4594eb"], outline="#ff0000")
     draw_strokes(scene, kind="SVG", path=tmp_path / "b.svg", style=style, pen=pen)
     text = (tmp_path / "a.svg").read_text()
@@ -405,7 +405,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoi
 def test_other_meshes_without_a_field_do_not_matter(camera, scene):
     add_mesh("Points", [(0, 0, 0)], [])
     add_field(add_plane("Square", cuts=4), "axis")
-    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=6))
+    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=12))
     assert made.obj.data.layers[0].frames[0].frame_number == min(
         scene.frame_start, scene.frame_current
     )

@@ -91,7 +91,7 @@ def test_what_was_never_saved_cannot_be_saved():
 def drawable(saved):
     """The same file, with settings of strokes that are not those of the command line."""
     settings = bpy.context.scene.rosy.strokes
-    settings.spacing, settings.width, settings.tone, settings.light = 9.0, 1.7, True, "lamp"
+    settings.spacing, settings.width, settings.tone, settings.light = 16.0, 1.7, True, "lamp"
     settings.inks, settings.outline, settings.overshoot = "FAMILIES", True, 6.0
     bpy.ops.wm.save_mainfile()
     return saved
@@ -116,11 +116,11 @@ def test_strokes_of_a_file_are_what_the_button_draws(drawable, tmp_path):
 def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
     scene = bpy.context.scene
     settings = scene.rosy.strokes
-    words = ["--distance", "0.2", "--no-tone", "--taper", "0", "--overshoot", "0"]
+    words = ["--distance", "0.5", "--no-tone", "--taper", "0", "--overshoot", "0"]
     words += ["--plotter", "--colours", "red,blue"]
     done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
     assert done.returncode == 0, done.stderr
-    settings.unit, settings.distance, settings.tone = "world", 0.2, False
+    settings.unit, settings.distance, settings.tone = "world", 0.5, False
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
     draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)

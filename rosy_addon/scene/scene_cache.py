@@ -29,7 +29,8 @@ from .field_attributes import (
     read_mesh_field,
 )
 from .meshes import evaluated_mesh, mesh_surface
-from .scene_reader import is_field_enabled, temp_attributes, user_modifiers
+from .owned_data import user_modifiers
+from .scene_reader import is_field_enabled, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
 
 

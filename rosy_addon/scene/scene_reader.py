@@ -29,10 +29,8 @@ from .field_attributes import (
     read_mesh_field,
 )
 from .meshes import evaluated_mesh, mesh_surface
+from .owned_data import OWNED_TAG, user_modifiers
 from .tone_inputs import ToneRequest, check_tones, read_tone
-
-#: Custom property on every datablock that RoSy created.
-OWNED_TAG = "rosy_made"
 
 #: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
 #: another form.
@@ -236,17 +234,6 @@ class _SceneReader:
                 f"({', '.join(modifier.name for modifier in user_modifiers(obj)) or 'none'}) "
                 f"the mesh {problem}"
             )
-
-
-def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Return the modifiers of an object without those that RoSy added."""
-    return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
-
-
-def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Whether RoSy added a modifier."""
-    group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
-    return group is not None and bool(group.get(OWNED_TAG))
 
 
 @contextmanager

@@ -19,17 +19,11 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .field_attributes import (
-    FieldLayout,
-    attribute_name,
-    field_degree,
-    has_field,
-    is_face_vector_field,
-    read_evaluated_field,
-    read_mesh_field,
-)
+from .evaluated_field import FieldLayout, read_evaluated_field
+from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import evaluated_mesh, mesh_surface
 from .owned_data import user_modifiers
+from .read_field import read_mesh_field
 from .scene_reader import is_field_enabled, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
 

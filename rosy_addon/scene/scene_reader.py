@@ -16,20 +16,17 @@ from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .compat import has_rosy_properties, is_editable
-from .field_attributes import (
+from .evaluated_field import (
     FACE_NORMAL_ATTRIBUTE,
     FieldLayout,
     add_temp_field,
     add_temp_vectors,
-    attribute_name,
-    field_degree,
-    has_field,
-    is_face_vector_field,
     read_evaluated_field,
-    read_mesh_field,
 )
+from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import evaluated_mesh, mesh_surface
 from .owned_data import OWNED_TAG, user_modifiers
+from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
 
 #: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in

@@ -2,8 +2,8 @@
 
 A field is given on the faces of the rest shape. The stored member of each face is transported to
 the deformed face (`face_values`). From the faces, the field is transported to the corners and
-averaged over each smooth fan (`fan_values`). All steps but the first work on the representation z = rho exp(i N t), so that the
-result does not depend on which of the N members is stored.
+averaged over each smooth fan (`fan_values`). All steps but the first work on the representation
+z = rho exp(i N t), so that the result does not depend on which of the N members is stored.
 
 A field can have more values than z: the deviations of directions that are not evenly spaced, and
 the line that the stored member is on. They are complex numbers too and take the same steps, but

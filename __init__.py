@@ -24,10 +24,12 @@ def unregister() -> None:
     from . import operators
     from .rosy_addon import cache, ui
     from .rosy_addon.gpu import device
+    from .rosy_addon.scene import staleness
 
     bpy.utils.unregister_cli_command(_cli_command)
     _cli_command = None
     operators.unregister()
     ui.unregister()
     cache.BAKE_CACHE.clear()
+    staleness.MESH_STATES.clear()
     device.release()

@@ -116,7 +116,7 @@ def drawn_twice(
     rosy : SimpleNamespace
         Of `rooms`.
     card : Card
-    instances : sequence of Body
+    instances : sequence of MeshInstance
     camera : Camera
         Of `look.supersampling` times the size of the picture each way.
     look : Look
@@ -152,7 +152,7 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
 
     Of all pixels that at least one of them covers with a field, those count that
 
-    - both cover, with the same body,
+    - both cover, with the same instance,
     - at the same point of it, within `NEAR` of a pixel: two points on the ray through the pixel, so
       their distance is that in depth, and compared with what a pixel measures across there. Which
       triangle is seen may differ where two meet, as OpenGL rounds their corners, but not the point;

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.scene.pictures import list_bakes, remove_bakes
+from ..rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from .poll import poll_idle
 
 

@@ -13,17 +13,13 @@ from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Task, subtask
-from ..rosy_addon.scene.field_attributes import (
-    STORAGE_FORMS,
-    attribute_name,
-    has_field,
-    read_face_scalars,
-    read_mesh_field,
-    write_mesh_field,
-)
+from ..rosy_addon.scene.face_values import read_face_scalars
+from ..rosy_addon.scene.field_attributes import attribute_name, has_field
 from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.scene.read_field import read_mesh_field
+from ..rosy_addon.scene.write_field import STORAGE_FORMS, write_mesh_field
 from .modal_task import ModalTaskMixin
-from .poll import assign_fields, poll_active_field, poll_editable, selected_mesh_objects
+from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
 
 
 class _FieldOperator:
@@ -99,7 +95,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
             task = convert_task(surface, field, conversion)
             field = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
             converted[mesh] = replace(field, source_directions=None)
-        assign_fields(self, context, converted)
+        store_fields(self, context, converted)
         return len(converted)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:

@@ -9,8 +9,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.field_io import write_field
-from ..rosy_addon.scene.field_attributes import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.scene.read_field import read_mesh_field
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
 
 #: File formats by suffix: label and description in the user interface.

@@ -23,7 +23,7 @@ from ..rosy_addon.scene.guides import (
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
 from ..rosy_addon.ui.generator_settings import generator_setting_names
 from .modal_task import ModalTaskMixin
-from .poll import assign_fields, poll_editable, selected_mesh_objects
+from .poll import poll_editable, selected_mesh_objects, store_fields
 
 #: Labels of generators that are not the capitalized key.
 KIND_LABELS = {"uv": "UV Map"}
@@ -148,7 +148,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 self.report({"WARNING"}, note)
             task = generate_task(surface, settings_per_mesh[index], self.degree)
             fields[mesh] = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
-        assign_fields(self, context, fields, self.attribute)
+        store_fields(self, context, fields, self.attribute)
         return sum(len(field.vectors) for field in fields.values())
 
     def _generator_settings(

@@ -9,7 +9,7 @@ from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
-from .poll import assign_fields, poll_editable, selected_mesh_objects
+from .poll import poll_editable, selected_mesh_objects, store_fields
 
 
 class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
@@ -70,7 +70,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
                 self.undefined,
                 mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
             )
-            assign_fields(self, context, {mesh: field}, self.attribute)
+            store_fields(self, context, {mesh: field}, self.attribute)
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.scene.compat import is_editable
-from ..rosy_addon.scene.field_attributes import (
-    DEFAULT_FIELD_NAME,
-    attribute_name,
-    has_field,
-    is_face_vector_field,
-    write_mesh_field,
-)
+from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.scene_reader import field_objects
-from ..rosy_addon.scene.singularity_points import read_singularities
+from ..rosy_addon.scene.write_field import assign_fields
 from ..rosy_addon.ui import job_status, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
 
@@ -83,13 +75,13 @@ def sync_suffix(operator: bpy.types.Operator, suffix: str) -> bool:
     return changed
 
 
-def assign_fields(
+def store_fields(
     operator: bpy.types.Operator,
     context: bpy.types.Context,
     fields: dict[bpy.types.Mesh, RosyField],
     name: str | None = None,
 ) -> None:
-    """Store fields on meshes, all or none of them, and apply the preferences to the scene.
+    """Store fields on meshes as `assign_fields`, and apply the preferences to the scene.
 
     The overlay of singularities is updated where it is shown.
 
@@ -107,34 +99,9 @@ def assign_fields(
     RosyError
         If a field cannot be stored on its mesh. Nothing is changed in this case.
     """
-    # Meshes that cannot accept a field come first, so that an error is raised before any change.
-    names = {mesh: name or _target_attribute(mesh) for mesh in fields}
-    for mesh in sorted(fields, key=lambda mesh: _accepts_field(mesh, names[mesh])):
-        write_mesh_field(mesh, fields[mesh], names[mesh])
-    _refresh_overlay(context, fields)
+    assign_fields(fields, name)
+    overlay.refresh(context, fields)
     try:
         apply_preferences(context)
     except RosyError as error:
         operator.report({"WARNING"}, f"RoSy's preferences: {error}")
-
-
-def _target_attribute(mesh: bpy.types.Mesh) -> str:
-    """Return the attribute of a mesh's field, or a default if that has another form."""
-    name = attribute_name(mesh)
-    return (
-        name
-        if name not in mesh.attributes or is_face_vector_field(mesh, name)
-        else DEFAULT_FIELD_NAME
-    )
-
-
-def _refresh_overlay(context: bpy.types.Context, meshes: Iterable[bpy.types.Mesh]) -> None:
-    """Update the singularities in the overlay for meshes with new fields."""
-    for obj in context.view_layer.objects:
-        if obj.data in meshes and overlay.is_shown(obj.name):
-            overlay.show(obj.name, read_singularities(obj, context.evaluated_depsgraph_get()))
-
-
-def _accepts_field(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether a field can be stored on a mesh under a name as vectors on faces."""
-    return is_editable(mesh) and (name not in mesh.attributes or is_face_vector_field(mesh, name))

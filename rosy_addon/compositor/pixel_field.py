@@ -12,7 +12,7 @@ from ..deterministic_trig import unit_phasor
 from ..field.directional_field import evaluate_harmonics
 from ..field.rosy_field import check_degree
 from ..field.symmetry import FieldSymmetry
-from ..projection.corner_field import FieldChannel
+from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..field.rosy_field import RosyField
 from ..field.symmetry import FieldSymmetry
-from ..projection.corner_field import FieldChannel
+from ..projection.field_channel import FieldChannel
 from .mesh_buffers import field_channels
 
 

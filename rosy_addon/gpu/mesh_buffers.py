@@ -13,13 +13,9 @@ from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..progress import run_to_completion
-from ..projection.corner_field import (
-    SIMILARITY_EPS,
-    CornerField,
-    FieldChannel,
-    corner_field_task,
-    rotation_order,
-)
+from ..projection.corner_field import CornerField, corner_field_task
+from ..projection.face_values import SIMILARITY_EPS
+from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.mip_map import MipMap
 from ..projection.surface_tone import SurfaceTone
 

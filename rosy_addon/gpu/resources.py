@@ -11,7 +11,7 @@ import numpy as np
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
-from ..projection.corner_field import FieldChannel
+from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
 from ..projection.rest_coordinates import matrix_scale

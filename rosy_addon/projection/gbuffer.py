@@ -10,7 +10,7 @@ import numpy as np
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
-from .corner_field import FieldChannel
+from .field_channel import FieldChannel
 from .surface_tone import SurfaceTone
 
 
@@ -81,7 +81,7 @@ class GBuffer:
         Whether the corners of the visible triangle run counter-clockwise in the picture. True at
         all pixels by default.
     channels : dict of FieldChannel to (P,) complex64 ndarray
-        Additional values of some fields (see `corner_field.FieldChannel`), in the same frame as
+        Additional values of some fields (see `field_channel.FieldChannel`), in the same frame as
         `representation`. Instances that do not have a channel have the value that it has for a
         plain RoSy field.
     instances : tuple of MeshInstance

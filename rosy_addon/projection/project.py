@@ -20,7 +20,8 @@ from ..field.representation import signed_power
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
 from .camera import Camera, pixel_rays
-from .corner_field import CornerField, cached_corner_field_task, rotation_order
+from .corner_field import CornerField, cached_corner_field_task
+from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_neighbors import neighbor_masks, screen_jacobians
 from .rasterizer import Fragments, rasterize
@@ -465,7 +466,7 @@ def _interpolated_values(
     length : (P,) float32 ndarray
         Length of sum b_i n_i, from `_interpolated_normal`.
     order : int
-        Power by which the values rotate with the frame (see `corner_field.rotation_order`).
+        Power by which the values rotate with the frame (see `field_channel.rotation_order`).
 
     Returns
     -------

@@ -9,7 +9,7 @@ import numpy as np
 from mathutils.geometry import interpolate_bezier
 
 from ..errors import RosyError
-from .field_attributes import read_face_vectors
+from .face_values import read_face_vectors
 from .meshes import read_attribute
 
 #: Object types that can guide a field: those with strokes, and all.

@@ -60,9 +60,9 @@ def store_occlusion_task(
     values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
         start, stop = index / len(objects), (index + 1) / len(objects)
-        instances, body_index = _with_original_faces(scene_data, obj)
+        instances, instance_index = _with_original_faces(scene_data, obj)
         values_by_mesh[obj.data] = yield from subtask(
-            occlusion_task(instances, body_index, direction_count), start, stop
+            occlusion_task(instances, instance_index, direction_count), start, stop
         )
     for mesh, values in values_by_mesh.items():
         attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "CORNER")
@@ -77,16 +77,16 @@ def _with_original_faces(
 
     The instance gets the object's original surface if its modifiers change the faces.
     """
-    body_index = scene_data.objects.index(obj)
+    instance_index = scene_data.objects.index(obj)
     instances = list(scene_data.instances)
     original, evaluated = (
         mesh_surface(obj.data, f"object '{obj.name}'"),
-        instances[body_index].surface,
+        instances[instance_index].surface,
     )
     same_faces = np.array_equal(original.face_start, evaluated.face_start)
     if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
-        instances[body_index] = replace(instances[body_index], surface=original)
-    return instances, body_index
+        instances[instance_index] = replace(instances[instance_index], surface=original)
+    return instances, instance_index
 
 
 def _check_writable(obj: bpy.types.Object, name: str) -> None:

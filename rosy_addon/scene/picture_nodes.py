@@ -1,4 +1,4 @@
-"""Nodes that show a picture on objects: a material per camera, and a node group per object."""
+"""What shows a picture on objects: a material per camera; a node group and a modifier per object."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import numpy as np
 
 from .blender_images import NEUTRAL_GRAY
 from .compat import has_nodes_by_default
+from .owned_data import delete_owned, is_rosy_modifier
+
+#: Name of the modifier that shows a picture.
+MODIFIER_NAME = "RoSy"
 
 #: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
 CLIP_ATTRIBUTE = "rosy_projection"
@@ -212,3 +216,27 @@ class _NodeBuilder:
             component = self.math("ADD", product.outputs["Value"], row[3])
             self.tree.links.new(component, combined.inputs[axis])
         return combined.outputs[0]
+
+
+def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) -> None:
+    """Set the node group of RoSy's modifier, and move it to the end of the object's stack."""
+    existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
+    modifier.show_expanded = False
+    old_group, modifier.node_group = modifier.node_group, node_group
+    for extra in existing[1:]:
+        obj.modifiers.remove(extra)
+    last = len(obj.modifiers) - 1
+    obj.modifiers.move(obj.modifiers.find(modifier.name), last)
+    if old_group is not None and old_group != node_group and not old_group.users:
+        bpy.data.node_groups.remove(old_group)
+    node_group.name = f"RoSy {obj.name}"
+
+
+def remove_picture_modifiers(obj: bpy.types.Object) -> int:
+    """Remove RoSy's modifiers from an object, and return the number of deleted node groups."""
+    existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    node_groups = {modifier.node_group for modifier in existing}
+    for modifier in existing:
+        obj.modifiers.remove(modifier)
+    return sum(delete_owned(node_group) for node_group in node_groups if not node_group.users)

@@ -19,17 +19,12 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .field_attributes import (
-    FieldLayout,
-    attribute_name,
-    field_degree,
-    has_field,
-    is_face_vector_field,
-    read_evaluated_field,
-    read_mesh_field,
-)
+from .evaluated_field import FieldLayout, read_evaluated_field
+from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import evaluated_mesh, mesh_surface
-from .scene_reader import is_field_enabled, temp_attributes, user_modifiers
+from .owned_data import user_modifiers
+from .read_field import read_mesh_field
+from .scene_reader import is_field_enabled, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
 
 
@@ -91,7 +86,7 @@ class SceneCache:
         # Names of objects that need `resolve_topologies`.
         self._unresolved: set[str] = set()
         # Mesh instances of the last call of `read`, and their versions.
-        self._bodies: dict[tuple, tuple[MeshInstance, int]] = {}
+        self._instances: dict[tuple, tuple[MeshInstance, int]] = {}
         self._last_version = 0
         self._tone_request: ToneRequest | None = None
 
@@ -156,31 +151,31 @@ class SceneCache:
                 instance.parent.original if instance.is_instance and instance.parent else owner
             )
             matrix = np.array(instance.matrix_world, dtype=np.float64)
-            body_key = (
+            instance_key = (
                 id(mesh_state.surface),
                 id(mesh_state.field),
                 id(mesh_state.tone),
                 matrix.tobytes(),
             )
-            if body_key not in instances:
-                instances[body_key] = self._versioned_body(body_key, mesh_state, matrix)
+            if instance_key not in instances:
+                instances[instance_key] = self._versioned_instance(instance_key, mesh_state, matrix)
             states.append(
                 InstanceState(
-                    instances[body_key][0], owner, visibility_object, instances[body_key][1]
+                    instances[instance_key][0], owner, visibility_object, instances[instance_key][1]
                 )
             )
         # The instances of the last call are released only now: while their surfaces are alive, no
         # new object can have the same id.
-        self._bodies = instances
+        self._instances = instances
         self._cache.evict_over_limit()
         return states
 
-    def _versioned_body(
-        self, body_key: tuple, mesh_state: _MeshState, matrix: np.ndarray
+    def _versioned_instance(
+        self, instance_key: tuple, mesh_state: _MeshState, matrix: np.ndarray
     ) -> tuple[MeshInstance, int]:
         """Return the mesh instance of a key and its version, from the last call or new."""
-        if body_key in self._bodies:
-            return self._bodies[body_key]
+        if instance_key in self._instances:
+            return self._instances[instance_key]
         self._last_version += 1
         return MeshInstance(
             mesh_state.surface, matrix, mesh_state.field, mesh_state.tone

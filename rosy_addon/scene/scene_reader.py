@@ -16,23 +16,18 @@ from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .compat import has_rosy_properties, is_editable
-from .field_attributes import (
+from .evaluated_field import (
     FACE_NORMAL_ATTRIBUTE,
     FieldLayout,
     add_temp_field,
     add_temp_vectors,
-    attribute_name,
-    field_degree,
-    has_field,
-    is_face_vector_field,
     read_evaluated_field,
-    read_mesh_field,
 )
+from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import evaluated_mesh, mesh_surface
+from .owned_data import OWNED_TAG, user_modifiers
+from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
-
-#: Custom property on every datablock that RoSy created.
-OWNED_TAG = "rosy_made"
 
 #: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
 #: another form.
@@ -83,7 +78,7 @@ def field_objects(
     return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
 
 
-def read_bodies(
+def read_instances(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object] | None = None,
     nonfinite: str = "error",
@@ -138,10 +133,12 @@ def read_scene(
             if _is_rendered(instance, visible_objects):
                 reader.add(instance)
     reader.check_complete(objects)
-    check_tones(tone_request, [(instance.tone, owner) for instance, owner in reader.field_bodies])
+    check_tones(
+        tone_request, [(instance.tone, owner) for instance, owner in reader.field_instances]
+    )
     return SceneData(
-        [instance for instance, _ in reader.field_bodies] + reader.occluders,
-        [owner for _, owner in reader.field_bodies],
+        [instance for instance, _ in reader.field_instances] + reader.occluders,
+        [owner for _, owner in reader.field_instances],
     )
 
 
@@ -154,7 +151,7 @@ class _SceneReader:
 
     Attributes
     ----------
-    field_bodies : list of (MeshInstance, bpy.types.Object)
+    field_instances : list of (MeshInstance, bpy.types.Object)
         Instances with a field, and their original objects.
     occluders : list of MeshInstance
         All other instances.
@@ -174,12 +171,12 @@ class _SceneReader:
         self.nonfinite = nonfinite
         self.cache = cache
         self.tone_request = tone_request
-        self.field_bodies: list[tuple[MeshInstance, bpy.types.Object]] = []
+        self.field_instances: list[tuple[MeshInstance, bpy.types.Object]] = []
         self.occluders: list[MeshInstance] = []
         self.mesh_data: dict[tuple, _MeshData | None] = {}
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """Add an instance to `field_bodies` or `occluders`."""
+        """Add an instance to `field_instances` or `occluders`."""
         obj = instance.object
         original = obj.original
         layout = self.layouts.get(original)
@@ -190,14 +187,14 @@ class _SceneReader:
             return
         surface, field, tone = self.mesh_data[mesh_key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
-        body_key = "body", id(surface), id(field), id(tone), matrix.tobytes()
-        body = self.cache.get_or_create(
-            body_key, lambda: MeshInstance(surface, matrix, field, tone)
+        instance_key = "instance", id(surface), id(field), id(tone), matrix.tobytes()
+        mesh_instance = self.cache.get_or_create(
+            instance_key, lambda: MeshInstance(surface, matrix, field, tone)
         )
         if field is None:
-            self.occluders.append(body)
+            self.occluders.append(mesh_instance)
         else:
-            self.field_bodies.append((body, original))
+            self.field_instances.append((mesh_instance, original))
 
     def _read_mesh(self, obj: bpy.types.Object, layout: FieldLayout | None) -> _MeshData | None:
         """Read an evaluated mesh; None if it has no faces."""
@@ -220,7 +217,7 @@ class _SceneReader:
 
     def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:
         """Raise an error if an object's field was not read."""
-        drawn_objects = {owner for _, owner in self.field_bodies}
+        drawn_objects = {owner for _, owner in self.field_instances}
         read_objects = {key[1] for key in self.mesh_data}
         for obj in objects:
             if obj in drawn_objects:
@@ -236,17 +233,6 @@ class _SceneReader:
                 f"({', '.join(modifier.name for modifier in user_modifiers(obj)) or 'none'}) "
                 f"the mesh {problem}"
             )
-
-
-def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Return the modifiers of an object without those that RoSy added."""
-    return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
-
-
-def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Whether RoSy added a modifier."""
-    group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
-    return group is not None and bool(group.get(OWNED_TAG))
 
 
 @contextmanager

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..field.singularities import find_singularities
 from ..field.validate import vertex_normals
-from .field_attributes import read_mesh_field
 from .meshes import mesh_surface
-from .scene_reader import OWNED_TAG, read_scene, user_modifiers
+from .owned_data import OWNED_TAG, user_modifiers
+from .read_field import read_mesh_field
+from .scene_reader import read_scene
 
 #: Attributes of the points: the singularity index in units of 1 / N, and the degree N.
 INDEX_ATTRIBUTE, DEGREE_ATTRIBUTE = "index", "degree"

@@ -22,8 +22,8 @@ from ..strokes.svg import Pen
 from .curves import new_curves
 from .grease_pencil import new_grease_pencil
 from .look_properties import read_settings
-from .pictures import rollback_on_error
-from .scene_reader import OWNED_TAG, field_objects
+from .owned_data import OWNED_TAG, rollback_on_error
+from .scene_reader import field_objects
 
 #: The function that creates the data of each kind of object.
 DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {

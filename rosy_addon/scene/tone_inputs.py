@@ -19,7 +19,7 @@ from ..field.surface import Surface
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties
-from .field_attributes import scalar_values
+from .face_values import scalar_values
 
 
 @dataclass(frozen=True)

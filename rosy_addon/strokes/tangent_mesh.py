@@ -19,7 +19,8 @@ from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
 from ..field.surface import build_edges
 from ..progress import run_to_completion
-from ..projection.corner_field import cached_corner_field_task, rotation_order
+from ..projection.corner_field import cached_corner_field_task
+from ..projection.field_channel import rotation_order
 from ..projection.gbuffer import MeshInstance
 
 #: An edge across which normals are not interpolated is a crease if the normals of its triangles

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..scene.bake_records import BakeInfo, list_bakes
 from ..scene.field_attributes import has_field
-from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS, BakeInfo, list_bakes
+from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.scene_reader import field_objects
 from ..viewport import session
 from . import job_status, overlay

@@ -6,6 +6,7 @@ with the object, but do not follow changes of the mesh.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import blf
@@ -16,7 +17,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..scene.singularity_points import Singularities
+from ..scene.singularity_points import Singularities, read_singularities
 from ..viewport.view3d import redraw
 
 #: Linear colors by the sign of the index: orange for positive, blue for negative.
@@ -80,6 +81,13 @@ def hide(object_name: str | None = None) -> None:
     if not _OVERLAY.singularities:
         _OVERLAY.remove_handlers()
     redraw()
+
+
+def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> None:
+    """Read the singularities again of objects that show them and whose fields have changed."""
+    for obj in context.view_layer.objects:
+        if obj.data in meshes and is_shown(obj.name):
+            show(obj.name, read_singularities(obj, context.evaluated_depsgraph_get()))
 
 
 def _clear_on_load(*_: Any) -> None:

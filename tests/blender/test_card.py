@@ -114,7 +114,7 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     for thing in (mirrored, hiding):
         scene.collection.objects.link(thing)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    instances = module_of(PACKAGE, "scene.scene_reader").read_bodies(depsgraph)
+    instances = module_of(PACKAGE, "scene.scene_reader").read_instances(depsgraph)
     assert [instance.field is None for instance in instances] == [False, False, True]
     seen = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
     look = rosy.Look(shading=0.0)

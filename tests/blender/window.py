@@ -62,8 +62,8 @@ def status():
     return rosy("rosy_addon.ui.job_status")
 
 
-def pictures():
-    return rosy("rosy_addon.scene.pictures")
+def bake_records():
+    return rosy("rosy_addon.scene.bake_records")
 
 
 def pixels(image):
@@ -208,7 +208,7 @@ def panel_out_of_date():
     scene.camera.location.x += 0.5
     other = add_camera("Another Camera", (0.0, 5.0, 0.0), (math.pi / 2, 0.0, math.pi))
     yield 1.0
-    assert [bake.stale_reason for bake in pictures().list_bakes(scene)] == [
+    assert [bake.stale_reason for bake in bake_records().list_bakes(scene)] == [
         "camera 'Camera' was changed"
     ]
     scene.camera = other

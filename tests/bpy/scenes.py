@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
-from rosy.rosy_addon.scene.field_attributes import write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.write_field import write_mesh_field
 
 
 def link(thing):

@@ -19,8 +19,9 @@ from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local, worker_command
 from rosy.rosy_addon.gpu.select import select_renderer
+from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
-from rosy.rosy_addon.scene.pictures import OutputSettings, list_bakes, remove_bakes
+from rosy.rosy_addon.scene.pictures import OutputSettings
 from scenes import contents, link, pixels, render
 
 ROOT = Path(__file__).parents[2]

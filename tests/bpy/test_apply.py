@@ -11,8 +11,10 @@ from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene import pictures as pictures_room
+from rosy.rosy_addon.scene import staleness
+from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
-from rosy.rosy_addon.scene.pictures import list_bakes, remove_bakes, show_bake
+from rosy.rosy_addon.scene.pictures import show_bake
 from rosy.rosy_addon.ui.properties import apply_look, read_look
 from scenes import add_camera, add_field, add_plane, contents, link, pixels, set_vectors
 
@@ -239,7 +241,7 @@ def delete_camera(scene, camera, monkey):
     ],
 )
 def test_out_of_date(scene, camera, monkey, change, monkeypatch):
-    monkeypatch.setattr(pictures_room, "STATE_TTL_SECONDS", 0.0)
+    monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 0.0)
     bake(scene)
     assert list_bakes(scene)[0].stale_reason == ""
     why = change(scene, camera, monkey)

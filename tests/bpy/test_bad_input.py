@@ -11,9 +11,10 @@ from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.field_attributes import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
+from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_camera,
     add_field,

@@ -14,10 +14,12 @@ from rosy.rosy_addon.field.representation import face_frames, face_representatio
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.field_attributes import has_field, read_mesh_field, write_mesh_field
+from rosy.rosy_addon.scene.field_attributes import has_field
 from rosy.rosy_addon.scene.lights import read_lights
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
-from rosy.rosy_addon.scene.scene_reader import TEMP_FIELD_ATTRIBUTE, field_objects, read_bodies
+from rosy.rosy_addon.scene.read_field import read_mesh_field
+from rosy.rosy_addon.scene.scene_reader import TEMP_FIELD_ATTRIBUTE, field_objects, read_instances
+from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_field,
     add_mesh,
@@ -146,12 +148,12 @@ def test_directions_go_through_modifiers(scene):
     """Angles and lengths stay, however the mesh is divided and bent."""
     plane = add_plane(cuts=2)
     member_attributes(plane.data, 3, 0.3, 2.0)
-    plain = read_bodies(depsgraph())[0].field
+    plain = read_instances(depsgraph())[0].field
     names = sorted(attribute.name for attribute in plane.data.attributes)
     plane.modifiers.new("Subdivision", "SUBSURF").levels = 1
     bend = plane.modifiers.new("Bend", "SIMPLE_DEFORM")
     bend.deform_method, bend.angle = "BEND", 1.0
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.surface.face_count == 4 * len(plane.data.polygons)
     np.testing.assert_allclose(
         instance.field.direction_ratios[::4], plain.direction_ratios, atol=1e-6
@@ -165,7 +167,7 @@ def test_families_are_known_where_numbers_are_consistent(scene):
     along = np.tile((1.0, 0.0, 0.0), (len(across), 1))
     for number, vectors in enumerate((along, 2 * across, -along, -2 * across)):
         set_vectors(plane.data, vectors, f"dir{number}")
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.field.family_count == 2 and instance.field.degree == 4
 
 
@@ -213,7 +215,7 @@ def test_one_surface_for_all_instances(scene, monkey):
         empty = link(bpy.data.objects.new("Instance", None))
         empty.instance_type, empty.instance_collection = "COLLECTION", collection
         empty.location.x = 3.0 * x
-    instances = read_bodies(depsgraph())
+    instances = read_instances(depsgraph())
     assert len(instances) == 3
     assert len({id(instance.surface) for instance in instances}) == 1
     assert sorted(instance.matrix[0, 3] for instance in instances) == [0, 3, 6]
@@ -240,7 +242,7 @@ def test_instances_of_geometry_nodes(scene, monkey):
     plane = add_plane()
     scatter(plane, monkey)
     monkey.location.z = 10.0
-    instances = [instance for instance in read_bodies(depsgraph()) if instance.field is not None]
+    instances = [instance for instance in read_instances(depsgraph()) if instance.field is not None]
     assert len(instances) == 5
     assert len({id(instance.surface) for instance in instances}) == 1
 
@@ -258,7 +260,7 @@ def test_everything_solid_hides(scene, monkey):
     bpy.context.object.hide_render = True
     bpy.ops.mesh.primitive_cube_add(location=(11, 0, 0))
     bpy.context.object.visible_camera = False
-    instances = read_bodies(depsgraph())
+    instances = read_instances(depsgraph())
     assert instances[0].field is not None
     assert sorted(instance.matrix[0, 3] for instance in instances) == [0, 4, 5, 6, 7, 8]
 
@@ -270,9 +272,9 @@ def test_an_occluder_covers(scene, camera):
     graph = depsgraph()
     view = camera_of_object(scene, graph, camera)
     whole = len(
-        project([instance for instance in read_bodies(graph) if instance.field], view).pixel
+        project([instance for instance in read_instances(graph) if instance.field], view).pixel
     )
-    part = len(project(read_bodies(graph), view).pixel)
+    part = len(project(read_instances(graph), view).pixel)
     assert 0 < part < whole
     near.rosy.include = False
     assert field_objects(bpy.context.view_layer) == [far]
@@ -282,13 +284,13 @@ def test_switched_off_objects_only_hide(scene, monkey):
     other = add_field(add_plane(), kind="axis")
     other.rosy.include = False
     assert field_objects(bpy.context.view_layer) == [monkey]
-    assert [instance.field is None for instance in read_bodies(depsgraph())] == [False, True]
+    assert [instance.field is None for instance in read_instances(depsgraph())] == [False, True]
 
 
 def test_reading_changes_nothing(scene, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.surface.rest_vertices is not None
     assert contents() == before
 
@@ -300,14 +302,14 @@ def test_the_field_has_no_preferred_member(scene, camera, monkey, modifier):
         monkey.modifiers.new("Modifier", modifier).levels = 2
     graph = depsgraph()
     view = camera_of_object(scene, graph, camera)
-    first = project(read_bodies(graph), view)
+    first = project(read_instances(graph), view)
     mesh = monkey.data
     surface = mesh_surface(mesh)
     vectors = member_vectors(mesh).astype(np.float64)
     across = np.cross(surface.face_normal, vectors)
     turn = (np.arange(len(vectors)) % 4 * np.pi / 2)[:, None]
     set_vectors(mesh, np.cos(turn) * vectors + np.sin(turn) * across)
-    second = project(read_bodies(depsgraph()), view)
+    second = project(read_instances(depsgraph()), view)
     np.testing.assert_array_equal(first.pixel, second.pixel)
     scale = np.abs(first.representation).max()
     assert np.abs(first.representation - second.representation).max() < 1e-4 * scale
@@ -343,10 +345,10 @@ def test_the_field_follows_a_deformation(scene, camera, monkey, deform):
     monkey.rotation_quaternion = turn.to_quaternion()
     graph = depsgraph()
     view = camera_of_object(scene, graph, camera)
-    expected = project(read_bodies(graph), view)
+    expected = project(read_instances(graph), view)
     monkey.rotation_quaternion = (1, 0, 0, 0)
     deform(monkey, turn)
-    found = project(read_bodies(depsgraph()), view)
+    found = project(read_instances(depsgraph()), view)
     same = np.intersect1d(expected.pixel, found.pixel, return_indices=True)[1:]
     assert len(same[0]) > 0.99 * len(expected.pixel)
     z, w = expected.representation[same[0]], found.representation[same[1]]
@@ -363,7 +365,7 @@ def test_mirrored_and_moved_copies(scene, camera):
     plane.modifiers.new("Mirror", "MIRROR")
     aim(camera, (0.0, -12.0, 0.0))
     graph = depsgraph()
-    buffer = project(read_bodies(graph), camera_of_object(scene, graph, camera), "flat")
+    buffer = project(read_instances(graph), camera_of_object(scene, graph, camera), "flat")
     left = buffer.position[:, 0] < 0
     expected = np.where(left, np.pi, 0) + np.where(left, -1, 1) * np.arctan2(0.5, 1.0)
     angle = np.angle(buffer.representation * np.exp(-1j * expected))
@@ -378,7 +380,7 @@ def test_evaluated_field_of_other_kinds(scene, monkey):
     set_vectors(mesh, angle, kind="FLOAT")
     modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = 1
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.surface.face_count == len(instance.field.vectors) > len(mesh.polygons)
     assert TEMP_FIELD_ATTRIBUTE not in mesh.attributes
     np.testing.assert_allclose(instance.field.magnitude, 1, atol=1e-4)
@@ -389,7 +391,7 @@ def test_edit_mode_is_read(scene, monkey):
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.transform.translate(value=(0, 0, 2.0))
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.surface.vertices[:, 2].mean() > 1.5
     assert instance.field.magnitude.max() > 0
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -421,7 +423,7 @@ def test_no_loops_over_faces(scene):
     thing = add_plane(cuts=500)
     add_field(thing, kind="axis")
     start = time.monotonic()
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     assert instance.surface.face_count == 250_000
     assert time.monotonic() - start < 10.0
 
@@ -430,7 +432,7 @@ def test_degenerate_faces_are_undefined(scene, camera):
     vertices = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (0.5, 0, 1), (2, 0, 2), (2, 0, 2)]
     thing = add_mesh("Odd", vertices, [(0, 1, 2, 3), (3, 4, 2), (2, 5, 6)])
     add_field(thing, kind="axis")
-    (instance,) = read_bodies(depsgraph())
+    (instance,) = read_instances(depsgraph())
     np.testing.assert_array_equal(instance.field.magnitude > 0, [True, False, False])
 
 

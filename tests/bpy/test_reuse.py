@@ -152,7 +152,7 @@ def test_two_cameras_are_both_kept(scene, camera, monkey, done):
 
 
 def test_another_object_may_move_alone(scene, camera, monkey, done):
-    """What is known of a body does not go when another changes."""
+    """What is known of an instance does not go when another changes."""
     plane = add_field(add_plane("Other"), kind="axis")
     bake(scene)
     entries = len(BAKE_CACHE)

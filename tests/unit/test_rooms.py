@@ -1,10 +1,12 @@
-"""Imports run one way, and the numpy rooms do without Blender."""
+"""Imports run one way, also inside rooms, and the numpy rooms do without Blender."""
 
 from __future__ import annotations
 
 import ast
 import subprocess
 import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -135,6 +137,58 @@ def test_the_rule_is_seen_when_broken(tmp_path, monkeypatch):
         "import bpy\nfrom ..scene.apply import x\nfrom .. import ui\nfrom . import frames\n"
     )
     assert imports_of(path) == ({"scene.apply", "ui", "field.frames"}, {"bpy"})
+
+
+def imported_files(path: Path) -> Iterator[Path]:
+    """Files of all modules that a file imports relatively, in functions as well."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        source = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+        for alias in node.names:
+            candidates = [
+                file
+                for module in (source / alias.name, source)
+                for file in (module.with_suffix(".py"), module / "__init__.py")
+                if file.is_file()
+            ]
+            assert candidates, f"{path} imports {alias.name}, which does not exist"
+            yield candidates[0]
+
+
+def import_cycle(folder: Path) -> list[str]:
+    """Files of a folder that import each other in a circle, or an empty list."""
+    graph = {path: set(imported_files(path)) for path in sorted(folder.rglob("*.py"))}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return [str(path.relative_to(folder)) for path in error.args[1]]
+    return []
+
+
+@pytest.mark.parametrize("folder", ["rosy_addon", "operators"])
+def test_no_module_imports_itself_through_others(folder):
+    """Not inside a room either, and not by an import in a function."""
+    assert import_cycle(ROOT / folder) == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "from .first import x",
+        "from . import first",
+        "def late():\n    from .first import x",
+        "from .inner.third import x",
+    ],
+)
+def test_a_cycle_is_seen(tmp_path, back):
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "first.py").write_text("from . import second\n")
+    (tmp_path / "second.py").write_text("import os\n")
+    (tmp_path / "inner" / "third.py").write_text("from ..first import x\n")
+    assert import_cycle(tmp_path) == []
+    (tmp_path / "second.py").write_text(back + "\n")
+    assert {"first.py", "second.py"} <= set(import_cycle(tmp_path))
 
 
 def test_numpy_rooms_import_without_blender():

@@ -49,9 +49,9 @@ class Model:
     Attributes
     ----------
     name : str
-    instance : Body
+    instance : MeshInstance
         With the field that presets of ink show.
-    raw : Body
+    raw : MeshInstance
         With the magnitudes that curvature gives.
     view : (float, float)
         Azimuth and elevation in degrees.

@@ -30,8 +30,7 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.gpu import mesh_buffers, passes, resources, uniforms
-from rosy_addon.gpu import renderer as card_module
+from rosy_addon.gpu import lic_stage, mesh_buffers, passes, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 from rosy_addon.gpu.field_kind import field_kinds
 from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, build_mesh_buffers, field_channels, split_matrix
@@ -1096,7 +1095,7 @@ def test_bands_leave_no_seam_and_nothing_from_before(card, monkeypatch, most):
     camera, small = view(), ball(3, placed(0.37 * rotation(1, 1, 0), (0.31, 0, 0.23)))
     fresh = GpuRenderer(card.device)
     expected = fresh.read(texture_of(fresh, fresh.upload([small], "smooth"), camera, LOOK), *SIZE)
-    monkeypatch.setattr(card_module, "MAX_DISPATCH_STEPS", most)
+    monkeypatch.setattr(lic_stage, "MAX_DISPATCH_STEPS", most)
     texture_of(card, card.upload([ball(3)], "smooth"), camera, LOOK)
     found = card.read(texture_of(card, card.upload([small], "smooth"), camera, LOOK), *SIZE)
     np.testing.assert_array_equal(found, expected)

@@ -1,0 +1,140 @@
+"""A picture that is being drawn, and how passes run on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..compositor.look import Look
+from ..compositor.look_units import supersampled_look
+from ..compositor.shading import Light
+from ..compositor.target_tone import ReferenceRender
+from ..projection.camera import Camera
+from .field_kind import FieldKind
+from .passes import ComputePass
+from .resources import DrawItem, GpuResources
+from .screen_box import Box, box_size, is_empty, screen_box, union_box
+from .uniforms import camera_uniforms, instance_uniforms
+
+
+@dataclass(eq=False)
+class Frame:
+    """A picture that is being drawn.
+
+    Attributes
+    ----------
+    resources : GpuResources
+        The device, and what stays on it.
+    items : sequence of DrawItem
+    camera : Camera
+        Of the supersampled frame.
+    look : Look
+        Lengths in pixels of the finished picture.
+    lights : sequence of Light
+    reference : ReferenceRender or None
+    clip_planes : (6, 4) ndarray
+    textures : dict of str to texture
+        Results of the passes so far, by the names that shaders read them by.
+    """
+
+    resources: GpuResources
+    items: Sequence[DrawItem]
+    camera: Camera
+    look: Look
+    lights: Sequence[Light]
+    reference: ReferenceRender | None
+    clip_planes: np.ndarray
+    textures: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the supersampled frame, in pixels."""
+        return self.camera.width, self.camera.height
+
+    @property
+    def pixel_look(self) -> Look:
+        """The look with lengths in pixels of the supersampled frame."""
+        return supersampled_look(self.look)
+
+    @property
+    def kinds(self) -> list[FieldKind]:
+        """The kinds of the fields, by degree."""
+        kinds = {item.kind for item in self.items} - {None}
+        return sorted(kinds, key=lambda kind: kind.degree)
+
+    def box_of_kind(self, kind: FieldKind) -> Box:
+        """Return the box of all instances whose fields are of a kind."""
+        return union_box(
+            [screen_box(item, self.camera) for item in self.items if item.kind == kind]
+        )
+
+    def fields_in_view(self) -> Iterator[tuple[int, DrawItem, Box]]:
+        """Yield the id, item and box of each instance that has a field and can be visible."""
+        for instance_id, item in enumerate(self.items):
+            if item.field is not None:
+                box = screen_box(item, self.camera)
+                if not is_empty(box):
+                    yield instance_id, item, box
+
+    def run_on_instance(
+        self,
+        shader: ComputePass,
+        instance_id: int,
+        box: Box,
+        images: dict[str, Any],
+        uniforms: dict[str, Any],
+    ) -> None:
+        """Run a compute pass over the pixels of one instance.
+
+        The pass can read all ``textures`` and the triangle records of the instance.
+
+        Parameters
+        ----------
+        shader : ComputePass
+        instance_id : int
+            Index into ``items``.
+        box : Box
+        images : dict of str to texture
+            Images that the pass writes.
+        uniforms : dict
+            In addition to those of the camera and the instance.
+        """
+        item = self.items[instance_id]
+        self.run(
+            shader,
+            box,
+            {**self.textures, "triangle_records": item.mesh.records_texture},
+            images,
+            {
+                **camera_uniforms(self.camera),
+                **instance_uniforms(instance_id, item, self.camera),
+                **uniforms,
+            },
+        )
+
+    def run(
+        self,
+        shader: ComputePass,
+        box: Box,
+        textures: dict[str, Any],
+        images: dict[str, Any],
+        uniforms: dict[str, Any],
+        layers: int = 1,
+    ) -> None:
+        """Run a compute pass over the pixels of a box.
+
+        Parameters
+        ----------
+        shader : ComputePass
+        box : Box
+        textures, images : dict of str to texture
+            What the pass reads and writes.
+        uniforms : dict
+        layers : int
+            Layers of array images.
+        """
+        uniforms = {**uniforms, "box_origin": box[:2]}
+        self.resources.device.compute(shader, (*box_size(box), layers), textures, images, uniforms)

@@ -1,0 +1,107 @@
+"""Line integral convolution: the covering of a field, and streamlines on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..compositor.look import Look
+from ..progress import Progress, Task
+from . import lookup_tables, passes
+from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
+from .field_kind import FieldKind
+from .frame import Frame
+from .passes import WORKGROUP_SIZE
+from .screen_box import Box
+from .uniforms import camera_uniforms, covering_uniforms, direction_uniforms, look_uniforms
+
+#: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers stop longer ones.
+MAX_DISPATCH_STEPS = 1 << 29
+
+
+def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None]:
+    """Draw the fields of one kind into a picture, with the textures of the earlier stages.
+
+    Parameters
+    ----------
+    frame : Frame
+    kind : FieldKind
+    box : Box
+        Pixels to draw.
+    picture : texture
+        Of the size of the frame.
+
+    Yields
+    ------
+    Progress
+    """
+    look, resources = frame.look, frame.resources
+    covering = covering_uniforms(kind, look)
+    textures = {**frame.textures, **_unfold(frame, kind, box, covering)}
+    textures |= {
+        "max_magnitude": _max_magnitude(frame, textures, kind, look),
+        "color_map": lookup_tables.color_map(resources, look),
+        "palette": lookup_tables.palette(resources),
+        "ink_thresholds": lookup_tables.thresholds(resources, frame.pixel_look),
+        "ink_table": lookup_tables.ink_table(resources, kind, look),
+    }
+    if "paper_grain" not in textures:
+        textures["paper_grain"] = lookup_tables.picture_grain(
+            resources, *frame.size, look, kind.line_count
+        )
+    uniforms = {**covering, **look_uniforms(kind, look)}
+    left, bottom, right, top = box
+    row_steps = (right - left) * kind.line_count * 2 * uniforms["half_length"]
+    # Whole work groups: a partial one would reach into rows that belong to the next band.
+    groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
+    band_rows = groups * WORKGROUP_SIZE[1]
+    for start in range(bottom, top, band_rows):
+        band = left, start, right, min(start + band_rows, top)
+        frame.run(passes.LIC, band, textures, {"picture": picture}, uniforms)
+        yield Progress((start + band_rows - bottom) / (top - bottom), "following streamlines")
+
+
+def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -> dict[str, Any]:
+    """Return the images of the covering: its cells, and directions with their gradients."""
+    image, lines = frame.resources.image, kind.line_count
+    cells = image("cells", *frame.size)
+    directions = image("directions", *frame.size, "RGBA16F", lines)
+    angle_gradient = image("angle_gradients", *frame.size, "RGBA16F", lines)
+    frame.run(
+        passes.DIRECTIONS,
+        box,
+        frame.textures,
+        {"cells": cells, "directions": directions},
+        {
+            **camera_uniforms(frame.camera),
+            **covering,
+            **direction_uniforms(kind, frame.look, frame.camera),
+        },
+    )
+    textures = {"cells": cells, "directions": directions}
+    images = {"angle_gradients": angle_gradient}
+    frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
+    return {"cells": cells, "angle_gradients": angle_gradient}
+
+
+def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:
+    """Return a texture of one texel: the largest magnitude of the fields of a kind.
+
+    Any texture if the look does not need it.
+    """
+    if not MAGNITUDE_MODES[look.magnitude] or look.magnitude_range:
+        return textures["cells"]
+    source = textures["field_values"]
+    width, height = source.width, source.height
+    level, is_first = 0, 1
+    while (width, height) != (1, 1) or is_first:
+        width, height = -(-width // REDUCE_BLOCK), -(-height // REDUCE_BLOCK)
+        tiles = frame.resources.image(f"tiles {level}", width, height)
+        frame.resources.device.compute(
+            passes.MAX_REDUCE,
+            (width, height),
+            {"source_values": source},
+            {"tiles": tiles},
+            {"degree": kind.degree, "is_first": is_first},
+        )
+        source, level, is_first = tiles, level + 1, 0
+    return source

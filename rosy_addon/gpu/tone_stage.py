@@ -1,0 +1,106 @@
+"""The tone of a picture: light, shadows, and the target tone of each pixel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..projection.shadow_maps import light_cameras
+from . import passes
+from .defines import HEADLIGHT, SUN_LIGHT, TONE_SOURCES
+from .frame import Frame
+from .screen_box import Box, is_empty, screen_box, union_box
+from .uniforms import (
+    camera_uniforms,
+    light_uniforms,
+    light_view_uniforms,
+    shadow_uniforms,
+    tone_uniforms,
+)
+
+
+def render_target_tones(frame: Frame) -> None:
+    """Render the target tone of each pixel, as ``frame.textures["tones"]``.
+
+    The method is that of `target_tone.target_tone`. The light alone is in the texture ``lighting``.
+    """
+    look, reference = frame.look, frame.reference
+    tones = frame.resources.image("tones", *frame.size)
+    shared_uniforms = tone_uniforms(look, frame.camera, reference)
+    reference_atlas = None if reference is None else frame.resources.reference_atlas(reference)
+    lighting = frame.textures["lighting"] = _lighting(frame)
+    for instance_id, item, box in frame.fields_in_view():
+        atlas = item.mesh.tone_atlas if look.tone == "image" else reference_atlas
+        has_own_tone = look.tone == "picture" or item.mesh.buffers.has_tone
+        level = 0 if atlas is None else atlas.max_level
+        if atlas is not None and look.tone == "picture":
+            requested_level = round(reference.mip_level(frame.camera)) - atlas.skipped_levels
+            level = min(max(requested_level, 0), atlas.max_level)
+        uniforms = {
+            **shared_uniforms,
+            "tone_source": TONE_SOURCES[look.tone] if has_own_tone else 0,
+            "image_size": (1, 1) if atlas is None else atlas.size,
+            "image_level": level,
+        }
+        frame.textures["tone_image"] = lighting if atlas is None else atlas.texture
+        frame.run_on_instance(passes.TONE, instance_id, box, {"tones": tones}, uniforms)
+    frame.textures["tones"] = tones
+
+
+def _lighting(frame: Frame) -> Any:
+    """Return the light of all light sources together, as `shading.diffuse` at full strength."""
+    boxes = [screen_box(item, frame.camera) for item in frame.items if item.field is not None]
+    box = union_box(boxes)
+    images = [frame.resources.image(f"lighting {index}", *frame.size) for index in range(2)]
+    normals = frame.textures["normals"]
+    for index, light in enumerate(light_uniforms(frame.look, frame.lights)):
+        if is_empty(box):
+            break
+        visibility = normals
+        if frame.look.shadows and light["light_kind"] != HEADLIGHT:
+            visibility = _shadow_visibility(frame, light, box)
+        uniforms = {
+            **camera_uniforms(frame.camera),
+            **light,
+            "is_shadowed": int(visibility is not normals),
+            "is_first": int(index == 0),
+        }
+        textures = {
+            "normals": normals,
+            "shadow_visibility": visibility,
+            "previous_lighting": images[1],
+        }
+        frame.run(passes.LIGHTING, box, textures, {"lighting": images[0]}, uniforms)
+        images.reverse()
+    return images[1]
+
+
+def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
+    """Return the share of a light that reaches each pixel, as `shadow_maps.shadow_visibility`."""
+    kind = "sun" if light["light_kind"] == SUN_LIGHT else "point"
+    vector = np.array(light["light_vector"][:3])
+    image = frame.resources.image
+    images = [image(f"shadow visibility {index}", *frame.size, "RGBA16F") for index in range(2)]
+    instances = [item.instance for item in frame.items]
+    for index, light_view in enumerate(light_cameras(instances, frame.camera, kind, vector)):
+        map_size = light_view.width, light_view.height
+        shadow_map = image("shadow_map", *map_size)
+        target = shadow_map, frame.resources.depth_image(*map_size)
+        batches = [(item.mesh.batch, shadow_uniforms(item, light_view)) for item in frame.items]
+        frame.resources.device.draw(passes.SHADOW_MAP, batches, target, {})
+        uniforms = {
+            **camera_uniforms(frame.camera),
+            **light_view_uniforms(light_view, frame.camera),
+            "is_first": int(index == 0),
+        }
+        textures = {
+            "normals": frame.textures["normals"],
+            "shadow_map": shadow_map,
+            "previous_visibility": images[1],
+        }
+        frame.run(
+            passes.SHADOW_VISIBILITY, box, textures, {"shadow_visibility": images[0]}, uniforms
+        )
+        images.reverse()
+    return images[1]

@@ -1,0 +1,191 @@
+"""The field on the faces of a deformed surface, transported from the faces at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.directional_field import field_harmonics
+from ..field.frames import dot_components, transform_components
+from ..field.representation import power, signed_power
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from .field_channel import FieldChannel, rotation_order
+from .vector_components import (
+    BLOCK_SIZE,
+    VectorComponents,
+    plane_coordinates,
+    polygon_angles,
+    polygon_normals,
+    relative_to_first,
+    tangent_frame_components,
+)
+
+#: Relative tolerance of `_similarity_scale`: the rounding error of Blender's single precision
+#: matrices.
+SIMILARITY_EPS = 2e-6
+
+
+@dataclass(frozen=True, eq=False)
+class FaceValues:
+    """Normals, field values and corner angles of the F deformed faces.
+
+    Attributes
+    ----------
+    normal : (3, F) float32 ndarray
+        Unit normals. Zero for a face without area.
+    representation : (F,) complex64 ndarray
+        z in the tangent frame of the normal (`tangent_frame_components`). Zero for a face without area.
+    corner_angle : (C,) float32 ndarray or None
+        Interior angle of the face at each of its corners, in radians.
+    channels : dict of FieldChannel to (F,) complex64 ndarray
+        Additional values in the same frame.
+    """
+
+    normal: np.ndarray
+    representation: np.ndarray
+    corner_angle: np.ndarray | None
+    channels: dict[FieldChannel, np.ndarray]
+
+
+def face_values(
+    surface: Surface, linear: np.ndarray, deformed: np.ndarray, field: RosyField, with_angles: bool
+) -> FaceValues:
+    """Transport the stored members from the faces of the rest shape to the deformed faces.
+
+    Parameters
+    ----------
+    surface : Surface
+    linear : (3, 3) float64 ndarray
+        Object to world space, without the translation.
+    deformed : (3, V) float64 ndarray
+        The vertices, transformed by `linear`.
+    field : RosyField
+    with_angles : bool
+        Compute the corner angles too.
+    """
+    count = surface.face_count
+    relative_channels: dict[FieldChannel, np.ndarray] = {
+        ("deviation", j): values for j, values in field_harmonics(field).items()
+    }
+    if field.family_count > 1:
+        relative_channels["family", field.family_count] = np.ones(count)
+    result = FaceValues(
+        normal=np.empty((3, count), dtype=np.float32),
+        representation=np.empty(count, dtype=np.complex64),
+        corner_angle=np.empty(len(surface.corner_vertex), dtype=np.float32)
+        if with_angles
+        else None,
+        channels={channel: np.empty(count, dtype=np.complex64) for channel in relative_channels},
+    )
+    scale = _similarity_scale(linear) if surface.rest_vertices is None else None
+    rest = None
+    if scale is None:
+        rest = np.ascontiguousarray(
+            (surface.vertices if surface.rest_vertices is None else surface.rest_vertices).T
+        )
+    for size, block in _faces_by_size(surface.face_start):
+        first_corner = surface.face_start[:-1][block]
+        corner_vertex = [
+            surface.corner_vertex.take(first_corner + corner) for corner in range(size)
+        ]
+        points = relative_to_first(deformed, corner_vertex)
+        normal = polygon_normals(points)
+        for component, out in zip(normal, result.normal, strict=True):
+            out[block] = component
+        x, y = tangent_frame_components(
+            [component[block].astype(np.float64) for component in result.normal]
+        )
+        vectors = [np.ascontiguousarray(component) for component in field.vectors[block].T]
+        if rest is None:
+            vectors = transform_components(vectors, linear * (1 / scale))
+            member = dot_components(vectors, x) + 1j * dot_components(vectors, y)
+        else:
+            member = _transport_member(
+                relative_to_first(rest, corner_vertex), points, vectors, x, y
+            )
+        size = np.abs(member)
+        member /= np.maximum(size, np.finfo(np.float64).tiny)
+        has_area = np.logical_or.reduce(normal)
+        result.representation[block] = power(member, field.degree) * (size * has_area)
+        for channel, values in relative_channels.items():
+            rotation = signed_power(member, rotation_order(channel, field.degree))
+            result.channels[channel][block] = values[block] * rotation * has_area
+        if with_angles:
+            for corner, angle in enumerate(polygon_angles(points)):
+                result.corner_angle[first_corner + corner] = angle
+    return result
+
+
+def _faces_by_size(face_start: np.ndarray) -> Iterator[tuple[int, slice | np.ndarray]]:
+    """Yield blocks of faces that have the same number of corners: this number, and the faces."""
+    corner_counts = np.diff(face_start)
+    if (corner_counts == corner_counts[0]).all():
+        for start in range(0, len(corner_counts), BLOCK_SIZE):
+            yield int(corner_counts[0]), slice(start, start + BLOCK_SIZE)
+        return
+    for corner_count in np.unique(corner_counts).tolist():
+        same_count = np.flatnonzero(corner_counts == corner_count)
+        # Fewer faces per block if they have many corners, so that blocks need equal memory.
+        block_faces = max(4 * BLOCK_SIZE // max(corner_count, 4), 1)
+        for start in range(0, len(same_count), block_faces):
+            yield corner_count, same_count[start : start + block_faces]
+
+
+def _similarity_scale(linear: np.ndarray) -> float | None:
+    """Return the scale of a (3, 3) linear map, or None if the map is not a similarity.
+
+    A similarity is a uniform scale with a rotation or reflection.
+    """
+    square = linear.T @ linear
+    scale = np.trace(square) / 3
+    if not scale > 0 or np.abs(square - scale * np.eye(3)).max() > SIMILARITY_EPS * scale:
+        return None
+    return float(np.sqrt(scale))
+
+
+def _transport_member(
+    rest: Sequence[VectorComponents],
+    deformed: Sequence[VectorComponents],
+    vectors: VectorComponents,
+    x: VectorComponents,
+    y: VectorComponents,
+) -> np.ndarray:
+    """Transport vectors from rest faces to deformed faces; return them as complex numbers.
+
+    Parameters
+    ----------
+    rest, deformed : sequence of vector components
+        Corners of the faces in both shapes, as returned by `relative_to_first`.
+    vectors : 3 (n,) ndarrays
+        Vectors on the rest faces.
+    x, y : 3 (n,) ndarrays
+        Tangent frames of the deformed faces.
+
+    Returns
+    -------
+    (n,) complex128 ndarray
+        In the frames x, y. Zero for a rest face without area.
+
+    Notes
+    -----
+    Write the corners in a frame of their plane as complex numbers: w at rest, u deformed. The
+    linear map from w to u of least squared error, u = a w + b conj(w), has the polar rotation
+    a / |a|. Only this rotation is applied. So the members keep their length and stay 2 pi / N
+    apart, however the face is stretched. Both normals follow from the order of the corners, so
+    mirrored faces need no special case.
+    """
+    rest_normal = polygon_normals(rest)
+    rest_x, rest_y = tangent_frame_components(rest_normal)
+    w, u = plane_coordinates(rest, rest_x, rest_y), plane_coordinates(deformed, x, y)
+    ww = uw = squared_norm = 0
+    for one, other in zip(w, u, strict=True):
+        ww, uw = ww + one * one, uw + other * one
+        squared_norm = squared_norm + (one.real**2 + one.imag**2)
+    rotation = squared_norm * sum(other * one.conj() for one, other in zip(w, u, strict=True))
+    rotation -= np.conj(ww) * uw
+    rotation *= np.logical_or.reduce(rest_normal)
+    rotation /= np.maximum(np.abs(rotation), np.finfo(np.float64).tiny)
+    return rotation * (dot_components(vectors, rest_x) + 1j * dot_components(vectors, rest_y))

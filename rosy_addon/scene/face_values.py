@@ -1,0 +1,126 @@
+"""Reading vectors and numbers from mesh attributes, as one value for each face."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..color import REC709_LUMINANCE
+from ..errors import RosyError
+from ..field.surface import mean_per_face
+from ..field.validate import apply_nonfinite_policy
+from .field_attributes import describe_type, field_values
+from .meshes import mesh_surface
+
+
+def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    """Read a vector attribute on faces, points or corners as one vector for each face.
+
+    Vectors on points or corners are averaged over each face. The vectors need not be tangent.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
+
+    Raises
+    ------
+    RosyError
+        If the attribute is of another type, or a value is not finite.
+    """
+    source = f"mesh '{mesh.name}', attribute '{name}'"
+    attribute = mesh.attributes[name]
+    values = field_values(attribute, source, mesh).astype(np.float64)
+    if values.ndim == 1:
+        raise RosyError(f"{source}: found {describe_type(attribute)}; a vector is wanted")
+    apply_nonfinite_policy(values, source, attribute.domain.lower(), "error")
+    if attribute.domain == "FACE":
+        return values
+    surface = mesh_surface(mesh)
+    if attribute.domain == "POINT":
+        values = values[surface.corner_vertex]
+    return mean_per_face(values, surface.face_start)
+
+
+def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    """Read an attribute or a vertex group as one number for each face.
+
+    The attribute may be a float, an integer, a boolean or a color (its luminance is taken). Values
+    on points or corners are averaged over each face.
+
+    Returns
+    -------
+    (F,) float64 ndarray
+
+    Raises
+    ------
+    RosyError
+        If there is neither an attribute nor a vertex group of this name, the type or domain of the
+        attribute is not supported, or a value is not finite.
+    """
+    surface = mesh_surface(mesh)
+    source = f"mesh '{mesh.name}', '{name}'"
+    attribute = mesh.attributes.get(name)
+    if attribute is not None:
+        domain, values = attribute.domain, scalar_values(attribute, source)
+    else:
+        obj = next(
+            (
+                other
+                for other in bpy.data.objects
+                if other.data == mesh and name in other.vertex_groups
+            ),
+            None,
+        )
+        if obj is None:
+            raise RosyError(f"{source}: is neither an attribute nor a vertex group")
+        group = obj.vertex_groups[name].index
+        domain, values = "POINT", np.zeros(len(mesh.vertices))
+        for vertex in mesh.vertices:
+            for membership in vertex.groups:
+                if membership.group == group:
+                    values[vertex.index] = membership.weight
+    if not np.isfinite(values).all():
+        raise RosyError(f"{source}: has values that are not finite")
+    if domain == "FACE":
+        return values
+    if domain == "POINT":
+        values = values[surface.corner_vertex]
+    return mean_per_face(values, surface.face_start)
+
+
+def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
+    """Return the values of a scalar attribute. Colors are converted to linear luminance.
+
+    Parameters
+    ----------
+    attribute : bpy.types.Attribute
+    source : str
+        Name of the attribute in messages.
+
+    Returns
+    -------
+    (n,) float64 ndarray
+        One value for each element of the domain.
+
+    Raises
+    ------
+    RosyError
+        If the attribute is not on faces, points or corners, or is neither a number nor a color.
+    """
+    count, data_type = len(attribute.data), attribute.data_type
+    if attribute.domain not in ("FACE", "POINT", "CORNER"):
+        raise RosyError(
+            f"{source}: found {describe_type(attribute)}; wanted on FACE, POINT or CORNER"
+        )
+    if data_type in ("FLOAT_COLOR", "BYTE_COLOR"):
+        values = np.empty(4 * count, dtype=np.float32)
+        attribute.data.foreach_get("color", values)
+        return values.reshape(-1, 4)[:, :3] @ REC709_LUMINANCE
+    dtypes = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
+    if data_type not in dtypes:
+        raise RosyError(
+            f"{source}: found {describe_type(attribute)}; a number or a colour is wanted"
+        )
+    values = np.empty(count, dtype=dtypes[data_type])
+    attribute.data.foreach_get("value", values)
+    return values.astype(np.float64)

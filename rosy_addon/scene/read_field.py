@@ -1,0 +1,177 @@
+"""Reading the field of a mesh, in any of the forms that `field_attributes` lists."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..field.frames import normalize, tangent_frame
+from ..field.representation import face_frames, from_representation, to_representation
+from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
+from ..field.surface import Surface, mean_per_face
+from ..field.validate import (
+    apply_nonfinite_policy,
+    project_to_tangent,
+    validated_directions,
+    validated_field,
+)
+from .field_attributes import (
+    ANGLE_TYPE,
+    VECTOR_TYPE,
+    attribute_name,
+    cached_field,
+    describe_type,
+    field_degree,
+    field_values,
+)
+from .meshes import flush_edit_mode, mesh_surface
+
+#: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
+#: to the smooth surface rather than to the face.
+CORNER_TOLERANCE_DEGREES = 30.0
+
+
+def read_mesh_field(
+    mesh: bpy.types.Mesh,
+    name: str | None = None,
+    degree: int | None = None,
+    surface: Surface | None = None,
+    *,
+    nonfinite: str = "error",
+    label: str | None = None,
+    cache: Cache | None = None,
+) -> RosyField:
+    """Read the field of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        May be in edit mode.
+    name : str, optional
+        Name of the attribute. By default ``mesh.rosy.attribute``.
+    degree : int, optional
+        By default ``mesh.rosy.degree``.
+    surface : Surface, optional
+        The surface of the mesh, if it has been read already.
+    nonfinite : {"error", "zero"}
+        Raise an error if a value is not finite, or treat it as undefined.
+    label : str, optional
+        Name of the mesh in messages.
+    cache : Cache, optional
+        Keeps surfaces and fields that have not changed since an earlier call.
+
+    Raises
+    ------
+    RosyError
+        If there is no such attribute, its type or domain is not supported, or its values are not a
+        field on the mesh (see `validated_field`). The message names the mesh and the attribute.
+
+    See Also
+    --------
+    write_mesh_field : The inverse.
+    """
+    label = f"mesh '{mesh.name}'" if label is None else label
+    flush_edit_mode(mesh)
+    surface = mesh_surface(mesh, label, cache=cache) if surface is None else surface
+    field_name = name or attribute_name(mesh)
+    degree = check_degree(field_degree(mesh) if degree is None else degree)
+    if field_name not in mesh.attributes and "dir0" in mesh.attributes:
+        return _field_from_directions(mesh, surface, nonfinite, label, cache)
+    attribute = mesh.attributes.get(field_name)
+    if attribute is None:
+        raise RosyError(
+            f"{label} has no attribute '{field_name}'; a vector on faces is wanted{_attribute_hint(mesh)}"
+        )
+    source = f"{label}, attribute '{field_name}'"
+    values = field_values(attribute, source, mesh)
+
+    def build_field() -> RosyField:
+        if attribute.data_type == ANGLE_TYPE:
+            return _field_from_angles(surface, values, degree, source, nonfinite)
+        if attribute.domain == "CORNER":
+            return _field_from_corners(surface, values, degree, source, nonfinite)
+        domain = {"FACE": "face", "POINT": "vertex"}[attribute.domain]
+        return validated_field(surface, values, degree, source, nonfinite, domain)
+
+    attribute_type = attribute.domain, attribute.data_type
+    return cached_field(
+        cache, surface, build_field, "given", *attribute_type, values, degree, source, nonfinite
+    )
+
+
+def _field_from_directions(
+    mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
+) -> RosyField:
+    """Read a field from ``dir0`` ... ``dir{N-1}``. N is the number of these attributes."""
+    degree = 0
+    while f"dir{degree}" in mesh.attributes:
+        degree += 1
+    if degree > MAX_DEGREE:
+        raise RosyError(f"{label}: has {degree} attributes dir0 ..., at most {MAX_DEGREE} are read")
+    first_attribute = mesh.attributes["dir0"]
+    directions = []
+    for index in range(degree):
+        attribute = mesh.attributes[f"dir{index}"]
+        source = f"{label}, attribute 'dir{index}'"
+        attribute_type = (attribute.domain, attribute.data_type)
+        if (
+            attribute_type not in (("FACE", VECTOR_TYPE), ("POINT", VECTOR_TYPE))
+            or attribute.domain != first_attribute.domain
+        ):
+            raise RosyError(
+                f"{source}: found {describe_type(attribute)}; wanted FLOAT_VECTOR on FACE or POINT, the "
+                "same for all members"
+            )
+        directions.append(field_values(attribute, source, mesh))
+    source = f"{label}, attributes dir0 to dir{degree - 1}"
+    domain = {"FACE": "face", "POINT": "vertex"}[first_attribute.domain]
+
+    def build_field() -> RosyField:
+        return validated_directions(
+            surface, np.stack(directions, axis=1), source, nonfinite, domain
+        )
+
+    return cached_field(
+        cache, surface, build_field, "directions", *directions, source, nonfinite, domain
+    )
+
+
+def _field_from_angles(
+    surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
+) -> RosyField:
+    """Return a unit field from angles, (F,), to the first edge of each face, in radians."""
+    x, y = face_frames(surface)
+    angles = angles.astype(np.float64)
+    defined = np.isfinite(angles)
+    apply_nonfinite_policy(angles, source, "face", nonfinite)
+    vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
+    return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
+
+
+def _field_from_corners(
+    surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
+) -> RosyField:
+    """Return a field from vectors on corners: projected to the face, then averaged as RoSys."""
+    vectors = vectors.astype(np.float64)
+    apply_nonfinite_policy(vectors, source, "corner", nonfinite)
+    normal = surface.face_normal
+    corner_face_normal = normal[surface.corner_face]
+    vectors = project_to_tangent(
+        vectors, corner_face_normal, CORNER_TOLERANCE_DEGREES, source, "corner"
+    )
+    x, y = tangent_frame(normal)
+    z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
+    mean = from_representation(mean_per_face(z, surface.face_start), x, y, degree)
+    return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
+
+
+def _attribute_hint(mesh: bpy.types.Mesh) -> str:
+    """Return a list of the mesh's vector attributes, for a message; empty if there are none."""
+    names = [
+        f"'{other.name}'"
+        for other in mesh.attributes
+        if other.data_type == VECTOR_TYPE and other.name not in ("position", "rest_position")
+    ]
+    return f"; there are {', '.join(names)}" if names else ""

@@ -1,0 +1,185 @@
+"""Storing fields on meshes."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ..errors import RosyError
+from ..field.directional_field import field_directions
+from ..field.frames import dot
+from ..field.representation import face_frames
+from ..field.rosy_field import RosyField
+from .compat import has_rosy_properties, is_editable
+from .field_attributes import (
+    ANGLE_TYPE,
+    DEFAULT_FIELD_NAME,
+    VECTOR_TYPE,
+    attribute_name,
+    describe_type,
+    is_face_vector_field,
+)
+from .meshes import mesh_surface
+
+#: Forms in which a field can be stored: label and description in the user interface.
+STORAGE_FORMS = {
+    "VECTOR": ("One Vector", "One direction on each face, the others follow from it"),
+    "DIRECTIONS": ("Directions", "All directions, as dir0, dir1 ... on faces"),
+    "ANGLE": ("Angle", "The angle from each face's first edge, in radians"),
+}
+
+
+def assign_fields(fields: dict[bpy.types.Mesh, RosyField], name: str | None = None) -> None:
+    """Store fields on meshes as vectors on faces, all or none of them.
+
+    Parameters
+    ----------
+    fields : dict of bpy.types.Mesh to RosyField
+    name : str, optional
+        Name of the attribute. By default the existing field of each mesh is replaced.
+
+    Raises
+    ------
+    RosyError
+        If a field cannot be stored on its mesh. Nothing is changed in this case.
+    """
+    # Meshes that cannot accept a field come first, so that an error is raised before any change.
+    names = {mesh: name or _target_attribute(mesh) for mesh in fields}
+    for mesh in sorted(fields, key=lambda mesh: _accepts_field(mesh, names[mesh])):
+        write_mesh_field(mesh, fields[mesh], names[mesh])
+
+
+def _target_attribute(mesh: bpy.types.Mesh) -> str:
+    """Return the attribute of a mesh's field, or a default if that has another form."""
+    name = attribute_name(mesh)
+    return (
+        name
+        if name not in mesh.attributes or is_face_vector_field(mesh, name)
+        else DEFAULT_FIELD_NAME
+    )
+
+
+def _accepts_field(mesh: bpy.types.Mesh, name: str) -> bool:
+    """Whether a field can be stored on a mesh under a name as vectors on faces."""
+    return is_editable(mesh) and (name not in mesh.attributes or is_face_vector_field(mesh, name))
+
+
+def write_mesh_field(
+    mesh: bpy.types.Mesh, field: RosyField, name: str = DEFAULT_FIELD_NAME, form: str = "VECTOR"
+) -> bpy.types.Attribute:
+    """Store a field on a mesh. A field with the same name is replaced.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    field : RosyField
+    name : str
+        Name of the attribute. Not used for "DIRECTIONS", whose attributes are ``dir0`` ...
+        ``dir{N-1}``.
+    form : {"VECTOR", "DIRECTIONS", "ANGLE"}
+        See `STORAGE_FORMS`. A field with free directions is always stored as "DIRECTIONS", and a
+        vector attribute with the name of the field is removed: it would be read instead. A RoSy
+        field stored as "DIRECTIONS" keeps such an attribute.
+
+    Returns
+    -------
+    bpy.types.Attribute
+        The attribute, or the first of several.
+
+    Raises
+    ------
+    RosyError
+        If the mesh is linked from a library or in edit mode, its number of faces differs from the
+        field's, an attribute of the name has another type or domain, or the field has free
+        directions and the form is "ANGLE". Nothing is changed in this case.
+
+    See Also
+    --------
+    read_mesh_field : The inverse.
+    """
+    name = name or DEFAULT_FIELD_NAME
+    _check_writable(mesh)
+    face_count = len(mesh.polygons)
+    if len(field.vectors) != face_count:
+        raise RosyError(
+            f"mesh '{mesh.name}' has {face_count} faces, but the field has {len(field.vectors)}"
+        )
+    if form == "ANGLE" and field.direction_ratios is not None:
+        raise RosyError(f"mesh '{mesh.name}': the directions of its field are no RoSy of one angle")
+    if form == "DIRECTIONS" or field.direction_ratios is not None:
+        attribute = _write_directions(mesh, field, name)
+    elif form == "ANGLE":
+        attribute = _get_or_create_attribute(mesh, name, ANGLE_TYPE)
+        x, y = face_frames(mesh_surface(mesh))
+        angle = np.arctan2(dot(field.vectors, y), dot(field.vectors, x))
+        angle[~field.vectors.any(axis=1)] = np.nan
+        attribute.data.foreach_set("value", angle.astype(np.float32))
+    else:
+        attribute = _get_or_create_attribute(mesh, name, VECTOR_TYPE)
+        attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    if has_rosy_properties():
+        mesh.rosy.degree = field.degree
+        if attribute.name == name:
+            mesh.rosy.attribute = name
+    mesh.update()
+    return attribute
+
+
+def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
+    """Store all directions of a field as ``dir0`` ... ``dir{N-1}``; remove ``dirN`` and so on."""
+    directions = (
+        field_directions(mesh_surface(mesh), field)
+        if field.source_directions is None
+        else field.source_directions
+    )
+    names = [f"dir{index}" for index in range(field.degree)]
+    for direction_name in names:
+        _check_attribute_type(mesh, direction_name, VECTOR_TYPE)
+    vector_attribute = mesh.attributes.get(name)
+    if field.direction_ratios is not None and vector_attribute is not None:
+        _check_attribute_type(mesh, name, VECTOR_TYPE)
+        mesh.attributes.remove(vector_attribute)
+    extra_index = field.degree
+    while f"dir{extra_index}" in mesh.attributes:
+        mesh.attributes.remove(mesh.attributes[f"dir{extra_index}"])
+        extra_index += 1
+    for direction_name, vectors in zip(names, directions.swapaxes(0, 1), strict=True):
+        attribute = _get_or_create_attribute(mesh, direction_name, VECTOR_TYPE)
+        attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    return mesh.attributes["dir0"]
+
+
+def _check_attribute_type(mesh: bpy.types.Mesh, name: str, data_type: str) -> None:
+    """Raise an error if an attribute exists and is not of the given type on faces."""
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", data_type):
+        raise RosyError(
+            f"mesh '{mesh.name}' has an attribute '{name}' of another kind, {describe_type(attribute)}; "
+            "remove it, or give the field another name"
+        )
+
+
+def _get_or_create_attribute(
+    mesh: bpy.types.Mesh, name: str, data_type: str
+) -> bpy.types.Attribute:
+    """Return the attribute of a name and type on faces, and create it if it is missing."""
+    _check_attribute_type(mesh, name, data_type)
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        attribute = mesh.attributes.new(name, data_type, "FACE")
+        if attribute is None or attribute.name != name:
+            if attribute is not None:
+                mesh.attributes.remove(attribute)
+            raise RosyError(f"mesh '{mesh.name}': an attribute cannot be named '{name}'")
+    return attribute
+
+
+def _check_writable(mesh: bpy.types.Mesh) -> None:
+    """Raise an error if a mesh is linked from a library or in edit mode."""
+    if not is_editable(mesh):
+        library = mesh.library.filepath if mesh.library else "its library"
+        raise RosyError(
+            f"mesh '{mesh.name}' is linked from {library}: make it local to give it a field"
+        )
+    if mesh.is_editmode:
+        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave it (Tab) to give it a field")

@@ -10,7 +10,7 @@ import numpy as np
 from bench.stroke_spacing import lateral_gaps
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.placement import SeparationRules
+from rosy_addon.strokes.separation_rules import SeparationRules
 from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy_addon.strokes.trace import trace_strokes
 

@@ -28,8 +28,8 @@ from rosy_addon.strokes.crossings import cut_intervals, find_crossings, with_cro
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.head_on_ends import head_on_ends
 from rosy_addon.strokes.outline import outline
-from rosy_addon.strokes.placement import SeparationRules
 from rosy_addon.strokes.separation import enforce_separation
+from rosy_addon.strokes.separation_rules import SeparationRules
 from rosy_addon.strokes.singularity_seeds import singularities
 from rosy_addon.strokes.spacing import (
     headlight_tone,

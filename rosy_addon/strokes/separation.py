@@ -1,10 +1,14 @@
 """Cut strokes of the same family where they are nearer than the minimum separation.
 
-Placement compares samples that are half a spacing apart. Where strokes bend strongly, above all at
-singularities, they may come nearer between samples, or neighbors may turn from different families
-into one. At folds, the distance in space is smaller than along the surface. After placement,
-strokes are compared more finely at such points and near their ends. Of two strokes that are too
-near, the shorter one is cut.
+Placement compares samples that are half a spacing apart. This misses some pairs that are too near:
+
+- Where strokes bend strongly, above all at singularities, they may be nearer between samples.
+- There, two neighbors may also be of different families at one sample and of the same family at the
+  next.
+- At folds, the distance in space is smaller than along the surface.
+
+After placement, strokes are compared more finely at such points and near their ends. Of two strokes
+that are too near, the shorter one is cut.
 """
 
 from __future__ import annotations

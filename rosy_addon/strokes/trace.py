@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes along the field of a mesh instance, from tangent mesh to `Strokes`."""
+"""Trace evenly spaced strokes on a mesh instance, from its tangent mesh to `Strokes`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.strokes.outline import OUTLINE_KINDS
 from rosy_addon.strokes.overshoot import MIN_EXTENSION_RATIO, extend_free_ends
-from rosy_addon.strokes.pipeline import TIP_WIDTH, draw_bodies
+from rosy_addon.strokes.pipeline import TIP_WIDTH, draw_instances
 from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.svg import Pen, svg_text
 from rosy_addon.strokes.visibility import clip_to_visible, project_to_pixels, rasterize_depth
@@ -32,7 +32,7 @@ FRONT = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 400, 360, fov=np.ra
 def both(instances, camera, **more):
     """The same strokes without, and with, ends that run on."""
     return (
-        draw_bodies(instances, camera, StrokeStyle(**more, overshoot=far)).strokes
+        draw_instances(instances, camera, StrokeStyle(**more, overshoot=far)).strokes
         for far in (0, FAR)
     )
 
@@ -70,7 +70,7 @@ def test_at_a_border_lines_go_straight_on_some_farther_than_others():
 
 def test_without_it_nothing_changes():
     plain, again = (
-        draw_bodies([BALL], FRONT, StrokeStyle(spacing=9, **more)).strokes
+        draw_instances([BALL], FRONT, StrokeStyle(spacing=9, **more)).strokes
         for more in ({}, {"overshoot": 0.0})
     )
     assert np.array_equal(plain.points, again.points) and np.array_equal(plain.width, again.width)
@@ -207,7 +207,7 @@ def test_creases_end_lines_unless_they_cross():
 def test_the_frame_cuts_them():
     near = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 206, 206, scale=2.06)
     for more in ({}, {"hidden": True}):
-        made = draw_bodies([SQUARE], near, StrokeStyle(spacing=6, overshoot=FAR, **more)).strokes
+        made = draw_instances([SQUARE], near, StrokeStyle(spacing=6, overshoot=FAR, **more)).strokes
         pixels, _ = project_to_pixels(made.points, near)
         assert (pixels >= 0).all() and (pixels <= 206).all()
         assert np.abs(ends_of(made)[:, :, 0]).min() > 1.015
@@ -215,7 +215,9 @@ def test_the_frame_cuts_them():
 
 @pytest.mark.parametrize("taper", [0.0, 1.0])
 def test_they_get_thinner_as_the_taper_says(taper):
-    made = draw_bodies([SQUARE], ABOVE, StrokeStyle(spacing=6, taper=taper, overshoot=FAR)).strokes
+    made = draw_instances(
+        [SQUARE], ABOVE, StrokeStyle(spacing=6, taper=taper, overshoot=FAR)
+    ).strokes
     tips = made.width[np.stack([made.start[:-1], made.start[1:] - 1], axis=1)]
     assert np.allclose(tips, TIP_WIDTH if taper else 1.0)
     from_tip = np.minimum(made.arc, made.length[made.stroke] - made.arc)
@@ -228,7 +230,7 @@ def test_kept_behind_they_run_on_in_space():
     slope = np.eye(4)
     slope[:3, :3] = [[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]]
     instance = MeshInstance(SQUARE.surface, slope, SQUARE.field)
-    made = draw_bodies(
+    made = draw_instances(
         [instance], ABOVE, StrokeStyle(spacing=6, hidden=True, overshoot=FAR), clip_to_frame=False
     ).strokes
     local = made.points @ slope[:3, :3]
@@ -242,7 +244,7 @@ def test_beside_and_behind_the_eye_nothing_breaks():
     floor = MeshInstance(surface, STILL, generate(surface, ALONG_X, 2))
     camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
     for more in ({}, {"hidden": True}):
-        made = draw_bodies(
+        made = draw_instances(
             [floor], camera, StrokeStyle(spacing=20, overshoot=FAR, **more), clip_to_frame=False
         )
         assert np.isfinite(made.strokes.points).all() and np.isfinite(made.strokes.width).all()
@@ -250,9 +252,9 @@ def test_beside_and_behind_the_eye_nothing_breaks():
 
 
 def test_plotters_and_strokes_that_are_too_short():
-    longer = draw_bodies([BALL], FRONT, StrokeStyle(spacing=9, overshoot=FAR)).strokes
+    longer = draw_instances([BALL], FRONT, StrokeStyle(spacing=9, overshoot=FAR)).strokes
     assert svg_text(longer, FRONT, Pen(plotter=True)).count("<path") == len(longer)
-    traced = draw_bodies([SQUARE], ABOVE, StrokeStyle(spacing=6, taper=0)).strokes
+    traced = draw_instances([SQUARE], ABOVE, StrokeStyle(spacing=6, taper=0)).strokes
     short = traced.runs_where(np.abs(traced.points[:, 0]) < 0.02)
     assert short.free_end_mask.all()
     more = growth(short, extend_free_ends(short, ABOVE, 100.0, [SQUARE]), ABOVE)
@@ -260,7 +262,7 @@ def test_plotters_and_strokes_that_are_too_short():
 
 
 def test_no_end_is_loose_unless_something_ended_it():
-    traced = draw_bodies([SQUARE], ABOVE, StrokeStyle(spacing=6, taper=0)).strokes
+    traced = draw_instances([SQUARE], ABOVE, StrokeStyle(spacing=6, taper=0)).strokes
     assert (
         not traced.free_end_mask.any()
         and not clip_to_visible(traced, [SQUARE], ABOVE).free_end_mask.any()

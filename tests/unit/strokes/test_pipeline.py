@@ -12,7 +12,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.strokes.pipeline import (
-    draw_bodies,
+    draw_instances,
     offset_toward_camera,
     simplify_strokes,
     stroke_geometry,
@@ -31,15 +31,15 @@ CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.r
 def test_families_of_several_bodies_are_one_by_name():
     six = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
     screen = MeshInstance(plane(), moved(z=-1.0))
-    made = draw_bodies([screen, BALL, six], CAMERA, StrokeStyle(spacing=12, outline=True))
+    made = draw_instances([screen, BALL, six], CAMERA, StrokeStyle(spacing=12, outline=True))
     names = made.strokes.names
     assert names == ("family 1", "family 2", "family 3", "silhouettes", "creases", "borders")
     for instance, families in ((1, {0, 1}), (2, {0, 1, 2})):
-        own = set(made.strokes.family[made.body_index == instance].tolist())
+        own = set(made.strokes.family[made.instance_index == instance].tolist())
         assert own - {3, 4, 5} == families and 3 in own
-    assert set(made.body_index.tolist()) == {1, 2}
+    assert set(made.instance_index.tolist()) == {1, 2}
     # Points are on the sphere that their body is.
-    middle = np.where((made.body_index == 1)[made.strokes.stroke, None], 0.0, [0.9, 0, 0])
+    middle = np.where((made.instance_index == 1)[made.strokes.stroke, None], 0.0, [0.9, 0, 0])
     assert np.abs(np.linalg.norm(made.strokes.points - middle, axis=1) - 1).max() < 0.02
 
 
@@ -48,7 +48,7 @@ def test_a_floor_that_runs_on_behind_the_eye_is_drawn():
     surface = plane(60, 60, size=40.0)
     floor = MeshInstance(surface, STILL, generate(surface, ALONG_X, 2))
     camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
-    made = draw_bodies([floor], camera, StrokeStyle(spacing=10))
+    made = draw_instances([floor], camera, StrokeStyle(spacing=10))
     pixels, depth = project_to_pixels(made.strokes.points, camera)
     assert len(made.strokes) > 10 and depth.min() > 0
     assert (pixels >= -1e-6).all() and (pixels <= np.array([200, 150]) + 1e-6).all()
@@ -58,7 +58,9 @@ def test_a_floor_that_runs_on_behind_the_eye_is_drawn():
 def test_spacings_in_units_do_not_ask_the_camera(distance):
     square = MeshInstance(plane(8, 8), STILL, generate(plane(8, 8), ALONG_X, 2))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
-    made = draw_bodies([square], camera, StrokeStyle(unit="world", distance=distance, hidden=True))
+    made = draw_instances(
+        [square], camera, StrokeStyle(unit="world", distance=distance, hidden=True)
+    )
     # The area, 2 by 2, over the distance.
     assert np.isclose(made.strokes.length.sum(), 4 / distance, rtol=0.12)
 
@@ -81,7 +83,7 @@ def test_light_is_that_of_lambert():
 
 def test_light_makes_room():
     manner = StrokeStyle(unit="world", distance=0.05, tone=True)
-    made = draw_bodies([BALL], CAMERA, manner, lights=[KEY_LIGHT]).strokes
+    made = draw_instances([BALL], CAMERA, manner, lights=[KEY_LIGHT]).strokes
     light = normalize(made.points) @ (CAMERA.view[:3, :3].T @ KEY_LIGHT.vector)
     assert made.spacing[light > 0.8].mean() > 2.5 * made.spacing[light < 0.0].mean()
     assert light.max() < 0.97 and made.width[light > 0.9].max() < 0.35
@@ -91,7 +93,7 @@ def test_light_makes_room():
 
 
 def test_thinned_lines_miss_nothing():
-    strokes = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12)).strokes
+    strokes = draw_instances([BALL], CAMERA, StrokeStyle(spacing=12)).strokes
     thin = simplify_strokes(strokes, CAMERA)
     assert len(thin) == len(strokes) and len(thin.points) < 0.5 * len(strokes.points)
     np.testing.assert_array_equal(thin.points[thin.start[:-1]], strokes.points[strokes.start[:-1]])
@@ -115,7 +117,7 @@ def test_lifted_lines_stay_in_the_picture_and_off_the_surface(ortho):
     camera = CAMERA
     if ortho:
         camera = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, scale=2.5)
-    strokes = draw_bodies([BALL], camera, StrokeStyle(spacing=12)).strokes
+    strokes = draw_instances([BALL], camera, StrokeStyle(spacing=12)).strokes
     points = offset_toward_camera(strokes, camera, 2.0)
     before, depth = project_to_pixels(strokes.points, camera)
     after, nearer = project_to_pixels(points, camera)
@@ -133,24 +135,26 @@ def test_lifted_lines_stay_in_the_picture_and_off_the_surface(ortho):
 
 
 def test_lines_have_the_width_of_the_pen():
-    made = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12, taper=0.0))
+    made = draw_instances([BALL], CAMERA, StrokeStyle(spacing=12, taper=0.0))
     lines = stroke_geometry(made, CAMERA, Pen(width=3.0, colours=["#112233", "#445566"]))
     np.testing.assert_allclose(2 * lines.radius / pixel_size(lines.points, CAMERA), 3.0)
     assert lines.colors == ["#112233", "#445566"]
-    hidden = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12, hidden=True))
+    hidden = draw_instances([BALL], CAMERA, StrokeStyle(spacing=12, hidden=True))
     raised = stroke_geometry(hidden, CAMERA, Pen(width=3.0)).points
     assert np.linalg.norm(raised, axis=1).min() > 1 and len(hidden.strokes) > len(made.strokes)
 
 
 def test_what_is_wrong_is_said(error_of):
-    assert "there is no field" in error_of(draw_bodies, [MeshInstance(plane(), STILL)], CAMERA)
+    assert "there is no field" in error_of(draw_instances, [MeshInstance(plane(), STILL)], CAMERA)
     behind = MeshInstance(BALL.surface, moved(y=-50.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [behind], CAMERA)
-    unseen = draw_bodies([behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False)
+    assert "sees none" in error_of(draw_instances, [behind], CAMERA)
+    unseen = draw_instances(
+        [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
+    )
     assert 20 < len(unseen.strokes) < 2000
-    assert "no room" in error_of(draw_bodies, [BALL], CAMERA, StrokeStyle(spacing=500))
+    assert "no room" in error_of(draw_instances, [BALL], CAMERA, StrokeStyle(spacing=500))
     away = MeshInstance(BALL.surface, moved(x=9.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [away], CAMERA)
+    assert "sees none" in error_of(draw_instances, [away], CAMERA)
     assert "setting 'spacing' is 0, not from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
     assert "'sun', not one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")

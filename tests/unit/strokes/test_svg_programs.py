@@ -22,7 +22,7 @@ from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_cam
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.strokes.outline import outline
-from rosy_addon.strokes.pipeline import draw_bodies
+from rosy_addon.strokes.pipeline import draw_instances
 from rosy_addon.strokes.spacing import pixel_spacing
 from rosy_addon.strokes.stroke_set import Strokes
 from rosy_addon.strokes.style import StrokeStyle
@@ -239,7 +239,7 @@ def test_lines_run_as_in_the_render(program, scene, tmp_path):
 def test_strokes_are_as_dark_as_the_render(program, scene, tmp_path):
     instance, camera = scene
     manner = StrokeStyle(spacing=4.0, tone=True, light="lamp")
-    drawn = draw_bodies([instance], camera, manner, lights=[KEY_LIGHT]).strokes
+    drawn = draw_instances([instance], camera, manner, lights=[KEY_LIGHT]).strokes
     write_svg(tmp_path / "a.svg", drawn, camera, Pen(width=2.0))
     program(tmp_path / "a.svg", tmp_path / "a.png")
     strokes = ink_of(tmp_path / "a.png")

@@ -63,6 +63,11 @@ class StrokeSamples(ColumnTable):
     current_step : int
         Number of the current step of growth.
 
+    Raises
+    ------
+    RosyError
+        If the expected number of samples is too large.
+
     Notes
     -----
     The columns, with a row for each sample:
@@ -88,11 +93,6 @@ class StrokeSamples(ColumnTable):
         Position as barycentric coordinates.
     local_member, local_direction : complex128
         Unit member and direction in the frame of the triangle.
-
-    Raises
-    ------
-    RosyError
-        If the expected number of samples is too large.
     """
 
     frame: np.ndarray

@@ -1,9 +1,8 @@
-"""How evenly strokes are spaced, measured: apart from what spaced them.
+"""Measure how evenly strokes are spaced, independently of the code that places them.
 
-At points along all strokes, and on either side of each, the gap is how far it is across the stroke
-to the next stroke of its family, over the spacing asked for there. The next stroke is that which
-passes abeam: where the line across the first meets it. Distances are chords, made longer by what
-the surface bends between the two normals.
+The gap is measured at points along all strokes, on both sides. It is the distance to the next
+stroke of the same family, perpendicular to the stroke, divided by the required spacing. Distances
+are chords, corrected to the length of an arc that bends by the angle between the two normals.
 """
 
 from __future__ import annotations
@@ -18,27 +17,27 @@ from rosy_addon.strokes.stroke_set import Strokes
 from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.strokes.tangent_mesh import TangentMesh
 
-#: Shares of the spacing: between the points of strokes that are compared, and how far is looked.
+#: Distance between the points that are compared, and search radius, in spacings.
 SAMPLE_STEP, SEARCH_RADIUS = 0.1, 2.0
 
-#: A stroke's gap to itself counts past so many spacings of its length.
+#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
 MIN_SELF_ARC = 2.5
 
 
 class LateralGaps(NamedTuple):
-    """At n points of strokes, on their left (0) and right (1).
+    """The gaps at n points of strokes, on the left (0) and the right (1) side.
 
     Attributes
     ----------
     point : (n,) int64 ndarray
-        Of the strokes.
+        Numbers of the points in the strokes.
     gap : (n, 2) float64 ndarray
-        In spacings; inf if there is none within `SEARCH_RADIUS`.
+        Distance to the next stroke in spacings; infinite if there is none within `SEARCH_RADIUS`.
     has_room : (n, 2) bool ndarray
-        Whether the surface goes on to that side for 1.25 spacings: where it ends, or a crease
-        stops strokes, none is to be expected.
+        Whether the surface continues on that side for 1.25 spacings. If it does not, or if a crease
+        stops strokes, no stroke is expected there.
     nearest_distance : (n,) float64 ndarray
-        How far the nearest point of any other stroke of the family is, in any direction.
+        Distance to the nearest point of another stroke of the family in any direction, in spacings.
     """
 
     point: np.ndarray
@@ -47,15 +46,22 @@ class LateralGaps(NamedTuple):
     nearest_distance: np.ndarray
 
     def evenness(self, tolerance: float = 0.25) -> float:
-        """Share of the gaps, of those on free sides, that are within a tolerance of 1."""
+        """Return the fraction of gaps on sides with room that differ from 1 by at most `tolerance`."""
         gap = self.gap[self.has_room]
         return float(np.mean(np.abs(gap - 1) <= tolerance)) if len(gap) else 1.0
 
 
 def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) -> LateralGaps:
-    """Measure strokes that were traced on a ground; all of them, before any is hidden or cut.
+    """Measure the gaps of strokes.
 
-    At `max_points` of their points or a few more, evenly taken.
+    Parameters
+    ----------
+    mesh : TangentMesh
+        The mesh on which the strokes were traced.
+    strokes : Strokes
+        All strokes, before any are clipped or cut.
+    max_points : int
+        About the number of points at which gaps are measured, evenly distributed.
     """
     arc = strokes.arc
     step = np.diff(arc, prepend=0)
@@ -80,6 +86,7 @@ def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) 
 def _measure(
     mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, grid: PointGrid, batch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Return `LateralGaps.gap` and `nearest_distance` for the samples of a batch."""
     stroke = samples.stroke
     query, other = grid.pairs_within(samples.points[batch], SEARCH_RADIUS * samples.spacing[batch])
     sample = batch[query]
@@ -122,7 +129,7 @@ def _measure(
 
 
 def _tangents(samples: Strokes) -> np.ndarray:
-    """(n, 3) unit tangents."""
+    """Return the (n, 3) unit tangents of strokes."""
     tangent = np.zeros_like(samples.points)
     tangent[1:] = np.diff(samples.points, axis=0)
     first = samples.start[:-1]
@@ -133,6 +140,7 @@ def _tangents(samples: Strokes) -> np.ndarray:
 def _sides_with_room(
     mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, sample: np.ndarray
 ) -> np.ndarray:
+    """Return `LateralGaps.has_room` for samples."""
     triangle, weights = samples.triangle[sample], samples.weights[sample]
     direction = dot(tangent[sample], mesh.x[triangle]) + 1j * dot(tangent[sample], mesh.y[triangle])
     direction /= np.maximum(np.abs(direction), 1e-300)

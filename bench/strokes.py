@@ -1,4 +1,4 @@
-"""20,000 strokes on 200K faces: seconds, and over what the smoothest field itself takes there."""
+"""Time to trace 20,000 strokes on 200,000 triangles, relative to computing the smoothest field."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from bench.stroke_spacing import lateral_gaps
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.placement import SeparationRules
+from rosy_addon.strokes.separation_rules import SeparationRules
 from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy_addon.strokes.trace import trace_strokes
 
@@ -19,35 +19,36 @@ from .timing import Case, compare, main
 
 DEGREE = 4
 
-#: Of hatching: lines of up to a dozen spacings, so near to each other that about 20,000 come.
-SPACING, LONGEST = 0.0102, 12.0
+#: Spacing in world space and maximum length in spacings, as for hatching. They give about 20,000
+#: strokes.
+SPACING, MAX_LENGTH = 0.0102, 12.0
 
-#: Seconds that are allowed.
-SECONDS = 30.0
+#: Maximum time in seconds.
+MAX_SECONDS = 30.0
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """The ratio, beside it the milliseconds of both; what came of it goes to the error stream."""
+    """Yield the ratio of the two times. Number, evenness and time go to the error stream."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
-    rules = SeparationRules(max_length=LONGEST)
-    drawn = trace_strokes(instance, SPACING, rules=rules)
-    gaps = lateral_gaps(build_tangent_mesh(instance), drawn)
+    rules = SeparationRules(max_length=MAX_LENGTH)
+    strokes = trace_strokes(instance, SPACING, rules=rules)
+    gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
     print(
-        f"{len(drawn)} strokes, {100 * gaps.evenness():.1f} % of gaps within 25 %, "
+        f"{len(strokes)} strokes, {100 * gaps.evenness():.1f} % of gaps within 25 %, "
         f"none nearer than {gaps.nearest_distance.min():.2f} spacings",
         file=sys.stderr,
     )
     case = compare(
-        f"{len(drawn)} strokes / smoothest field, 200K triangles, N = {DEGREE}",
+        f"{len(strokes)} strokes / smoothest field, 200K triangles, N = {DEGREE}",
         lambda: trace_strokes(instance, SPACING, rules=rules),
         lambda: smoothest_field(surface, DEGREE),
         higher_is_better=False,
         runs=min(runs, 3),
     )
     seconds = case.amounts[0] / 1e3
-    said = "yes" if seconds <= SECONDS else "NO"
-    print(f"{seconds:.1f} s, at most {SECONDS:g}: {said}", file=sys.stderr)
+    verdict = "yes" if seconds <= MAX_SECONDS else "NO"
+    print(f"{seconds:.1f} s, at most {MAX_SECONDS:g}: {verdict}", file=sys.stderr)
     yield case
 
 

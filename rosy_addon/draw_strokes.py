@@ -18,7 +18,7 @@ from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
 from .scene.scene_reader import SceneData, read_scene
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
-from .strokes.pipeline import StrokeDrawing, draw_bodies_task
+from .strokes.pipeline import StrokeDrawing, draw_instances_task
 from .strokes.style import StrokeStyle
 from .strokes.svg import Pen, write_svg
 
@@ -96,7 +96,7 @@ def draw_strokes_task(
     ------
     RosyError
         If there is nothing to draw, or it cannot be drawn; see `read_scene`, `resolve_camera` and
-        `draw_bodies_task`. Also if the file cannot be written.
+        `draw_instances_task`. Also if the file cannot be written.
     """
     settings = scene.rosy.strokes
     kind = settings.kind if kind is None else kind
@@ -111,7 +111,7 @@ def draw_strokes_task(
     scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
     lights = lights_of(style, read_lights(depsgraph, view.view))
     clip_to_frame = kind == "SVG"
-    work = draw_bodies_task(
+    work = draw_instances_task(
         scene_data.instances,
         view,
         style,

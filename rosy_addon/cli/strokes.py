@@ -14,7 +14,7 @@ from ..file_io import check_writable
 from ..frame_workers import parse_frames
 from ..projection.camera import orbit_camera
 from ..render.mesh_view import check_light, mesh_instance
-from ..strokes.pipeline import draw_bodies
+from ..strokes.pipeline import draw_instances
 from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen, write_svg
 from .mesh_field import add_mesh_options, load_mesh_and_field
@@ -77,7 +77,7 @@ def run_strokes(options: argparse.Namespace) -> None:
     camera = orbit_camera(
         instance.world_points(), *options.view, *size, perspective=not options.ortho
     )
-    drawing = draw_bodies([instance], camera, style, lights=lights_of(style, ()))
+    drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
     write_svg(options.output, drawing.strokes, camera, pen)
 
 

@@ -56,7 +56,7 @@ def new_curves(
     # out of date, it writes past the end of its arrays. Adding no curves updates them.
     data.add_curves([])
     _set_attribute(data, "family", "INT", "CURVE", strokes.family)
-    _set_attribute(data, "object", "INT", "CURVE", geometry.body_index)
+    _set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
     _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colours[strokes.family])
     values = {
         "opacity": strokes.opacity,

@@ -1,9 +1,9 @@
 """Assign strokes to families: the M lines that the field has at each point.
 
 Each family becomes a layer, which can have its own pen and color. Lines of neighboring triangles
-are matched across the edges. If no path around a singularity or a handle connects different lines,
-the families are consistent over the whole surface. Otherwise the family depends on the angle
-between the stroke and a guide direction.
+are matched across the edges. A path around a singularity or a handle may connect different lines of
+a triangle. If there is no such path, the families are consistent over the whole surface. Otherwise
+the family depends on the angle between the stroke and a guide direction.
 """
 
 from __future__ import annotations

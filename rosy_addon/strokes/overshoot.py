@@ -1,6 +1,6 @@
 """Overshoot: extend strokes beyond occluding edges, borders and the end of the shade.
 
-This imitates lines drawn by hand with a swing.
+This imitates quick drawings by hand, in which lines continue a little too far.
 """
 
 from __future__ import annotations
@@ -151,10 +151,11 @@ def _extension_in_space(
 def _extension_in_picture(
     strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the same for extensions that are straight in the picture.
+    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
 
-    They lie in the plane through the end that is parallel to the image plane. They leave the stroke
-    `backtrack` pixels before its end, because lines bend along the silhouette close to it.
+    The parameters and results are those of `_extension_in_space`. The lines lie in the plane
+    through the end that is parallel to the image plane. They leave the stroke `backtrack` pixels
+    before its end, because strokes bend along the silhouette close to it.
     """
     start_point = _point_before_end(arc, strokes, end, backtrack)
     before = _point_before_end(arc, strokes, end, backtrack + np.abs(arc[end] - arc[start_point]))

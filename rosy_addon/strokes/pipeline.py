@@ -60,31 +60,31 @@ class StrokeDrawing:
     ----------
     strokes : Strokes
         Families with the same name are merged across instances. The kinds of outline come last.
-    body_index : (S,) int32 ndarray
+    instance_index : (S,) int32 ndarray
         The mesh instance of each stroke: an index into the instances that were given.
     hidden : bool
         Whether parts that the camera does not see were kept.
     """
 
     strokes: Strokes
-    body_index: np.ndarray
+    instance_index: np.ndarray
     hidden: bool = False
 
 
-def draw_bodies(
+def draw_instances(
     instances: Sequence[MeshInstance], camera: Camera, style: StrokeStyle | None = None, **options
 ) -> StrokeDrawing:
-    """Run `draw_bodies_task` to its end.
+    """Run `draw_instances_task` to its end.
 
     Examples
     --------
-    >>> drawing = draw_bodies([instance], camera, StrokeStyle(spacing=6.0))  # doctest: +SKIP
+    >>> drawing = draw_instances([instance], camera, StrokeStyle(spacing=6.0))  # doctest: +SKIP
     >>> write_svg("strokes.svg", drawing.strokes, camera)  # doctest: +SKIP
     """
-    return run_to_completion(draw_bodies_task(instances, camera, style, **options))
+    return run_to_completion(draw_instances_task(instances, camera, style, **options))
 
 
-def draw_bodies_task(
+def draw_instances_task(
     instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle | None = None,
@@ -125,19 +125,19 @@ def draw_bodies_task(
     """
     style = style or StrokeStyle()
     cache = Cache() if cache is None else cache
-    body_indices = [index for index, instance in enumerate(instances) if instance.field is not None]
-    if not body_indices:
+    drawn = [index for index, instance in enumerate(instances) if instance.field is not None]
+    if not drawn:
         raise RosyError("there is no field to draw strokes along")
     if clip_to_frame or not style.hidden:
-        body_indices = [index for index in body_indices if _is_in_view(instances[index], camera)]
-    body_strokes = []
-    for rank, index in enumerate(body_indices):
-        start, stop = (0.05 + 0.8 * done / len(body_indices) for done in (rank, rank + 1))
-        work = _trace_body(instances[index], camera, style, lights, cache)
-        body_strokes.append((yield from subtask(work, start, stop)))
-    if not body_strokes:
+        drawn = [index for index in drawn if _is_in_view(instances[index], camera)]
+    strokes_of_instances = []
+    for rank, index in enumerate(drawn):
+        start, stop = (0.05 + 0.8 * done / len(drawn) for done in (rank, rank + 1))
+        task = _trace_instance(instances[index], camera, style, lights, cache)
+        strokes_of_instances.append((yield from subtask(task, start, stop)))
+    if not strokes_of_instances:
         raise RosyError(f"camera '{camera.name}' sees none of the strokes")
-    strokes = reduce(Strokes.concatenate, body_strokes)
+    strokes = reduce(Strokes.concatenate, strokes_of_instances)
     if not len(strokes):
         raise RosyError("there is no room for a stroke: ask for a narrower spacing")
     if clip_to_frame or not style.hidden:
@@ -147,12 +147,15 @@ def draw_bodies_task(
         strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
         raise RosyError(f"camera '{camera.name}' sees none of the strokes")
-    family_counts = [len(single.names) for single in body_strokes]
-    body_index = np.repeat(np.array(body_indices, dtype=np.int32), family_counts)[strokes.family]
-    return StrokeDrawing(_merge_families_by_name(strokes), body_index, style.hidden)
+    # Families of different instances are still separate. Each belongs to one instance.
+    family_counts = [len(single.names) for single in strokes_of_instances]
+    instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
+    return StrokeDrawing(
+        _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden
+    )
 
 
-def _trace_body(
+def _trace_instance(
     instance: MeshInstance,
     camera: Camera,
     style: StrokeStyle,
@@ -260,7 +263,7 @@ class StrokeGeometry:
     ----------
     strokes : Strokes
         Simplified strokes; n points in all.
-    body_index : (S,) int32 ndarray
+    instance_index : (S,) int32 ndarray
         As in `StrokeDrawing`.
     points : (n, 3) float64 ndarray
         Points of the curves in world space, offset from the surface.
@@ -271,7 +274,7 @@ class StrokeGeometry:
     """
 
     strokes: Strokes
-    body_index: np.ndarray
+    instance_index: np.ndarray
     points: np.ndarray
     radius: np.ndarray
     colors: list[str]
@@ -287,7 +290,7 @@ def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeG
     )
     radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
     return StrokeGeometry(
-        strokes, drawing.body_index, points, radius, pen.family_colors(strokes.names)
+        strokes, drawing.instance_index, points, radius, pen.family_colors(strokes.names)
     )
 
 

@@ -1,10 +1,14 @@
 """Cut strokes of the same family where they are nearer than the minimum separation.
 
-Placement compares samples that are half a spacing apart. Where strokes bend strongly, above all at
-singularities, they may come nearer between samples, or neighbors may turn from different families
-into one. At folds, the distance in space is smaller than along the surface. After placement,
-strokes are compared more finely at such points and near their ends. Of two strokes that are too
-near, the shorter one is cut.
+Placement compares samples that are half a spacing apart. This misses some pairs that are too near:
+
+- Where strokes bend strongly, above all at singularities, they may be nearer between samples.
+- There, two neighbors may also be of different families at one sample and of the same family at the
+  next.
+- At folds, the distance in space is smaller than along the surface.
+
+After placement, strokes are compared more finely at such points and near their ends. Of two strokes
+that are too near, the shorter one is cut.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ import numpy as np
 
 from ..field.frames import dot, normalize
 from .point_grid import PointGrid
+from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh
 
@@ -26,7 +31,7 @@ MIN_SEPARATION = 0.52
 FAMILY_TOLERANCE = np.radians(10)
 
 #: Distance between the points that are compared, in spacings.
-SAMPLE_STEP = 0.1
+REFINED_STEP = 0.1
 
 #: Strokes are checked where they or the field turn by more than this within a spacing, in radians.
 MAX_TURN = np.radians(18)
@@ -36,14 +41,6 @@ FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
 #: Radius around such points in which strokes are sampled finely, in spacings.
 CHECK_RADIUS = 1.0
-
-#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
-MIN_SELF_ARC = 2.5
-
-#: Points are on different parts of a fold if the cosine between their normals is below the first
-#: value, or the slope between them relative to the mean normal (height over distance) is above the
-#: second.
-MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
 
 
 def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Strokes:
@@ -168,7 +165,7 @@ def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
 
 
 def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.ndarray]:
-    """Subdivide strokes to steps of at most `SAMPLE_STEP` spacings at some points.
+    """Subdivide strokes to steps of at most `REFINED_STEP` spacings at some points.
 
     Parameters
     ----------
@@ -185,7 +182,7 @@ def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.nda
     step = np.diff(strokes.arc, prepend=0)
     step[strokes.start[:-1]] = 0
     step[1:][~(near_suspect[1:] | near_suspect[:-1])] = 0
-    counts = np.ceil(step / (SAMPLE_STEP * strokes.spacing)).clip(1, 1000).astype(np.int64)
+    counts = np.ceil(step / (REFINED_STEP * strokes.spacing)).clip(1, 1000).astype(np.int64)
     return strokes.subdivided(counts), np.repeat(np.arange(len(counts)), counts)
 
 
@@ -261,7 +258,7 @@ def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
     # A stretch at the end of a stroke and one at the start of the next share one change.
     first = changes[removed[np.minimum(changes, len(removed) - 1)] & (changes < len(removed))]
     last = changes[(changes > 0) & removed[np.maximum(changes - 1, 0)]] - 1
-    min_extent = (MIN_SEPARATION + 2 * SAMPLE_STEP) * refined.spacing[first]
+    min_extent = (MIN_SEPARATION + 2 * REFINED_STEP) * refined.spacing[first]
     padding = np.maximum(min_extent - (arc[last] - arc[first]), 0) / 2
     low = np.searchsorted(key, key[first] - padding)
     high = np.searchsorted(key, key[last] + padding, side="right")

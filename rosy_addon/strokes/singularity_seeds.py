@@ -3,8 +3,8 @@
 Near a singularity of index i, the lines of the field are parallel lines on a cone, which
 z -> z^(1 - i) unrolls. A line is nearest to the apex where its member is perpendicular to the
 direction from the apex. If the nearest lines have the same distance in all sectors, the spacing is
-consistent all around the singularity. A front of strokes that arrives from elsewhere is not, and
-would pass too near to the singularity on one side.
+consistent all around the singularity. Without these seeds, strokes would reach the singularity from
+elsewhere, at different distances in different sectors.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ class Strokes:
     def arc_distance(self, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
         """Return (m,) float64: the distances along strokes between pairs of points, in world space.
 
-        On a closed stroke it is the shorter of the two ways. It is infinite if the points are on
+        On a closed stroke it is the shorter of the two directions. It is infinite if the points are on
         different strokes.
         """
         arc, stroke = self.arc, self.stroke

@@ -11,7 +11,7 @@ from ..settings import check_settings, choice, number, switch
 class StrokeStyle:
     """The settings of strokes, as shown in the panel and accepted on the command line.
 
-    To add a setting, add a field here. `rosy_addon.settings` lists what is derived from it.
+    To add a setting, add a field here. `rosy_addon.settings` says what is derived from a field.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes along the field of a mesh instance: seeding phases and collection."""
+"""Trace evenly spaced strokes on a mesh instance, from its tangent mesh to `Strokes`."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..field.frames import dot
 from ..progress import Progress, Task, run_to_completion
 from ..projection.gbuffer import MeshInstance
 from .closed_strokes import close_loops
 from .families import label_families
-from .placement import MIN_TIPS, ROUNDS_PER_SEEDING, SeparationRules, StreamlinePlacer
+from .growing_strokes import StrokeSegments
+from .placement import StreamlinePlacer
+from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
 from .separation import enforce_separation
+from .separation_rules import SeparationRules
 from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
-from .surface_particles import SurfaceParticles
-from .tangent_mesh import build_tangent_mesh, corner_values, nearest_member
+from .tangent_mesh import build_tangent_mesh, corner_values
 
-#: Candidate seeds per area of one squared spacing.
-PROBE_DENSITY = 0.35
+#: Steps between two rounds of seeding, and the number of tips below which seeds are added at every
+#: step.
+ROUNDS_PER_SEEDING, MIN_TIPS = 3, 64
 
 #: Distance in spacings between seeds that are added at once: in the first round, and the value at
 #: which rounds stop. Each round divides it by 4.
@@ -111,22 +113,22 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     placer.rules = replace(
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
-    placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing))
+    placer.add_seeds(seeds_around_singularities(placer.mesh, placer.corner_spacing))
     for _ in range(WARMUP_STEPS):
-        if len(placer.tips.stroke):
+        if len(placer.tips):
             placer.step()
     placer.suspend()
-    seeds = candidate_seeds(placer)
-    seeds = seeds.take(uncovered_seeds(placer, seeds))
-    seed_spacing = MAX_SEED_SPACING
+    seeds = candidate_seeds(placer.mesh, placer.corner_spacing)
+    seeds = uncovered_seeds(placer.samples, seeds)
+    seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.corner_spacing))
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     while len(seeds):
-        placer.add_seeds(seeds.take(thinned_seeds(placer, seeds, seed_spacing)))
+        placer.add_seeds(thinned_seeds(placer.mesh, seeds, seed_spacing * median_spacing))
         yield from _grow_until(placer, label, STRAGGLER_RATIO)
         if seed_spacing <= MIN_SEED_SPACING:
             break
         seed_spacing /= 4
-        seeds = seeds.take(uncovered_seeds(placer, seeds))
+        seeds = uncovered_seeds(placer.samples, seeds)
     placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     fill_rules = replace(
@@ -146,16 +148,16 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     """
     rounds, max_tips = 0, 0
     while True:
-        if rounds % ROUNDS_PER_SEEDING == 0 or len(placer.tips.stroke) < MIN_TIPS:
+        if rounds % ROUNDS_PER_SEEDING == 0 or len(placer.tips) < MIN_TIPS:
             seeded = placer.seed_neighbors()
-            if not seeded and not len(placer.tips.stroke):
-                if not len(placer.open_sides):
+            if not seeded and not len(placer.tips):
+                if not placer.samples.has_open_sides:
                     return
                 if not placer.seed_neighbors() and not placer.seed_neighbors():
                     return
-            fraction = placer.samples.count / max(placer.expected_samples, 1)
+            fraction = placer.samples.count / max(placer.samples.expected_count, 1)
             yield Progress(min(fraction, 0.99), label)
-        tip_count = len(placer.tips.stroke)
+        tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
             return
@@ -164,73 +166,15 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
         rounds += 1
 
 
-def candidate_seeds(placer: StreamlinePlacer) -> SurfaceParticles:
-    """Return seeds at evenly distributed points of the mesh, one for each line at each point."""
-    mesh = placer.mesh
-    spacing = placer.spacing.mean(axis=1)
-    cumulative = np.cumsum(PROBE_DENSITY * mesh.area / spacing**2 * (mesh.z != 0).any(axis=1))
-    count = int(np.ceil(cumulative[-1]))
-    triangle = np.searchsorted(cumulative, (np.arange(count) + 0.5) * cumulative[-1] / count)
-    triangle = np.minimum(triangle, len(cumulative) - 1).astype(np.int32)
-    # A low-discrepancy sequence within triangles: multiples of irrational numbers.
-    u = np.modf((np.arange(count) + 1) * 0.7548776662466927)[0]
-    v = np.modf((np.arange(count) + 1) * 0.5698402909980532)[0]
-    fold = u + v > 1
-    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    weights = np.stack([1 - u - v, u, v], axis=1)
-    z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
-    member = nearest_member(np.ones(count, dtype=complex), z, mesh.degree)
-    rotations = np.exp(2j * np.pi * np.arange(mesh.family_count) / mesh.degree)
-    seeds = SurfaceParticles(
-        np.repeat(triangle, mesh.family_count),
-        np.repeat(weights, mesh.family_count, axis=0),
-        (member[:, None] * rotations).ravel(),
-        np.ones(count * mesh.family_count),
-    )
-    return seeds.take(np.flatnonzero(seeds.member != 0))
-
-
-def uncovered_seeds(placer: StreamlinePlacer, seeds: SurfaceParticles) -> np.ndarray:
-    """Return the numbers of seeds that have no stroke of their family near."""
-    if not len(seeds):
-        return np.empty(0, dtype=np.intp)
-    return np.flatnonzero(placer.is_uncovered(seeds))
-
-
-def thinned_seeds(
-    placer: StreamlinePlacer, seeds: SurfaceParticles, seed_spacing: float
-) -> np.ndarray:
-    """Return the numbers of seeds at points that are about `seed_spacing` spacings apart.
-
-    All seeds at a chosen point are returned, one for each line.
-    """
-    if not len(seeds):
-        return np.empty(0, dtype=np.intp)
-    position = placer.mesh.points_at(seeds.triangle, seeds.weights)
-    low, cell_size = position.min(axis=0), seed_spacing * float(np.median(placer.spacing))
-    # Divide the bounding box into cells, and choose the point nearest to the center of each cell.
-    cell_counts = np.maximum(np.ceil(np.ptp(position, axis=0) / cell_size), 1)
-    grid_position = (position - low) * cell_counts / np.maximum(np.ptp(position, axis=0), 1e-300)
-    cell = np.minimum(np.floor(grid_position), cell_counts - 1)
-    center_offset = grid_position - cell - 0.5
-    cell_index = (cell[:, 0] * cell_counts[1] + cell[:, 1]) * cell_counts[2] + cell[:, 2]
-    order = np.lexsort((np.round(dot(center_offset, center_offset), 9), cell_index))
-    first = order[np.unique(cell_index[order], return_index=True)[1]]
-    cell_rank = np.searchsorted(cell_index[first], cell_index)
-    to_chosen = position - position[first[cell_rank]]
-    return np.flatnonzero(dot(to_chosen, to_chosen) == 0)
-
-
 def collect_strokes(placer: StreamlinePlacer) -> Strokes:
     """Return the strokes of a placer. They are all in one family; see `label_families`."""
     mesh, samples = placer.mesh, placer.samples
-    stroke, sign, triangle, begin, weights, direction = (
-        np.concatenate(column) for column in zip(*placer.segments, strict=True)
+    segments = StrokeSegments(
+        *(np.concatenate(column) for column in zip(*placer.segments, strict=True))
     )
-    alive = placer.strokes.alive[: placer.strokes.count]
-    keep = np.flatnonzero(alive[stroke])
-    stroke, sign, triangle, begin, weights, direction = (
-        column[keep] for column in (stroke, sign, triangle, begin, weights, direction)
+    keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
+    stroke, sign, triangle, begin_weights, weights, direction = (
+        column[keep] for column in segments
     )
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
@@ -239,11 +183,13 @@ def collect_strokes(placer: StreamlinePlacer) -> Strokes:
     last_backward = np.full(placer.strokes.count, -1)
     last_backward[stroke[backward]] = backward
     last_backward = last_backward[stroke_ids]
-    seed, from_seed = placer.strokes.seed[stroke_ids], last_backward[:, None] < 0
+    seed, from_seed = placer.strokes.seed_sample[stroke_ids], last_backward[:, None] < 0
     first_triangle = np.where(last_backward < 0, samples.triangle[seed], triangle[last_backward])
     first_weights = np.where(from_seed, samples.weights[seed], weights[last_backward])
-    first_direction = np.where(last_backward < 0, samples.own_way[seed], -direction[last_backward])
-    weights[backward] = begin[backward]
+    first_direction = np.where(
+        last_backward < 0, samples.local_direction[seed], -direction[last_backward]
+    )
+    weights[backward] = begin_weights[backward]
     rank = sign * (np.arange(len(stroke)) + 1.0)
     order = np.lexsort(
         (
@@ -258,7 +204,7 @@ def collect_strokes(placer: StreamlinePlacer) -> Strokes:
     row = np.searchsorted(stroke_ids, stroke)
     points = mesh.points_at(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
-    spacing = np.einsum("nk,nk->n", weights, placer.spacing[triangle])
+    spacing = np.einsum("nk,nk->n", weights, placer.corner_spacing[triangle])
     return Strokes(
         points=points,
         start=start,

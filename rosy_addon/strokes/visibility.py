@@ -237,7 +237,7 @@ def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
 
 
 def _remove_specks(visible: np.ndarray, pixels: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Close short gaps in (n,) visibility, then remove short visible runs; see `MIN_RUN_PX`."""
+    """Fill short hidden runs of (n,) points, then remove short visible runs; see `MIN_RUN_PX`."""
     arc = arc_lengths(np.nan_to_num(np.column_stack([pixels, np.zeros(len(pixels))])), start)
     for value in (False, True):
         visible = _flip_short_runs(visible, arc, start, value)

@@ -9,7 +9,7 @@ from rosy_addon.compositor.shading import lights_of
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.pipeline import draw_bodies
+from rosy_addon.strokes.pipeline import draw_instances
 from rosy_addon.strokes.stroke_set import Strokes
 from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.visibility import project_to_pixels
@@ -41,8 +41,8 @@ def write() -> None:
     )
     camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
     panels = []
-    for label, manner in DRAWN.items():
-        strokes = draw_bodies([instance], camera, manner, lights=lights_of(manner, ())).strokes
+    for label, style in DRAWN.items():
+        strokes = draw_instances([instance], camera, style, lights=lights_of(style, ())).strokes
         panels.append(Panel(rastered(strokes, camera), label))
     save(sheet([panels]), IMAGES / "strokes.png")
 

@@ -1,4 +1,4 @@
-"""Drawings of several bodies: what is in them, how dense it is, and the lines that are made of them."""
+"""Drawings of several instances: families, density, light, and the geometry of the strokes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.strokes.pipeline import (
-    draw_bodies,
+    draw_instances,
     offset_toward_camera,
     simplify_strokes,
     stroke_geometry,
@@ -22,135 +22,159 @@ from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.svg import Pen
 from rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 
-STILL = np.eye(4)
+IDENTITY = np.eye(4)
 ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))
-BALL = MeshInstance(icosphere(3), STILL, generate(icosphere(3), "smoothest", 4))
+SPHERE = MeshInstance(icosphere(3), IDENTITY, generate(icosphere(3), "smoothest", 4))
 CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.radians(40))
 
 
-def test_families_of_several_bodies_are_one_by_name():
-    six = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
-    screen = MeshInstance(plane(), moved(z=-1.0))
-    made = draw_bodies([screen, BALL, six], CAMERA, StrokeStyle(spacing=12, outline=True))
-    names = made.strokes.names
-    assert names == ("family 1", "family 2", "family 3", "silhouettes", "creases", "borders")
-    for instance, families in ((1, {0, 1}), (2, {0, 1, 2})):
-        own = set(made.strokes.family[made.body_index == instance].tolist())
-        assert own - {3, 4, 5} == families and 3 in own
-    assert set(made.body_index.tolist()) == {1, 2}
-    # Points are on the sphere that their body is.
-    middle = np.where((made.body_index == 1)[made.strokes.stroke, None], 0.0, [0.9, 0, 0])
-    assert np.abs(np.linalg.norm(made.strokes.points - middle, axis=1) - 1).max() < 0.02
+def test_families_of_several_instances_are_merged_by_name():
+    degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
+    occluder = MeshInstance(plane(), moved(z=-1.0))
+    drawing = draw_instances(
+        [occluder, SPHERE, degree_6], CAMERA, StrokeStyle(spacing=12, outline=True)
+    )
+    strokes = drawing.strokes
+    assert strokes.names == (
+        "family 1",
+        "family 2",
+        "family 3",
+        "silhouettes",
+        "creases",
+        "borders",
+    )
+    for instance, expected in ((1, {0, 1}), (2, {0, 1, 2})):
+        families = set(strokes.family[drawing.instance_index == instance].tolist())
+        assert families - {3, 4, 5} == expected and 3 in families
+    assert set(drawing.instance_index.tolist()) == {1, 2}
+    # Points are on the sphere of their instance.
+    is_first = (drawing.instance_index == 1)[strokes.stroke]
+    center = np.where(is_first[:, None], 0.0, [0.9, 0, 0])
+    assert np.abs(np.linalg.norm(strokes.points - center, axis=1) - 1).max() < 0.02
 
 
-def test_a_floor_that_runs_on_behind_the_eye_is_drawn():
-    """Spacings in pixels are next to nothing beside the eye; nobody looks there."""
+def test_a_floor_that_continues_behind_the_camera_is_drawn():
+    """Beside the camera, outside the frame, spacings in pixels are almost zero in world space."""
     surface = plane(60, 60, size=40.0)
-    floor = MeshInstance(surface, STILL, generate(surface, ALONG_X, 2))
+    floor = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
     camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
-    made = draw_bodies([floor], camera, StrokeStyle(spacing=10))
-    pixels, depth = project_to_pixels(made.strokes.points, camera)
-    assert len(made.strokes) > 10 and depth.min() > 0
+    drawing = draw_instances([floor], camera, StrokeStyle(spacing=10))
+    pixels, depth = project_to_pixels(drawing.strokes.points, camera)
+    assert len(drawing.strokes) > 10 and depth.min() > 0
     assert (pixels >= -1e-6).all() and (pixels <= np.array([200, 150]) + 1e-6).all()
 
 
 @pytest.mark.parametrize("distance", [0.1, 0.2])
-def test_spacings_in_units_do_not_ask_the_camera(distance):
-    square = MeshInstance(plane(8, 8), STILL, generate(plane(8, 8), ALONG_X, 2))
+def test_spacings_in_world_units_do_not_depend_on_the_camera(distance):
+    square = MeshInstance(plane(8, 8), IDENTITY, generate(plane(8, 8), ALONG_X, 2))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
-    made = draw_bodies([square], camera, StrokeStyle(unit="world", distance=distance, hidden=True))
-    # The area, 2 by 2, over the distance.
-    assert np.isclose(made.strokes.length.sum(), 4 / distance, rtol=0.12)
+    drawing = draw_instances(
+        [square], camera, StrokeStyle(unit="world", distance=distance, hidden=True)
+    )
+    # The total length is the area, 2 by 2, divided by the distance.
+    assert np.isclose(drawing.strokes.length.sum(), 4 / distance, rtol=0.12)
 
 
 def test_light_is_that_of_lambert():
-    """In closed form on a sphere, whose normals are its points."""
-    normal = normalize(BALL.surface.vertices)
-    turn = CAMERA.view[:3, :3]
+    """The tones are in closed form on a sphere, whose normals are its points."""
+    normal = normalize(SPHERE.surface.vertices)
+    rotation = CAMERA.view[:3, :3]
     sun = Light("sun", np.array([0.6, 0.0, 0.8]), np.ones(3), 0.7)
-    place = np.array([0.3, -1.7, 2.0])
-    point = Light("point", turn @ place + CAMERA.view[:3, 3], np.array([0, 1.0, 0]), 1.5)
-    bright = 0.7 * np.maximum(normal @ (turn.T @ sun.vector), 0)
-    np.testing.assert_allclose(lit_tone(BALL, CAMERA, [sun]), bright, atol=0.01)
-    way = place - BALL.surface.vertices
-    near = 1.5 * 0.7152 * np.maximum(dot(normal, normalize(way)), 0) / dot(way, way)
-    np.testing.assert_allclose(lit_tone(BALL, CAMERA, [point]), np.minimum(near, 1), atol=0.01)
-    both = np.minimum(bright + near, 1)
-    np.testing.assert_allclose(lit_tone(BALL, CAMERA, [sun, point]), both, atol=0.02)
+    position = np.array([0.3, -1.7, 2.0])
+    point = Light("point", rotation @ position + CAMERA.view[:3, 3], np.array([0, 1.0, 0]), 1.5)
+    sun_tone = 0.7 * np.maximum(normal @ (rotation.T @ sun.vector), 0)
+    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun]), sun_tone, atol=0.01)
+    to_light = position - SPHERE.surface.vertices
+    cosine = np.maximum(dot(normal, normalize(to_light)), 0)
+    point_tone = 1.5 * 0.7152 * cosine / dot(to_light, to_light)
+    np.testing.assert_allclose(
+        lit_tone(SPHERE, CAMERA, [point]), np.minimum(point_tone, 1), atol=0.01
+    )
+    both = np.minimum(sun_tone + point_tone, 1)
+    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun, point]), both, atol=0.02)
 
 
-def test_light_makes_room():
-    manner = StrokeStyle(unit="world", distance=0.05, tone=True)
-    made = draw_bodies([BALL], CAMERA, manner, lights=[KEY_LIGHT]).strokes
-    light = normalize(made.points) @ (CAMERA.view[:3, :3].T @ KEY_LIGHT.vector)
-    assert made.spacing[light > 0.8].mean() > 2.5 * made.spacing[light < 0.0].mean()
-    assert light.max() < 0.97 and made.width[light > 0.9].max() < 0.35
-    # One family in the lights, both in the dark.
-    families = [np.unique(made.family[made.stroke][part]) for part in (light > 0.75, light < 0.2)]
-    assert [len(found) for found in families] == [1, 2]
+def test_spacing_is_wider_in_the_light():
+    style = StrokeStyle(unit="world", distance=0.05, tone=True)
+    strokes = draw_instances([SPHERE], CAMERA, style, lights=[KEY_LIGHT]).strokes
+    light = normalize(strokes.points) @ (CAMERA.view[:3, :3].T @ KEY_LIGHT.vector)
+    assert strokes.spacing[light > 0.8].mean() > 2.5 * strokes.spacing[light < 0.0].mean()
+    assert light.max() < 0.97 and strokes.width[light > 0.9].max() < 0.35
+    # There is one family in the lights, and both in the dark.
+    family = strokes.family[strokes.stroke]
+    assert [len(np.unique(family[tone])) for tone in (light > 0.75, light < 0.2)] == [1, 2]
 
 
-def test_thinned_lines_miss_nothing():
-    strokes = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12)).strokes
-    thin = simplify_strokes(strokes, CAMERA)
-    assert len(thin) == len(strokes) and len(thin.points) < 0.5 * len(strokes.points)
-    np.testing.assert_array_equal(thin.points[thin.start[:-1]], strokes.points[strokes.start[:-1]])
-    # Every point that was left out is near the piece between those that stayed.
+def test_simplified_strokes_are_within_the_tolerance():
+    strokes = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12)).strokes
+    simplified = simplify_strokes(strokes, CAMERA)
+    assert len(simplified) == len(strokes)
+    assert len(simplified.points) < 0.5 * len(strokes.points)
+    np.testing.assert_array_equal(
+        simplified.points[simplified.start[:-1]], strokes.points[strokes.start[:-1]]
+    )
+    # Every removed point is near a segment of the simplified stroke.
     pixel = pixel_size(strokes.points, CAMERA)
-    worst = 0.0
+    max_distance = 0.0
     for number in range(len(strokes)):
-        was = slice(*strokes.start[number : number + 2])
-        left = thin.points[slice(*thin.start[number : number + 2])]
-        along = np.diff(left, axis=0)
-        off = strokes.points[was][:, None] - left[:-1]
-        share = np.einsum("nki,ki->nk", off, along) / (along**2).sum(axis=1)
-        off = off - np.clip(share, 0, 1)[..., None] * along
-        nearest = np.sqrt((off**2).sum(axis=2)).min(axis=1)
-        worst = max(worst, float((nearest / pixel[was]).max()))
-    assert worst < 0.11
+        span = slice(*strokes.start[number : number + 2])
+        kept = simplified.points[slice(*simplified.start[number : number + 2])]
+        chord = np.diff(kept, axis=0)
+        delta = strokes.points[span][:, None] - kept[:-1]
+        fraction = np.einsum("nki,ki->nk", delta, chord) / (chord**2).sum(axis=1)
+        delta = delta - np.clip(fraction, 0, 1)[..., None] * chord
+        distance = np.sqrt((delta**2).sum(axis=2)).min(axis=1)
+        max_distance = max(max_distance, float((distance / pixel[span]).max()))
+    assert max_distance < 0.11
 
 
 @pytest.mark.parametrize("ortho", [False, True])
-def test_lifted_lines_stay_in_the_picture_and_off_the_surface(ortho):
+def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho):
     camera = CAMERA
     if ortho:
         camera = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, scale=2.5)
-    strokes = draw_bodies([BALL], camera, StrokeStyle(spacing=12)).strokes
+    strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=12)).strokes
     points = offset_toward_camera(strokes, camera, 2.0)
-    before, depth = project_to_pixels(strokes.points, camera)
-    after, nearer = project_to_pixels(points, camera)
-    np.testing.assert_allclose(after, before, atol=1e-6)
+    pixels, depth = project_to_pixels(strokes.points, camera)
+    offset_pixels, offset_depth = project_to_pixels(points, camera)
+    np.testing.assert_allclose(offset_pixels, pixels, atol=1e-6)
     pixel = pixel_size(strokes.points, camera)
-    assert ((depth - nearer) / pixel > 1.9).all()
-    # A ribbon of 2 pixels reaches into the slope by 1 pixel times its steepness.
+    assert ((depth - offset_depth) / pixel > 1.9).all()
+    # A ribbon of 2 pixels extends into a slope by 1 pixel times its steepness.
     eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    toward = normalize(eye - strokes.points) if not ortho else camera.view[2, :3]
-    facing = dot(strokes.normal, np.broadcast_to(toward, strokes.points.shape))
-    clear = facing > 0.15
-    slope = np.sqrt(1 - facing[clear] ** 2) / facing[clear]
-    lift = np.linalg.norm(points - strokes.points, axis=1)[clear]
-    assert (lift / pixel[clear] > slope).all()
+    to_camera = normalize(eye - strokes.points) if not ortho else camera.view[2, :3]
+    facing = dot(strokes.normal, np.broadcast_to(to_camera, strokes.points.shape))
+    compared = facing > 0.15
+    steepness = np.sqrt(1 - facing[compared] ** 2) / facing[compared]
+    offset = np.linalg.norm(points - strokes.points, axis=1)[compared]
+    assert (offset / pixel[compared] > steepness).all()
 
 
-def test_lines_have_the_width_of_the_pen():
-    made = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12, taper=0.0))
-    lines = stroke_geometry(made, CAMERA, Pen(width=3.0, colours=["#112233", "#445566"]))
-    np.testing.assert_allclose(2 * lines.radius / pixel_size(lines.points, CAMERA), 3.0)
-    assert lines.colors == ["#112233", "#445566"]
-    hidden = draw_bodies([BALL], CAMERA, StrokeStyle(spacing=12, hidden=True))
-    raised = stroke_geometry(hidden, CAMERA, Pen(width=3.0)).points
-    assert np.linalg.norm(raised, axis=1).min() > 1 and len(hidden.strokes) > len(made.strokes)
+def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
+    drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, taper=0.0))
+    geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colours=["#112233", "#445566"]))
+    np.testing.assert_allclose(2 * geometry.radius / pixel_size(geometry.points, CAMERA), 3.0)
+    assert geometry.colors == ["#112233", "#445566"]
+    hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, hidden=True))
+    offset_points = stroke_geometry(hidden, CAMERA, Pen(width=3.0)).points
+    assert np.linalg.norm(offset_points, axis=1).min() > 1 and len(hidden.strokes) > len(
+        drawing.strokes
+    )
 
 
-def test_what_is_wrong_is_said(error_of):
-    assert "there is no field" in error_of(draw_bodies, [MeshInstance(plane(), STILL)], CAMERA)
-    behind = MeshInstance(BALL.surface, moved(y=-50.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [behind], CAMERA)
-    unseen = draw_bodies([behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False)
+def test_errors(error_of):
+    assert "there is no field" in error_of(
+        draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA
+    )
+    behind = MeshInstance(SPHERE.surface, moved(y=-50.0), SPHERE.field)
+    assert "sees none" in error_of(draw_instances, [behind], CAMERA)
+    unseen = draw_instances(
+        [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
+    )
     assert 20 < len(unseen.strokes) < 2000
-    assert "no room" in error_of(draw_bodies, [BALL], CAMERA, StrokeStyle(spacing=500))
-    away = MeshInstance(BALL.surface, moved(x=9.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [away], CAMERA)
+    assert "no room" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
+    away = MeshInstance(SPHERE.surface, moved(x=9.0), SPHERE.field)
+    assert "sees none" in error_of(draw_instances, [away], CAMERA)
     assert "setting 'spacing' is 0, not from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
     assert "'sun', not one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")

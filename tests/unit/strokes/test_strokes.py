@@ -1,4 +1,4 @@
-"""Strokes: where they run, how far apart, what hides them, and what is written of them."""
+"""Strokes: directions, spacing, families, visibility, and SVG files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from shapes import cube, cylinder, icosphere, plane, torus
 
 from bench.stroke_spacing import lateral_gaps
 from rosy_addon.cli import main
-from rosy_addon.field.frames import dot, normalize, transport
+from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames
@@ -24,12 +24,13 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
 from rosy_addon.strokes.crossings import cut_intervals, find_crossings, with_crossing_gaps
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.head_on_ends import head_on_ends
 from rosy_addon.strokes.outline import outline
-from rosy_addon.strokes.placement import SeparationRules
 from rosy_addon.strokes.separation import enforce_separation
+from rosy_addon.strokes.separation_rules import SeparationRules
 from rosy_addon.strokes.singularity_seeds import singularities
 from rosy_addon.strokes.spacing import (
     headlight_tone,
@@ -47,135 +48,137 @@ from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy_addon.strokes.trace import trace_strokes
 from rosy_addon.strokes.visibility import clip_to_visible, project_to_pixels
 
-STILL = np.eye(4)
+IDENTITY = np.eye(4)
 
 
-def body_of(surface, degree, angle=0.0, kind=None):
-    """With a field at an angle to the first edges of the faces, or a generated one."""
+def instance_of(surface, degree, angle=0.0, kind=None):
+    """Return an instance with a field at an angle to the first edges of faces, or a generated one."""
     if kind is not None:
-        return MeshInstance(surface, STILL, generate(surface, kind, degree))
+        return MeshInstance(surface, IDENTITY, generate(surface, kind, degree))
     x, y = face_frames(surface)
-    return MeshInstance(surface, STILL, RosyField(degree, np.cos(angle) * x + np.sin(angle) * y))
+    return MeshInstance(surface, IDENTITY, RosyField(degree, np.cos(angle) * x + np.sin(angle) * y))
 
 
-def straight_pieces(strokes):
-    """Starts and ends of the pieces, and the triangles that they lie in."""
-    stroke = strokes.stroke
-    end = np.flatnonzero(np.diff(stroke, prepend=-1) == 0)
+def segments_of(strokes):
+    """Return the starts and ends of all segments, and their triangles."""
+    end = np.flatnonzero(np.diff(strokes.stroke, prepend=-1) == 0)
     return strokes.points[end - 1], strokes.points[end], strokes.triangle[end]
 
 
-def degrees_off(ground, strokes, shares=(0.0, 0.5, 1.0)):
-    """By how many degrees pieces are off the nearest member, at points along them."""
-    start, end, triangle = straight_pieces(strokes)
-    long = np.linalg.norm(end - start, axis=1) > 1e-9 * np.abs(strokes.points).max()
-    start, end, triangle = start[long], end[long], triangle[long]
-    way = normalize(end - start)
-    flat = dot(way, ground.x[triangle]) + 1j * dot(way, ground.y[triangle])
-    flat /= np.abs(flat)
-    worst = np.zeros(len(start))
-    for share in shares:
-        point = start + share * (end - start)
-        corner = ground.points[triangle]
-        local = np.stack(
-            [
-                dot(point - corner[:, 0], ground.x[triangle]),
-                dot(point - corner[:, 0], ground.y[triangle]),
-            ],
-            axis=1,
-        )
-        flat_corner = [
-            np.stack(
-                [dot(corner[:, k] - corner[:, 0], axis[triangle]) for axis in (ground.x, ground.y)],
-                1,
-            )
-            for k in (1, 2)
-        ]
-        matrix = np.stack(flat_corner, axis=2)
-        two = np.linalg.solve(matrix, local[..., None])[..., 0]
-        weights = np.column_stack([1 - two.sum(axis=1), two])
-        z = np.einsum("nk,nk->n", weights, ground.z[triangle])
-        both = 1 if ground.degree % 2 == 0 else 2  # forward or backward along a member
-        off = np.angle((z * (flat.conj() ** ground.degree)) ** both) / (both * ground.degree)
-        worst = np.maximum(worst, np.degrees(np.abs(off)))
-    return worst
+def direction_errors(mesh, strokes, fractions=(0.0, 0.5, 1.0)):
+    """Return the angles in degrees between segments and the nearest member at points along them."""
+    start, end, triangle = segments_of(strokes)
+    is_long = np.linalg.norm(end - start, axis=1) > 1e-9 * np.abs(strokes.points).max()
+    start, end, triangle = start[is_long], end[is_long], triangle[is_long]
+    direction = normalize(end - start)
+    tangent = dot(direction, mesh.x[triangle]) + 1j * dot(direction, mesh.y[triangle])
+    tangent /= np.abs(tangent)
+    corner = mesh.points[triangle]
+    edges = [planar(mesh, triangle, corner[:, k] - corner[:, 0]) for k in (1, 2)]
+    matrix = np.stack(edges, axis=2)
+    max_error = np.zeros(len(start))
+    for fraction in fractions:
+        point = planar(mesh, triangle, start + fraction * (end - start) - corner[:, 0])
+        last_weights = np.linalg.solve(matrix, point[..., None])[..., 0]
+        weights = np.column_stack([1 - last_weights.sum(axis=1), last_weights])
+        z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
+        # Segments run forward or backward along a member.
+        power = 1 if mesh.degree % 2 == 0 else 2
+        error = np.angle((z * (tangent.conj() ** mesh.degree)) ** power) / (power * mesh.degree)
+        max_error = np.maximum(max_error, np.degrees(np.abs(error)))
+    return max_error
 
 
-def too_near(strokes, lines, least=0.5):
-    """(k,) distances in spacings of points nearer to another stroke of their family than they may.
+def planar(mesh, triangle, vectors):
+    """Return the (n, 2) components of (n, 3) vectors in the frames of triangles."""
+    return np.stack([dot(vectors, axis[triangle]) for axis in (mesh.x, mesh.y)], axis=1)
 
-    Plain geometry: polylines cut finely, a tree, and the angle between tangents as it looks along
-    the mean normal. A stroke is another to itself past three spacings of its length.
+
+def too_close_distances(strokes, line_count, min_separation=0.5):
+    """Return (k,) distances in spacings between points of one family that are too close.
+
+    This uses plain geometry: finely sampled polylines, a k-d tree, and the angle between tangents
+    projected along the mean normal. Points of one stroke are compared if they are more than three
+    spacings apart along it.
     """
     scipy = pytest.importorskip("scipy.spatial")
-    place, way, normal, spacing, stroke, arc = map(
-        np.concatenate, zip(*_cut_finely(strokes), strict=True)
+    position, direction, normal, spacing, stroke, arc = map(
+        np.concatenate, zip(*resampled(strokes), strict=True)
     )
-    one, two = scipy.cKDTree(place).query_pairs(least * spacing.max(), output_type="ndarray").T
-    apart = np.abs(arc[one] - arc[two])
-    total = strokes.length[stroke[one]]
-    apart = np.where(strokes.closed[stroke[one]], np.minimum(apart, total - apart), apart)
-    other = (stroke[one] != stroke[two]) | (apart > 3 * spacing[one])
-    one, two = one[other], two[other]
-    gap = place[two] - place[one]
-    distance = np.linalg.norm(gap, axis=1)
-    above = normalize(normal[one] + normal[two])
-    near = distance < least * np.minimum(spacing[one], spacing[two])
-    near &= dot(normal[one], normal[two]) > 0.3  # else an edge is between them, or a thin sheet
-    near &= np.abs(dot(gap, above)) <= 0.5 * distance
-    a, b = (normalize(w - dot(w, above)[:, None] * above) for w in (way[one], way[two]))
-    near &= np.degrees(np.arccos(np.clip(np.abs(dot(a, b)), 0, 1))) < 90 / lines
-    return (distance / spacing[one])[near]
+    tree = scipy.cKDTree(position)
+    a, b = tree.query_pairs(min_separation * spacing.max(), output_type="ndarray").T
+    arc_gap = np.abs(arc[a] - arc[b])
+    total = strokes.length[stroke[a]]
+    arc_gap = np.where(strokes.closed[stroke[a]], np.minimum(arc_gap, total - arc_gap), arc_gap)
+    distinct = (stroke[a] != stroke[b]) | (arc_gap > 3 * spacing[a])
+    a, b = a[distinct], b[distinct]
+    delta = position[b] - position[a]
+    distance = np.linalg.norm(delta, axis=1)
+    mean_normal = normalize(normal[a] + normal[b])
+    too_close = distance < min_separation * np.minimum(spacing[a], spacing[b])
+    # Otherwise there is an edge or a thin sheet between them.
+    too_close &= dot(normal[a], normal[b]) > 0.3
+    too_close &= np.abs(dot(delta, mean_normal)) <= 0.5 * distance
+    tangent_a, tangent_b = (
+        normalize(tangent - dot(tangent, mean_normal)[:, None] * mean_normal)
+        for tangent in (direction[a], direction[b])
+    )
+    angle = np.degrees(np.arccos(np.clip(np.abs(dot(tangent_a, tangent_b)), 0, 1)))
+    too_close &= angle < 90 / line_count
+    return (distance / spacing[a])[too_close]
 
 
-def _cut_finely(strokes, share=0.05):
-    """Of each stroke points, tangents, normals, spacings, its number and how far along they are."""
-    for number, (a, b) in enumerate(pairwise(strokes.start)):
-        points = strokes.points[a:b]
-        piece = np.diff(points, axis=0)
-        size = np.linalg.norm(piece, axis=1)
-        arc = np.concatenate([[0], np.cumsum(size)])
-        at = np.linspace(0, arc[-1], int(arc[-1] / (share * strokes.spacing[a:b].min())) + 2)
-        before = np.clip(np.searchsorted(arc, at, side="right") - 1, 0, len(size) - 1)
-        part = (at - arc[before]) / np.maximum(size[before], 1e-300)
-        long = normalize(piece)[before]
+def resampled(strokes, step=0.05):
+    """Yield, for each stroke, columns of points that are at most `step` spacings apart.
+
+    The columns are position, direction, normal, spacing, number of the stroke, and arc length.
+    """
+    for number, (first, last) in enumerate(pairwise(strokes.start)):
+        points = strokes.points[first:last]
+        segment = np.diff(points, axis=0)
+        length = np.linalg.norm(segment, axis=1)
+        arc = np.concatenate([[0], np.cumsum(length)])
+        count = int(arc[-1] / (step * strokes.spacing[first:last].min())) + 2
+        sample_arc = np.linspace(0, arc[-1], count)
+        before = np.clip(np.searchsorted(arc, sample_arc, side="right") - 1, 0, len(length) - 1)
+        fraction = (sample_arc - arc[before]) / np.maximum(length[before], 1e-300)
         yield (
-            points[before] + part[:, None] * piece[before],
-            long,
-            strokes.normal[a:b][before],
-            strokes.spacing[a:b][before],
-            np.full(len(at), number),
-            at,
+            points[before] + fraction[:, None] * segment[before],
+            normalize(segment)[before],
+            strokes.normal[first:last][before],
+            strokes.spacing[first:last][before],
+            np.full(len(sample_arc), number),
+            sample_arc,
         )
 
 
-def nearest_others(strokes):
-    """By brute force, of strokes of one family: the least distance between points of different ones."""
-    stroke, least = strokes.stroke, np.inf
+def min_distance_by_brute_force(strokes):
+    """Return the smallest distance between points of different strokes of one family."""
+    stroke, min_distance = strokes.stroke, np.inf
     for first in range(0, len(stroke), 500):
-        part = slice(first, first + 500)
-        apart = np.linalg.norm(strokes.points[part, None] - strokes.points[None], axis=2)
-        apart[stroke[part, None] == stroke[None]] = np.inf
-        least = min(least, apart.min())
-    return least
+        batch = slice(first, first + 500)
+        distance = np.linalg.norm(strokes.points[batch, None] - strokes.points[None], axis=2)
+        distance[stroke[batch, None] == stroke[None]] = np.inf
+        min_distance = min(min_distance, distance.min())
+    return min_distance
 
 
-# --- where strokes run -----------------------------------------------------------------------------
+# --- directions ------------------------------------------------------------------------------------
 
 
 @settings(max_examples=12, deadline=None)
 @given(st.floats(0, np.pi), st.integers(1, 6), st.integers(1, 7))
 def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cells):
-    instance = body_of(plane(cells, cells), degree, angle)
-    drawn = trace_strokes(instance, 0.2)
-    chord = drawn.points[drawn.start[1:] - 1] - drawn.points[drawn.start[:-1]]
-    assert np.allclose(np.linalg.norm(chord, axis=1), drawn.length, rtol=1e-6)
-    turn = np.angle(np.exp(1j * angle) / (chord[:, 0] + 1j * chord[:, 1]))
-    lines = degree if degree % 2 else degree // 2
-    off = (turn * lines / np.pi + 0.5) % 1 - 0.5
-    assert np.abs(off).max() < 1e-4
-    assert np.abs(drawn.points).max() <= 1 + 1e-9
-    gaps = lateral_gaps(build_tangent_mesh(instance), drawn)
+    instance = instance_of(plane(cells, cells), degree, angle)
+    strokes = trace_strokes(instance, 0.2)
+    chord = strokes.points[strokes.start[1:] - 1] - strokes.points[strokes.start[:-1]]
+    assert np.allclose(np.linalg.norm(chord, axis=1), strokes.length, rtol=1e-6)
+    chord_angle = np.angle(np.exp(1j * angle) / (chord[:, 0] + 1j * chord[:, 1]))
+    line_count = degree if degree % 2 else degree // 2
+    error = (chord_angle * line_count / np.pi + 0.5) % 1 - 0.5
+    assert np.abs(error).max() < 1e-4
+    assert np.abs(strokes.points).max() <= 1 + 1e-9
+    gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
     assert gaps.evenness() > 0.9
     assert gaps.nearest_distance.min() > 0.5
 
@@ -183,124 +186,117 @@ def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cell
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 def test_directions_are_those_of_the_field_everywhere(degree):
     surface = icosphere(3)
-    instance = body_of(surface, degree, kind="smoothest")
-    ground = build_tangent_mesh(instance)
-    drawn = trace_strokes(instance, 0.1)
-    assert degrees_off(ground, drawn).max() < 1.0
+    instance = instance_of(surface, degree, kind="smoothest")
+    mesh = build_tangent_mesh(instance)
+    strokes = trace_strokes(instance, 0.1)
+    assert direction_errors(mesh, strokes).max() < 1.0
 
 
 def test_on_a_torus_strokes_wind_at_the_angle_of_the_field():
-    """In closed form: at an angle to the circles around the axis."""
+    """The expected direction is in closed form: at an angle to the circles around the axis."""
     angle = np.radians(25)
-    instance = body_of(torus(128, 64), 2, angle)
-    drawn = trace_strokes(instance, 0.08)
-    start, end, _ = straight_pieces(drawn)
-    middle, way = (start + end) / 2, normalize(end - start)
+    instance = instance_of(torus(128, 64), 2, angle)
+    start, end, _ = segments_of(trace_strokes(instance, 0.08))
+    middle, direction = (start + end) / 2, normalize(end - start)
     around = normalize(np.stack([-middle[:, 1], middle[:, 0], 0 * middle[:, 0]], axis=1))
-    out = normalize(middle * (1, 1, 0))
-    normal = normalize(middle - out)
-    across = np.cross(normal, around)
-    found = np.arctan2(dot(way, across), dot(way, around))
-    off = np.degrees((found - angle + np.pi / 2) % np.pi - np.pi / 2)
-    long = np.linalg.norm(end - start, axis=1) > 1e-3
-    # The field is given on flat faces, 5 degrees wide: it is that of the round torus to second order.
-    assert np.abs(off[long]).max() < 1.0
+    tube_center = normalize(middle * (1, 1, 0))
+    normal = normalize(middle - tube_center)
+    perpendicular = np.cross(normal, around)
+    found = np.arctan2(dot(direction, perpendicular), dot(direction, around))
+    error = np.degrees((found - angle + np.pi / 2) % np.pi - np.pi / 2)
+    is_long = np.linalg.norm(end - start, axis=1) > 1e-3
+    # The field is given on flat faces, 5 degrees wide. It is that of the round torus to second
+    # order.
+    assert np.abs(error[is_long]).max() < 1.0
 
 
-def test_pieces_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
-    instance = body_of(icosphere(2), 4, kind="smoothest")
-    ground, drawn = build_tangent_mesh(instance), trace_strokes(instance, 0.2)
-    start, end, triangle = straight_pieces(drawn)
+def test_segments_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
+    instance = instance_of(icosphere(2), 4, kind="smoothest")
+    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.2)
+    start, end, triangle = segments_of(strokes)
     for point in (start, end):
-        above = dot(point - ground.points[triangle, 0], ground.normal[triangle])
-        assert np.abs(above).max() < 1e-9
-    assert np.allclose(drawn.points, ground.points_at(drawn.triangle, drawn.weights))
-    assert (drawn.face == instance.surface.triangle_face[drawn.triangle]).all()
+        height = dot(point - mesh.points[triangle, 0], mesh.normal[triangle])
+        assert np.abs(height).max() < 1e-9
+    assert np.allclose(strokes.points, mesh.points_at(strokes.triangle, strokes.weights))
+    assert (strokes.face == instance.surface.triangle_face[strokes.triangle]).all()
 
 
 def test_strokes_look_like_the_render():
-    """The pixels that strokes pass hold the field that they follow."""
-    from rosy_addon.field.frames import tangent_frame, view_frame
-    from rosy_addon.projection.project import project
-
-    instance = body_of(icosphere(4), 4, kind="smoothest")
+    """Strokes have the direction of the field in the G-buffer at the pixels that they cross."""
+    instance = instance_of(icosphere(4), 4, kind="smoothest")
     camera = orbit_camera(instance.surface, 20, 30, 900, 900, perspective=False)
-    buffer = project([instance], camera)
-    shown = clip_to_visible(trace_strokes(instance, 0.1), [instance], camera)
-    end = np.flatnonzero(np.diff(shown.stroke, prepend=-1) == 0)
-    pixels, _ = project_to_pixels((shown.points[end] + shown.points[end - 1]) / 2, camera)
+    gbuffer = project([instance], camera)
+    visible = clip_to_visible(trace_strokes(instance, 0.1), [instance], camera)
+    end = np.flatnonzero(np.diff(visible.stroke, prepend=-1) == 0)
+    pixels, _ = project_to_pixels((visible.points[end] + visible.points[end - 1]) / 2, camera)
     column, row = np.floor(pixels.T).astype(int)
-    place = np.searchsorted(buffer.pixel, row * camera.width + column).clip(
-        0, len(buffer.pixel) - 1
-    )
-    same = buffer.pixel[place] == row * camera.width + column
-    same &= buffer.triangle[place] == shown.triangle[end]
-    normal = buffer.normal[place].astype(float)
-    same &= normal[:, 2] > 0.4
-    turn = camera.view[:3, :3]
-    way = normalize(shown.points[end] - shown.points[end - 1]) @ turn.T
-    flat = buffer.geometric_normal[place].astype(float)
-    eye = buffer.view_direction[place].astype(float)
-    way = transport(transport(way, flat, normal), normal, eye)
-    x, y = view_frame(eye)
-    angle = np.arctan2(dot(way, y), dot(way, x))
-    z = buffer.representation[place]
-    off = np.degrees(np.abs(np.angle(z * np.exp(-4j * angle)))) / 4
-    sharp = np.abs(z) > 0.5  # elsewhere the field turns within a pixel
-    assert (same & sharp).sum() > 1000
-    assert np.percentile(off[same & sharp], 99) < 1.0
-    assert tangent_frame is not None
+    pixel = row * camera.width + column
+    index = np.searchsorted(gbuffer.pixel, pixel).clip(0, len(gbuffer.pixel) - 1)
+    compared = gbuffer.pixel[index] == pixel
+    compared &= gbuffer.triangle[index] == visible.triangle[end]
+    normal = gbuffer.normal[index].astype(float)
+    compared &= normal[:, 2] > 0.4
+    rotation = camera.view[:3, :3]
+    direction = normalize(visible.points[end] - visible.points[end - 1]) @ rotation.T
+    geometric_normal = gbuffer.geometric_normal[index].astype(float)
+    view_direction = gbuffer.view_direction[index].astype(float)
+    direction = transport(direction, geometric_normal, normal)
+    direction = transport(direction, normal, view_direction)
+    x, y = view_frame(view_direction)
+    angle = np.arctan2(dot(direction, y), dot(direction, x))
+    z = gbuffer.representation[index]
+    error = np.degrees(np.abs(np.angle(z * np.exp(-4j * angle)))) / 4
+    # Where z is smaller, the field turns within a pixel.
+    compared &= np.abs(z) > 0.5
+    assert compared.sum() > 1000
+    assert np.percentile(error[compared], 99) < 1.0
 
 
 def test_strokes_stop_at_creases_unless_asked():
-    surface = read_cube()
-    drawn = trace_strokes(MeshInstance(surface, STILL, axis_field(surface, 4, (1, 0.3, 0.2))), 0.1)
-    assert all(
-        len(np.unique(drawn.face[a:b])) == 1
-        for a, b in zip(drawn.start, drawn.start[1:], strict=False)
-    )
-    over = trace_strokes(
-        MeshInstance(surface, STILL, axis_field(surface, 4, (1, 0.3, 0.2))), 0.1, cross_creases=True
-    )
-    assert any(
-        len(np.unique(over.face[a:b])) > 1 for a, b in zip(over.start, over.start[1:], strict=False)
-    )
+    surface = sharp_cube()
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (1, 0.3, 0.2)))
+
+    def face_counts(strokes):
+        return [len(np.unique(strokes.face[a:b])) for a, b in pairwise(strokes.start)]
+
+    assert set(face_counts(trace_strokes(instance, 0.1))) == {1}
+    assert max(face_counts(trace_strokes(instance, 0.1, cross_creases=True))) > 1
 
 
-def read_cube():
-    whole = cube()
+def sharp_cube():
+    smooth = cube()
     return build_surface(
-        whole.vertices, whole.corner_vertex, whole.face_start, name="cube", sharp_angle=0.5
+        smooth.vertices, smooth.corner_vertex, smooth.face_start, name="cube", sharp_angle=0.5
     )
 
 
 def test_straight_ahead_is_a_geodesic():
-    """Around a cylinder: as far up and around as in the plane that it is unrolled to."""
+    """Geodesics on a cylinder are straight lines in the plane to which it is unrolled."""
     surface = cylinder(64, 8)
-    ground = build_tangent_mesh(body_of(surface, 2))
+    mesh = build_tangent_mesh(instance_of(surface, 2))
     count = 20
     triangle = np.full(count, 100, dtype=np.int32)
     weights = np.full((count, 3), 1 / 3)
     angle = np.linspace(0.1, 1.0, count)
-    start = SurfaceParticles(triangle, weights, np.ones(count, complex), np.ones(count))
-    here = ground.points_at(triangle, weights)
-    around = np.cross((0, 0, 1.0), ground.normal[triangle])
-    way = np.cos(angle)[:, None] * around + np.sin(angle)[:, None] * np.array([0, 0, 1.0])
-    flat = dot(way, ground.x[triangle]) + 1j * dot(way, ground.y[triangle])
-    now, walked = trace_geodesics(ground, start, flat, np.full(count, 0.5))
-    there = ground.points_at(now.triangle, now.weights)
+    particles = SurfaceParticles(triangle, weights, np.ones(count, complex), np.ones(count))
+    start = mesh.points_at(triangle, weights)
+    around = np.cross((0, 0, 1.0), mesh.normal[triangle])
+    direction = np.cos(angle)[:, None] * around + np.sin(angle)[:, None] * np.array([0, 0, 1.0])
+    tangent = dot(direction, mesh.x[triangle]) + 1j * dot(direction, mesh.y[triangle])
+    arrived, walked = trace_geodesics(mesh, particles, tangent, np.full(count, 0.5))
+    end = mesh.points_at(arrived.triangle, arrived.weights)
     inside = walked > 0.5 - 1e-9
     assert inside.any()
-    assert np.allclose((there - here)[inside, 2], 0.5 * np.sin(angle)[inside], atol=1e-9)
+    assert np.allclose((end - start)[inside, 2], 0.5 * np.sin(angle)[inside], atol=1e-9)
 
 
-# --- how far apart ---------------------------------------------------------------------------------
+# --- separation ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("degree", [2, 4])
 def test_spacing_on_a_torus(degree):
     surface = torus()
-    instance = body_of(surface, degree, kind="axis" if degree == 2 else "smoothest")
+    instance = instance_of(surface, degree, kind="axis" if degree == 2 else "smoothest")
     spacing = 0.02 * surface.extent
     gaps = lateral_gaps(build_tangent_mesh(instance), trace_strokes(instance, spacing))
     assert gaps.evenness() >= 0.9
@@ -308,31 +304,34 @@ def test_spacing_on_a_torus(degree):
 
 
 @pytest.mark.parametrize("degree", [2, 4, 6])
-def test_none_is_too_near_around_singularities(degree):
-    instance = body_of(icosphere(4), degree, kind="smoothest")
-    drawn = trace_strokes(instance, 0.09)
-    assert not len(too_near(drawn, degree // 2))
+def test_no_strokes_are_too_close_around_singularities(degree):
+    instance = instance_of(icosphere(4), degree, kind="smoothest")
+    strokes = trace_strokes(instance, 0.09)
+    assert not len(too_close_distances(strokes, degree // 2))
 
 
-def singular_body(degree, sign, at, phase):
-    """In the plane, with one singularity, of index sign / degree: z^(sign / degree)."""
+def instance_with_singularity(degree, sign, center, phase):
+    """Return a plane whose field has one singularity of index sign / degree."""
     surface = plane(50, 50)
-    middle = surface.vertices[surface.corner_vertex].reshape(-1, 4, 3).mean(axis=1)
-    around = np.arctan2(middle[:, 1] - at[1], middle[:, 0] - at[0])
-    angle = sign * around / degree + phase
-    way = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    return MeshInstance(surface, STILL, RosyField(degree, way))
+    face_center = surface.vertices[surface.corner_vertex].reshape(-1, 4, 3).mean(axis=1)
+    polar_angle = np.arctan2(face_center[:, 1] - center[1], face_center[:, 0] - center[0])
+    angle = sign * polar_angle / degree + phase
+    direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    return MeshInstance(surface, IDENTITY, RosyField(degree, direction))
 
 
-def nearest_passes(strokes, at):
-    """Where strokes pass a point: by how many spacings, and on which side of it (radians)."""
+def closest_approaches(strokes, center):
+    """Return (k, 2): how close strokes pass a point in spacings, and at which polar angle, sorted.
+
+    Strokes whose closest point is one of their ends are left out.
+    """
     found = []
-    for points, _, _, spacing, _, _ in _cut_finely(strokes):
-        off = points[:, :2] - at
-        radius = np.linalg.norm(off, axis=1) / spacing
-        least = int(np.argmin(radius))
-        if 0 < least < len(radius) - 1:
-            found.append((radius[least], np.arctan2(off[least, 1], off[least, 0])))
+    for points, _, _, spacing, _, _ in resampled(strokes):
+        offset = points[:, :2] - center
+        radius = np.linalg.norm(offset, axis=1) / spacing
+        closest = int(np.argmin(radius))
+        if 0 < closest < len(radius) - 1:
+            found.append((radius[closest], np.arctan2(offset[closest, 1], offset[closest, 0])))
     return np.array(sorted(found)).reshape(-1, 2)
 
 
@@ -340,89 +339,94 @@ def nearest_passes(strokes, at):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("phase", [0.3, 1.1])
 def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
-    """In closed form: N - 1 or N + 1 sectors, turned by equal angles, each with a stroke as near."""
-    instance = singular_body(degree, sign, (0.013, -0.007), phase)
-    ground, drawn = build_tangent_mesh(instance), trace_strokes(instance, 0.08)
-    triangle, weights, index = singularities(ground)
+    """There are N - 1 or N + 1 equal sectors. The closest stroke has the same distance in each."""
+    center, spacing = (0.013, -0.007), 0.08
+    instance = instance_with_singularity(degree, sign, center, phase)
+    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, spacing)
+    triangle, weights, index = singularities(mesh)
     assert np.allclose(index, sign / degree) and len(index) == 1
-    at = ground.points_at(triangle, weights)[0, :2]
-    assert np.linalg.norm(at - (0.013, -0.007)) < 0.02
+    found_center = mesh.points_at(triangle, weights)[0, :2]
+    assert np.linalg.norm(found_center - center) < 0.02
     sectors = degree - sign
-    radius, side = nearest_passes(drawn, at)[:sectors].T
+    radius, polar_angle = closest_approaches(strokes, found_center)[:sectors].T
     assert len(radius) == sectors
     assert radius.max() < 1.2 and radius.max() / radius.min() < 1.05
-    turn = np.diff(np.sort(side), append=np.sort(side)[0] + 2 * np.pi)
-    assert np.abs(np.degrees(turn) - 360 / sectors).max() < 8
-    gaps = lateral_gaps(ground, drawn)
-    near = np.linalg.norm(drawn.points[gaps.point, :2] - at, axis=1) < 5 * 0.08
+    polar_angle = np.sort(polar_angle)
+    sector_angle = np.diff(polar_angle, append=polar_angle[0] + 2 * np.pi)
+    assert np.abs(np.degrees(sector_angle) - 360 / sectors).max() < 8
+    gaps = lateral_gaps(mesh, strokes)
+    distance = np.linalg.norm(strokes.points[gaps.point, :2] - found_center, axis=1)
+    near = distance < 5 * spacing
     gap = gaps.gap[near][gaps.has_room[near]]
     assert np.mean(np.abs(gap - 1) <= 0.25) > (0.6 if degree == 2 else 0.8)
-    assert not len(too_near(drawn, degree // 2))
+    assert not len(too_close_distances(strokes, degree // 2))
 
 
 def test_singularities_are_found():
-    """Their indices sum up to what Poincare and Hopf say.
+    """The sum of the indices is the Euler characteristic (Poincare-Hopf theorem).
 
     The surface has no symmetry, so that no zero lies on an edge.
     """
     surface = bumpy(icosphere(4))
     for degree in (1, 2, 3, 4, 6):
-        ground = build_tangent_mesh(body_of(surface, degree, kind="smoothest"))
-        assert np.isclose(singularities(ground)[2].sum(), 2)
+        mesh = build_tangent_mesh(instance_of(surface, degree, kind="smoothest"))
+        assert np.isclose(singularities(mesh)[2].sum(), 2)
 
 
-def by_hand(lines, ways, spacing):
-    """Strokes in a plane, of (S, n, 3) points and (S n, 3) directions."""
-    count, size = len(lines), lines.shape[0] * lines.shape[1]
+def planar_strokes(points, directions, spacing):
+    """Return strokes in a plane from (S, n, 3) points and (S n, 3) directions."""
+    stroke_count, point_count = len(points), points.shape[0] * points.shape[1]
     return Strokes(
-        points=lines.reshape(-1, 3),
-        start=np.arange(count + 1) * lines.shape[1],
-        family=np.zeros(count, dtype=np.int32),
+        points=points.reshape(-1, 3),
+        start=np.arange(stroke_count + 1) * points.shape[1],
+        family=np.zeros(stroke_count, dtype=np.int32),
         names=("family 1",),
-        face=np.zeros(size, dtype=np.int32),
-        triangle=np.zeros(size, dtype=np.int32),
-        weights=np.full((size, 3), 1 / 3),
-        normal=np.tile((0, 0, 1.0), (size, 1)),
-        member=ways,
-        spacing=np.full(size, spacing),
-        width=np.ones(size),
-        opacity=np.ones(size),
-        closed=np.zeros(count, dtype=bool),
+        face=np.zeros(point_count, dtype=np.int32),
+        triangle=np.zeros(point_count, dtype=np.int32),
+        weights=np.full((point_count, 3), 1 / 3),
+        normal=np.tile((0, 0, 1.0), (point_count, 1)),
+        member=directions,
+        spacing=np.full(point_count, spacing),
+        width=np.ones(point_count),
+        opacity=np.ones(point_count),
+        closed=np.zeros(stroke_count, dtype=bool),
     )
 
 
-def test_what_is_too_near_is_cut_back():
-    """Concentric arcs put by hand, 0.3 and 0.8 spacings apart: the shorter of the first two goes."""
-    instance = body_of(plane(), 2)
-    ground, spacing = build_tangent_mesh(instance), 0.2
-    turn = np.linspace(0.2, 3.0, 200)
+def test_strokes_that_are_too_close_are_cut():
+    """Of concentric arcs, 0.3 and 0.8 spacings apart, the shorter of the first two is removed."""
+    spacing = 0.2
+    mesh = build_tangent_mesh(instance_of(plane(), 2))
+    angle = np.linspace(0.2, 3.0, 200)
     radius = spacing * np.array([1.0, 1.3, 2.1])
-    arcs = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    ways = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=1)
-    lines = by_hand(radius[:, None, None] * arcs, np.tile(ways, (3, 1)), spacing)
-    assert len(too_near(lines, 1))
-    left = enforce_separation(ground, lines, 0.5)
-    assert not len(too_near(left, 1))
-    assert np.allclose(np.unique(np.linalg.norm(left.points, axis=1).round(9)), radius[1:])
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    directions = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    strokes = planar_strokes(radius[:, None, None] * arc, np.tile(directions, (3, 1)), spacing)
+    assert len(too_close_distances(strokes, 1))
+    remaining = enforce_separation(mesh, strokes, 0.5)
+    assert not len(too_close_distances(remaining, 1))
+    assert np.allclose(np.unique(np.linalg.norm(remaining.points, axis=1).round(9)), radius[1:])
 
 
 def test_circles_of_latitude_close():
     surface = icosphere(4)
-    instance = MeshInstance(surface, STILL, axis_field(surface, 4, (0, 0, 1)))
-    ground, drawn = build_tangent_mesh(instance), trace_strokes(instance, 0.1)
-    assert drawn.closed.sum() >= 20
-    first, last = drawn.start[:-1][drawn.closed], drawn.start[1:][drawn.closed] - 1
-    assert np.linalg.norm(drawn.points[first] - drawn.points[last], axis=1).max() < 1e-3 * 0.1 * 2
-    # All the way around, at one height; or over both poles.
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0, 0, 1)))
+    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.1)
+    assert strokes.closed.sum() >= 20
+    first, last = strokes.start[:-1][strokes.closed], strokes.start[1:][strokes.closed] - 1
+    assert (
+        np.linalg.norm(strokes.points[first] - strokes.points[last], axis=1).max() < 1e-3 * 0.1 * 2
+    )
+    # Loops go around the axis at constant height, or over both poles.
     for a, b in zip(first, last, strict=True):
-        loop = drawn.points[a : b + 1]
+        loop = strokes.points[a : b + 1]
         if np.ptp(loop[:, 2]) > 1.99:
             continue
-        turn = np.unwrap(np.arctan2(loop[:, 1], loop[:, 0]))
-        assert np.isclose(abs(turn[-1] - turn[0]), 2 * np.pi, atol=0.05)
+        longitude = np.unwrap(np.arctan2(loop[:, 1], loop[:, 0]))
+        assert np.isclose(abs(longitude[-1] - longitude[0]), 2 * np.pi, atol=0.05)
         assert np.ptp(loop[:, 2]) < 0.03
-    assert degrees_off(ground, drawn).max() < 1.0
-    assert not len(too_near(drawn, 2))
+    assert direction_errors(mesh, strokes).max() < 1.0
+    assert not len(too_close_distances(strokes, 2))
 
 
 @pytest.mark.slow
@@ -430,70 +434,55 @@ def test_circles_of_latitude_close():
 @pytest.mark.parametrize("degree", [2, 4, 6])
 def test_spacing_on_the_bunny(shared_data, degree):
     surface = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
-    instance = body_of(surface, degree, kind="smoothest")
-    ground, drawn = build_tangent_mesh(instance), trace_strokes(instance, 0.012 * surface.extent)
-    gaps = lateral_gaps(ground, drawn)
+    instance = instance_of(surface, degree, kind="smoothest")
+    mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.012 * surface.extent)
+    gaps = lateral_gaps(mesh, strokes)
     assert gaps.evenness() >= 0.9
-    assert not len(too_near(drawn, degree // 2))
-    assert degrees_off(ground, drawn).max() < 1.0
+    assert not len(too_close_distances(strokes, degree // 2))
+    assert direction_errors(mesh, strokes).max() < 1.0
 
 
-def test_the_measure_knows_how_far_lines_are_apart():
-    """Lines put by hand: 1.0, 1.2 and 1.6 spacings apart, in a plane."""
-    instance = body_of(plane(), 2)
-    ground = build_tangent_mesh(instance)
-    drawn = trace_strokes(instance, 0.1)
-    y = np.array([-0.4, -0.3, -0.18, -0.02])
-    x = np.linspace(-0.9, 0.9, 181)
-    points = np.stack([np.tile(x, 4), np.repeat(y, 181), np.zeros(4 * 181)], axis=1)
-    lines = Strokes(
-        points=points,
-        start=np.arange(5) * 181,
-        family=np.zeros(4, dtype=np.int32),
-        names=drawn.names,
-        face=np.zeros(724, dtype=np.int32),
-        triangle=np.zeros(724, dtype=np.int32),
-        weights=np.full((724, 3), 1 / 3),
-        normal=np.tile((0, 0, 1.0), (724, 1)),
-        member=np.tile((1.0, 0, 0), (724, 1)),
-        spacing=np.full(724, 0.1),
-        width=np.ones(724),
-        opacity=np.ones(724),
-        closed=np.zeros(4, dtype=bool),
-    )
-    gaps = lateral_gaps(ground, lines)
-    middle = np.abs(points[gaps.point % 724, 0]) < 0.5
-    line = gaps.point // 181
-    for number, (left, right) in enumerate([(1.0, np.inf), (1.2, 1.0), (1.6, 1.2), (np.inf, 1.6)]):
-        own = gaps.gap[(line == number) & middle]
-        assert np.allclose(own[:, 0], left, atol=1e-6) or np.isinf(left)
-        assert np.allclose(own[:, 1], right, atol=1e-6) or np.isinf(right)
+def test_lateral_gaps_of_parallel_lines():
+    """The gaps between lines that are 1.0, 1.2 and 1.6 spacings apart in a plane."""
+    mesh = build_tangent_mesh(instance_of(plane(), 2))
+    x, y = np.linspace(-0.9, 0.9, 181), np.array([-0.4, -0.3, -0.18, -0.02])
+    points = np.stack([*np.meshgrid(x, y), np.zeros((4, 181))], axis=-1)
+    lines = planar_strokes(points, np.tile((1.0, 0, 0), (724, 1)), 0.1)
+    gaps = lateral_gaps(mesh, lines)
+    is_middle = np.abs(lines.points[gaps.point, 0]) < 0.5
+    line = lines.stroke[gaps.point]
+    expected = [(1.0, np.inf), (1.2, 1.0), (1.6, 1.2), (np.inf, 1.6)]
+    for number, (left, right) in enumerate(expected):
+        gap = gaps.gap[(line == number) & is_middle]
+        assert np.allclose(gap[:, 0], left, atol=1e-6)
+        assert np.allclose(gap[:, 1], right, atol=1e-6)
 
 
-def test_none_is_too_near_by_brute_force():
-    instance = body_of(plane(), 2, 0.3)
-    assert nearest_others(trace_strokes(instance, 0.15)) >= 0.5 * 0.15
+def test_no_strokes_are_too_close_by_brute_force():
+    instance = instance_of(plane(), 2, 0.3)
+    assert min_distance_by_brute_force(trace_strokes(instance, 0.15)) >= 0.5 * 0.15
 
 
 def test_thin_sheets_do_not_interfere():
-    """Two planes a hundredth of the spacing apart, facing away from each other."""
-    one = plane()
-    count = len(one.vertices)
-    below = one.vertices - (0, 0, 0.001)
-    quads = one.corner_vertex.reshape(-1, 4)
-    both = np.concatenate([quads, quads[:, ::-1] + count])
+    """Two planes are a hundredth of the spacing apart and face away from each other."""
+    upper = plane()
+    lower_vertices = upper.vertices - (0, 0, 0.001)
+    quads = upper.corner_vertex.reshape(-1, 4)
+    faces = np.concatenate([quads, quads[:, ::-1] + len(upper.vertices)])
     surface = build_surface(
-        np.concatenate([one.vertices, below]), both.ravel(), np.arange(0, both.size + 1, 4)
+        np.concatenate([upper.vertices, lower_vertices]),
+        faces.ravel(),
+        np.arange(0, faces.size + 1, 4),
     )
-    instance = MeshInstance(surface, STILL, axis_field(surface, 2, (1, 0, 0)))
-    drawn = trace_strokes(instance, 0.1)
-    top = drawn.normal[drawn.start[:-1], 2] > 0
-    assert 18 <= top.sum() <= 22 and 18 <= (~top).sum() <= 22
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (1, 0, 0)))
+    strokes = trace_strokes(instance, 0.1)
+    is_upper = strokes.normal[strokes.start[:-1], 2] > 0
+    assert 18 <= is_upper.sum() <= 22 and 18 <= (~is_upper).sum() <= 22
 
 
 def test_same_strokes_again():
-    one, two = (trace_strokes(body_of(icosphere(3), 4, kind="smoothest"), 0.1) for _ in range(2))
-    assert np.array_equal(one.points, two.points) and np.array_equal(one.family, two.family)
+    a, b = (trace_strokes(instance_of(icosphere(3), 4, kind="smoothest"), 0.1) for _ in range(2))
+    assert np.array_equal(a.points, b.points) and np.array_equal(a.family, b.family)
 
 
 # --- density ---------------------------------------------------------------------------------------
@@ -504,46 +493,47 @@ def test_darker_is_denser():
     dark = surface.vertices[:, 0] < 0
     spacing = spacing_by_tone(0.05, np.where(dark, 0.0, 0.6))
     assert np.allclose(np.unique(spacing), (0.05, 0.125))
-    drawn = trace_strokes(MeshInstance(surface, STILL, axis_field(surface, 2, (0, 1, 0))), spacing)
-    x = drawn.points[drawn.start[:-1], 0]
-    per_length = [drawn.length[side].sum() for side in (x < -0.1, x > 0.1)]
-    assert 1.9 < per_length[0] / per_length[1] < 3.2
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
+    strokes = trace_strokes(instance, spacing)
+    x = strokes.points[strokes.start[:-1], 0]
+    dark_length, light_length = (strokes.length[side].sum() for side in (x < -0.1, x > 0.1))
+    assert 1.9 < dark_length / light_length < 3.2
 
 
-def test_a_ramp_of_tone_comes_out_as_a_ramp():
-    """Ink is the length of strokes on an area, times the width that makes black of the narrowest."""
+def test_ink_coverage_follows_a_ramp_of_tone():
+    """Coverage is the length of strokes per area, times the width that is solid at the minimum."""
     surface = plane(40, 40)
-    narrow = 0.025
+    width = 0.025
     tone = 0.85 * (surface.vertices[:, 0] + 1) / 2
-    spacing = spacing_by_tone(narrow, tone, max_ratio=1 / 0.15)
-    drawn = trace_strokes(MeshInstance(surface, STILL, axis_field(surface, 2, (0, 1, 0))), spacing)
-    start, end, _ = straight_pieces(drawn)
+    spacing = spacing_by_tone(width, tone, max_ratio=1 / 0.15)
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 1, 0)))
+    start, end, _ = segments_of(trace_strokes(instance, spacing))
     length = np.linalg.norm(end - start, axis=1)
-    edges = np.linspace(-1, 1, 6)
-    ink, _ = np.histogram((start + end)[:, 0] / 2, edges, weights=length * narrow)
-    ink /= 2 * np.diff(edges)
-    wanted = 1 - 0.85 * ((edges[1:] + edges[:-1]) / 2 + 1) / 2
-    assert (np.diff(ink) < 0).all()
-    assert np.abs(ink - wanted).max() < 0.1
+    bins = np.linspace(-1, 1, 6)
+    coverage, _ = np.histogram((start + end)[:, 0] / 2, bins, weights=length * width)
+    coverage /= 2 * np.diff(bins)
+    expected = 1 - 0.85 * ((bins[1:] + bins[:-1]) / 2 + 1) / 2
+    assert (np.diff(coverage) < 0).all()
+    assert np.abs(coverage - expected).max() < 0.1
 
 
-def test_where_it_bends_more_strokes_are_nearer():
-    """On a long ball: the length of strokes on an area is one over the spacing asked for there."""
-    ball = icosphere(4)
+def test_strokes_are_denser_where_the_surface_is_more_curved():
+    """On an ellipsoid, the length of strokes per area is one over the required spacing."""
+    sphere = icosphere(4)
     surface = build_surface(
-        ball.vertices * (1, 1, 3), ball.corner_vertex, ball.face_start, name="long ball"
+        sphere.vertices * (1, 1, 3), sphere.corner_vertex, sphere.face_start, name="ellipsoid"
     )
     spacing = spacing_by_curvature(surface, 0.06, 1.0)
     assert np.ptp(spacing) > 0.01
-    instance = MeshInstance(surface, STILL, axis_field(surface, 2, (0, 0, 1)))
-    ground, drawn = build_tangent_mesh(instance), trace_strokes(instance, spacing)
-    corner = spacing[surface.triangle_vertex].mean(axis=1)
-    start, end, triangle = straight_pieces(drawn)
-    length = np.bincount(triangle, np.linalg.norm(end - start, axis=1), len(corner))
-    near = corner < np.median(corner)
-    for part in (near, ~near):
-        asked = (ground.area[part] / corner[part]).sum()
-        assert 0.8 < length[part].sum() / asked < 1.2
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 0, 1)))
+    mesh = build_tangent_mesh(instance)
+    triangle_spacing = spacing[surface.triangle_vertex].mean(axis=1)
+    start, end, triangle = segments_of(trace_strokes(instance, spacing))
+    length = np.bincount(triangle, np.linalg.norm(end - start, axis=1), len(triangle_spacing))
+    dense = triangle_spacing < np.median(triangle_spacing)
+    for region in (dense, ~dense):
+        expected = (mesh.area[region] / triangle_spacing[region]).sum()
+        assert 0.8 < length[region].sum() / expected < 1.2
 
 
 def test_curvature_and_light():
@@ -551,167 +541,168 @@ def test_curvature_and_light():
     spacing = spacing_by_curvature(surface, 1.0, 0.5)
     assert spacing.shape == (len(surface.vertices),) and np.ptp(spacing) > 0
     camera = orbit_camera(surface, 0, 90, 100, 100, perspective=False)
-    tone = headlight_tone(MeshInstance(surface, STILL), camera)
+    tone = headlight_tone(MeshInstance(surface, IDENTITY), camera)
     assert np.isclose(tone.max(), 1, atol=1e-3) and tone[surface.vertices[:, 2] < -0.3].max() == 0
 
 
 def test_families_by_tone():
-    instance = body_of(plane(10, 10), 4)
-    drawn = trace_strokes(instance, 0.1)
-    tone = values_at_points(drawn, instance.surface, (instance.surface.vertices[:, 0] + 1) / 2)
-    weighed = weight_by_tone(drawn, tone, 0.4)
-    for family, begins in ((0, 1.0), (1, 0.6)):
-        own = weighed.select(weighed.family == family)
-        x = own.points[:, 0]
-        assert len(own) and x.max() < 2 * begins - 1
-        # Three times as wide as the darkness, up to the whole of the pen.
-        wanted = np.clip(3 * (begins - (x + 1) / 2), 0, 1)
-        np.testing.assert_allclose(own.width, wanted, atol=1e-6)
+    instance = instance_of(plane(10, 10), 4)
+    strokes = trace_strokes(instance, 0.1)
+    tone = values_at_points(strokes, instance.surface, (instance.surface.vertices[:, 0] + 1) / 2)
+    weighted = weight_by_tone(strokes, tone, 0.4)
+    for family, onset_tone in ((0, 1.0), (1, 0.6)):
+        selected = weighted.select(weighted.family == family)
+        x = selected.points[:, 0]
+        assert len(selected) and x.max() < 2 * onset_tone - 1
+        # The width is three times the darkness, at most the full width.
+        expected = np.clip(3 * (onset_tone - (x + 1) / 2), 0, 1)
+        np.testing.assert_allclose(selected.width, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("slant", [0.0, 0.8, 1.2])
 def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
-    """Of lines of all directions, in length over area."""
+    """The density is the length of lines per area in the picture, averaged over directions."""
     floor = plane(20, 20)
     camera = orthographic_camera(
         look_at((0, -5 * np.sin(slant), 5 * np.cos(slant)), (0, 0, 0), (0, 1, 0)), 400, 400, scale=2
     )
-    turned = []
+    lengths = []
     for angle in np.linspace(0, np.pi / 2, 5)[:-1]:
         instance = MeshInstance(
-            floor, STILL, axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0))
+            floor, IDENTITY, axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0))
         )
         spacing = spacing_by_foreshortening(instance, camera, pixel_spacing(instance, camera, 6.0))
-        drawn = trace_strokes(instance, spacing)
-        pixels, _ = project_to_pixels(drawn.points, camera)
-        piece = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
-        same = np.diff(drawn.stroke) == 0
-        turned.append(piece[same].sum())
+        strokes = trace_strokes(instance, spacing)
+        pixels, _ = project_to_pixels(strokes.points, camera)
+        segment_length = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
+        lengths.append(segment_length[np.diff(strokes.stroke) == 0].sum())
     area = 400 * 400 * np.cos(slant)
-    # Of two families, six pixels apart.
-    assert np.mean(turned) / area == pytest.approx(2 / 6, rel=0.12)
+    # There are two families, six pixels apart.
+    assert np.mean(lengths) / area == pytest.approx(2 / 6, rel=0.12)
 
 
 # --- families --------------------------------------------------------------------------------------
 
 
-def test_families_are_the_same_all_over_a_torus():
-    instance = body_of(torus(48, 24), 4)
+def test_families_are_consistent_on_a_torus():
+    instance = instance_of(torus(48, 24), 4)
     assert global_labels(build_tangent_mesh(instance)) is not None
-    drawn = trace_strokes(instance, 0.15)
-    assert drawn.names == ("family 1", "family 2")
-    middle = (drawn.start[:-1] + drawn.start[1:]) // 2
-    place = drawn.points[middle]
-    around = normalize(np.stack([-place[:, 1], place[:, 0], 0 * place[:, 0]], axis=1))
-    along = np.abs(dot(drawn.member[middle], around)) > 0.7
-    assert len(np.unique(along[drawn.family == 0])) == 1
-    assert len(np.unique(along[drawn.family == 1])) == 1
+    strokes = trace_strokes(instance, 0.15)
+    assert strokes.names == ("family 1", "family 2")
+    middle = (strokes.start[:-1] + strokes.start[1:]) // 2
+    x, y, _ = strokes.points[middle].T
+    around = normalize(np.stack([-y, x, 0 * x], axis=1))
+    is_around = np.abs(dot(strokes.member[middle], around)) > 0.7
+    assert len(np.unique(is_around[strokes.family == 0])) == 1
+    assert len(np.unique(is_around[strokes.family == 1])) == 1
 
 
-def test_around_singularities_families_run_into_each_other():
-    instance = body_of(icosphere(3), 4, kind="smoothest")
+def test_no_global_families_around_singularities():
+    instance = instance_of(icosphere(3), 4, kind="smoothest")
     assert global_labels(build_tangent_mesh(instance)) is None
     assert set(trace_strokes(instance, 0.2).family.tolist()) == {0, 1}
 
 
-# --- what is done with them --------------------------------------------------------------------------
+# --- tapers, ends and crossings ----------------------------------------------------------------------
 
 
 def test_taper_and_closed_strokes():
-    drawn = trace_strokes(body_of(plane(), 2), 0.1).tapered(2.0, 0.2)
-    assert np.allclose(drawn.width[drawn.start[:-1]], 0.2)
-    assert drawn.width.max() == 1.0 and (drawn.width >= 0.2 - 1e-9).all()
+    strokes = trace_strokes(instance_of(plane(), 2), 0.1).tapered(2.0, 0.2)
+    assert np.allclose(strokes.width[strokes.start[:-1]], 0.2)
+    assert strokes.width.max() == 1.0 and (strokes.width >= 0.2 - 1e-9).all()
 
 
-def test_ends_that_meet_head_on_are_not_thinned():
-    """Of two strokes nearly in line, half a spacing apart, one beside them, and one across."""
+def test_ends_that_meet_head_on_are_not_tapered():
+    """Stroke 1 continues stroke 0 at half a spacing, 2 is beside 0, and 3 is perpendicular to it."""
     along = np.linspace(0, 1, 11)[:, None] * np.array([1.0, 0, 0])
-    spacing, off = 0.1, (0, 0.05, 0)
-    lines = [
+    points = [
         along,
-        along + (1.05, 0, 0) + off,
+        along + (1.05, 0.05, 0),
         along + (0, 0.1, 0),
         along[:, [1, 0, 2]] + (1.02, 0, 0),
     ]
-    ways = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
-    strokes = by_hand(np.array(lines), ways, spacing)
-    # The third one's last end is beside that of the first, and meets the second one as well.
+    directions = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
+    strokes = planar_strokes(np.array(points), directions, 0.1)
+    # The last end of stroke 2 is beside that of stroke 0, and also meets stroke 1.
     assert head_on_ends(strokes).tolist() == [
         [False, True],
         [True, False],
         [False, True],
         [False, False],
     ]
-    thin = strokes.tapered(2.0, 0.2, ~head_on_ends(strokes))
-    ends = np.stack([thin.width[thin.start[:-1]], thin.width[thin.start[1:] - 1]], axis=1)
-    assert np.allclose(ends, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])
+    tapered = strokes.tapered(2.0, 0.2, ~head_on_ends(strokes))
+    first, last = tapered.start[:-1], tapered.start[1:] - 1
+    end_width = np.stack([tapered.width[first], tapered.width[last]], axis=1)
+    assert np.allclose(end_width, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])
 
 
 def test_gaps_at_crossings():
-    instance = body_of(plane(3, 3), 4)
-    drawn = trace_strokes(instance, 0.2)
-    met = find_crossings(drawn)
-    first = (drawn.family == 0).sum() * (drawn.family == 1).sum()
-    assert 0.8 * first <= len(met.stroke) <= first
-    gapped = with_crossing_gaps(drawn, 0.3)
+    instance = instance_of(plane(3, 3), 4)
+    strokes = trace_strokes(instance, 0.2)
+    crossings = find_crossings(strokes)
+    max_count = (strokes.family == 0).sum() * (strokes.family == 1).sum()
+    assert 0.8 * max_count <= len(crossings.stroke) <= max_count
+    gapped = with_crossing_gaps(strokes, 0.3)
     assert not len(find_crossings(gapped).stroke)
-    lost = drawn.length.sum() - gapped.length.sum()
-    assert np.isclose(lost, len(met.stroke) * 0.3 * 0.2, rtol=0.1)
-    over = gapped.select(gapped.family == 0)
-    assert np.isclose(over.length.sum(), drawn.length[drawn.family == 0].sum())
-    assert not len(find_crossings(with_crossing_gaps(drawn, 0.3, weave=True)).stroke)
+    removed_length = strokes.length.sum() - gapped.length.sum()
+    assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
+    upper = gapped.select(gapped.family == 0)
+    assert np.isclose(upper.length.sum(), strokes.length[strokes.family == 0].sum())
+    assert not len(find_crossings(with_crossing_gaps(strokes, 0.3, weave=True)).stroke)
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
-def test_cuts_take_out_what_they_say(low, size):
-    drawn = trace_strokes(body_of(plane(3, 3), 2), 0.2)
-    left = cut_intervals(drawn, np.array([0]), np.array([low]), np.array([low + size]))
-    total = drawn.length[0]
+def test_cut_intervals_remove_their_length(low, size):
+    strokes = trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+    remaining = cut_intervals(strokes, np.array([0]), np.array([low]), np.array([low + size]))
+    total = strokes.length[0]
     assume(low + size < total - 1e-6 or low + size > total + 1e-6)
-    taken = min(low + size, total) - min(low, total)
-    assert np.isclose(drawn.length.sum() - left.length.sum(), taken, atol=1e-9)
+    removed_length = min(low + size, total) - min(low, total)
+    assert np.isclose(strokes.length.sum() - remaining.length.sum(), removed_length, atol=1e-9)
 
 
-# --- what a camera sees ------------------------------------------------------------------------------
+# --- visibility --------------------------------------------------------------------------------------
 
 
 def test_a_sphere_shows_its_near_side():
-    instance = body_of(icosphere(4), 2, kind="smoothest")
+    instance = instance_of(icosphere(4), 2, kind="smoothest")
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
-    drawn = trace_strokes(instance, 0.1)
-    shown = clip_to_visible(drawn, [instance], camera)
-    assert shown.points[:, 1].max() < 0.06
-    near = drawn.points[:, 1] < 0
-    assert shown.length.sum() > 0.9 * drawn.length.sum() * near.mean()
-    every = clip_to_visible(drawn, [instance], camera, remove_hidden=False)
-    assert np.isclose(every.length.sum(), drawn.length.sum())
+    strokes = trace_strokes(instance, 0.1)
+    visible = clip_to_visible(strokes, [instance], camera)
+    assert visible.points[:, 1].max() < 0.06
+    start, end, _ = segments_of(strokes)
+    is_near_side = (start + end)[:, 1] < 0
+    near_length = np.linalg.norm(end - start, axis=1)[is_near_side].sum()
+    assert np.isclose(visible.length.sum(), near_length, rtol=0.02)
+    unclipped = clip_to_visible(strokes, [instance], camera, remove_hidden=False)
+    assert np.isclose(unclipped.length.sum(), strokes.length.sum())
 
 
-def test_others_hide_and_the_frame_cuts():
-    instance = body_of(plane(), 2)
+def test_strokes_are_clipped_by_occluders_and_by_the_frame():
+    instance = instance_of(plane(), 2)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 200, scale=1.0)
-    drawn = trace_strokes(instance, 0.05)
-    shown = clip_to_visible(drawn, [instance], camera)
-    assert np.abs(shown.points[:, :2]).max() <= 0.5 + 1e-9
-    wall = plane()
-    moved = np.eye(4)
-    moved[:3, 3] = (1.0, 0, 1.0)
-    left = clip_to_visible(drawn, [instance, MeshInstance(wall, moved)], camera)
-    assert left.points[:, 0].max() < 0.02
-    assert len(left) >= 15
+    strokes = trace_strokes(instance, 0.05)
+    in_frame = clip_to_visible(strokes, [instance], camera)
+    assert np.abs(in_frame.points[:, :2]).max() <= 0.5 + 1e-9
+    matrix = np.eye(4)
+    matrix[:3, 3] = (1.0, 0, 1.0)
+    occluder = MeshInstance(plane(), matrix)
+    visible = clip_to_visible(strokes, [instance, occluder], camera)
+    assert visible.points[:, 0].max() < 0.02
+    assert len(visible) >= 15
 
 
-def test_outlines_of_simple_bodies():
-    sphere = MeshInstance(icosphere(4), STILL)
+def test_outlines_of_simple_shapes():
+    sphere = MeshInstance(icosphere(4), IDENTITY)
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
     lines = outline(sphere, camera)
     assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
     assert np.abs(lines.points[:, 1]).max() < 0.01
     assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
-    box = outline(MeshInstance(read_cube(), STILL))
+    box = outline(MeshInstance(sharp_cube(), IDENTITY))
     assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
-    edge = outline(MeshInstance(plane(), STILL))
+    edge = outline(MeshInstance(plane(), IDENTITY))
     assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
 
 
@@ -722,111 +713,116 @@ def svg_camera():
     return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 100, scale=4.0)
 
 
-def svg_of(**more):
-    instance = body_of(plane(), 4)
-    drawn = clip_to_visible(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
-    return ElementTree.fromstring(svg_text(drawn, svg_camera(), Pen(**more))), drawn
+def svg_of(**pen_options):
+    """Return the root element of an SVG file, and its strokes."""
+    instance = instance_of(plane(), 4)
+    strokes = clip_to_visible(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
+    return ElementTree.fromstring(svg_text(strokes, svg_camera(), Pen(**pen_options))), strokes
 
 
-def test_svg_has_a_layer_a_family_and_a_path_a_stroke():
-    root, drawn = svg_of(millimetres=100, colours=("red", "#00f"))
-    space = "{http://www.inkscape.org/namespaces/inkscape}"
+def path_points(data):
+    """Return the (n, 2) points of SVG path data, without the radii of arcs."""
+    without_arcs = re.sub(r"A\S+ 0 0 1", "", data)
+    return np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", without_arcs), dtype=float)
+
+
+def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
+    root, strokes = svg_of(millimetres=100, colours=("red", "#00f"))
+    inkscape = "{http://www.inkscape.org/namespaces/inkscape}"
     layers = root.findall("{http://www.w3.org/2000/svg}g")
-    assert [layer.get(space + "label") for layer in layers] == ["paper", "family 1", "family 2"]
-    assert all(layer.get(space + "groupmode") == "layer" for layer in layers)
+    assert [layer.get(inkscape + "label") for layer in layers] == ["paper", "family 1", "family 2"]
+    assert all(layer.get(inkscape + "groupmode") == "layer" for layer in layers)
     assert [layer.get("stroke") for layer in layers[1:]] == ["red", "#00f"]
     assert (root.get("width"), root.get("height")) == ("100mm", "50mm")
     assert root.get("viewBox") == "0 0 200 100"
     paths = list(root.iter("{http://www.w3.org/2000/svg}path"))
-    assert len(paths) == len(drawn)
+    assert len(paths) == len(strokes)
     for path in paths:
         assert path.get("d").endswith("Z") == (path.get("stroke") == "none")
-        # An outline goes around the points of its stroke, half the width of the pen away.
-        without_arcs = re.sub(r"A\S+ 0 0 1", "", path.get("d"))
-        pairs = re.findall(r"(-?[\d.]+),(-?[\d.]+)", without_arcs)
-        points = np.array(pairs, dtype=float)
+        # An outline is half the width of the pen away from its stroke.
+        points = path_points(path.get("d"))
         assert len(points) >= 2
         assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
 @pytest.mark.parametrize("plotter", [False, True])
 def test_closed_strokes_are_closed_paths(plotter):
-    instance = MeshInstance(icosphere(4), STILL, axis_field(icosphere(4), 4, (0, 0, 1)))
+    instance = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
-    drawn = clip_to_visible(trace_strokes(instance, 0.15), [instance], camera)
-    assert drawn.closed.any() and not drawn.closed.all()
+    strokes = clip_to_visible(trace_strokes(instance, 0.15), [instance], camera)
+    assert strokes.closed.any() and not strokes.closed.all()
 
-    def paths(strokes):
-        text = svg_text(strokes, camera, Pen(plotter=plotter))
+    def path_data(selected):
+        text = svg_text(selected, camera, Pen(plotter=plotter))
         return [path.get("d") for path in ElementTree.fromstring(text).iter() if path.get("d")]
 
     for closed in (True, False):
-        own = drawn.select(drawn.closed == closed)
-        assert all(path.endswith("Z") == closed for path in paths(own))
-        for path in paths(own):
-            points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", path), dtype=float)
+        selected = strokes.select(strokes.closed == closed)
+        assert all(data.endswith("Z") == closed for data in path_data(selected))
+        for data in path_data(selected):
+            points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", data), dtype=float)
             assert not (points[0] == points[-1]).all()
-    # What is cut is open.
-    half = drawn.runs_where(drawn.points[:, 0] > 0)
-    assert not any(path.endswith("Z") for path in paths(half))
+    # Strokes that are cut are open.
+    cut = strokes.runs_where(strokes.points[:, 0] > 0)
+    assert not any(data.endswith("Z") for data in path_data(cut))
 
 
 def test_outlines_hold_as_much_ink_as_their_strokes():
-    """In closed form: the mean width times the length; the round ends are left out."""
-    root, drawn = svg_of(width=3.0, paper=None)
-    pixels, _ = project_to_pixels(drawn.points, svg_camera())
-    step = np.hypot(*np.diff(pixels, axis=0).T) * (np.diff(drawn.stroke) == 0)
-    mean = (drawn.width[1:] + drawn.width[:-1]) / 2
-    ink = np.bincount(drawn.stroke[1:], 3.0 * mean * step)
+    """The area of an outline is the mean width times the length, without the round ends."""
+    root, strokes = svg_of(width=3.0, paper=None)
+    pixels, _ = project_to_pixels(strokes.points, svg_camera())
+    length = np.hypot(*np.diff(pixels, axis=0).T) * (np.diff(strokes.stroke) == 0)
+    mean_width = (strokes.width[1:] + strokes.width[:-1]) / 2
+    expected = np.bincount(strokes.stroke[1:], 3.0 * mean_width * length)
     areas = []
     for path in root.iter("{http://www.w3.org/2000/svg}path"):
-        pairs = re.findall(r"(-?[\d.]+),(-?[\d.]+)", re.sub(r"A\S+ 0 0 1", "", path.get("d")))
-        x, y = np.array(pairs, dtype=float).T
+        x, y = path_points(path.get("d")).T
         areas.append(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2)
-    by_family = np.argsort(drawn.family, kind="stable")
-    assert np.allclose(areas, ink[by_family], rtol=0.03, atol=0.2)
+    by_family = np.argsort(strokes.family, kind="stable")
+    assert np.allclose(areas, expected[by_family], rtol=0.03, atol=0.2)
 
 
-def test_plotters_get_whole_lines_in_a_short_order():
-    root, drawn = svg_of(plotter=True, paper=None)
+def test_plotters_draw_lines_of_constant_width():
+    root, strokes = svg_of(plotter=True, paper=None)
     paths = list(root.iter("{http://www.w3.org/2000/svg}path"))
-    assert len(paths) == len(drawn)
+    assert len(paths) == len(strokes)
     assert all(path.get("stroke-width") is None for path in paths)
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 60), st.integers(0, 10**6))
-def test_pen_order_is_a_short_permutation(count, seed):
+def test_plotter_order_is_a_permutation_with_little_travel(count, seed):
     random = np.random.default_rng(seed)
     first, last = random.random((2, count, 2))
-    order, turned = plotter_order(first, last)
+    order, is_reversed = plotter_order(first, last)
     assert sorted(order.tolist()) == list(range(count))
-    begin = np.where(turned[:, None], last[order], first[order])
-    end = np.where(turned[:, None], first[order], last[order])
+    begin = np.where(is_reversed[:, None], last[order], first[order])
+    end = np.where(is_reversed[:, None], first[order], last[order])
     travel = np.linalg.norm(begin[1:] - end[:-1], axis=1).sum()
-    plain = np.linalg.norm(first[1:] - last[:-1], axis=1).sum()
-    assert travel <= plain + 1e-9 or count < 6
+    unordered_travel = np.linalg.norm(first[1:] - last[:-1], axis=1).sum()
+    assert travel <= unordered_travel + 1e-9 or count < 6
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.integers(2, 40), min_size=1, max_size=4), st.integers(0, 10**6))
-def test_simplified_lines_stay_near(sizes, seed):
+def test_simplified_lines_stay_within_the_tolerance(sizes, seed):
     random = np.random.default_rng(seed)
     start = np.concatenate([[0], np.cumsum(sizes)])
     points = np.cumsum(random.normal(size=(start[-1], 2)), axis=0)
     kept = simplify_mask(points, start, 0.5)
     assert kept[start[:-1]].all() and kept[start[1:] - 1].all()
     for a, b in pairwise(start):
-        left = points[a:b][kept[a:b]]
+        simplified = points[a:b][kept[a:b]]
         for point in points[a:b]:
-            along = left[1:] - left[:-1]
-            off = point - left[:-1]
-            square = np.maximum((along**2).sum(axis=1), 1e-300)
-            share = np.clip((off * along).sum(axis=1) / square, 0, 1)
-            assert np.linalg.norm(off - share[:, None] * along, axis=1).min() <= 0.5 + 1e-9
+            chord = simplified[1:] - simplified[:-1]
+            delta = point - simplified[:-1]
+            chord_squared = np.maximum((chord**2).sum(axis=1), 1e-300)
+            fraction = np.clip((delta * chord).sum(axis=1) / chord_squared, 0, 1)
+            distance = np.linalg.norm(delta - fraction[:, None] * chord, axis=1)
+            assert distance.min() <= 0.5 + 1e-9
 
 
-def write_ball(path):
+def write_sphere(path):
     surface = icosphere(3)
     lines = [f"v {x} {y} {z}" for x, y, z in surface.vertices]
     lines += [
@@ -837,7 +833,7 @@ def write_ball(path):
 
 def test_command_line(tmp_path, capsys, monkeypatch):
     mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
-    write_ball(mesh)
+    write_sphere(mesh)
     command = [
         "strokes",
         str(mesh),
@@ -851,18 +847,18 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
     root = ElementTree.parse(out).getroot()
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
-    once = out.read_bytes()
+    first_bytes = out.read_bytes()
     assert main([*command, "-o", str(out), "--outline", "--gaps", "0.3", "--tone"]) == 0
-    assert out.read_bytes() == once
+    assert out.read_bytes() == first_bytes
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
-    for words, wanted in (
+    for arguments, message in (
         (["--camera", "Close"], "ball.obj: --camera is for .blend files"),
         (["--frames", "1-3"], "ball.obj: --frames is for .blend files"),
         (["--tone", "--light", "scene"], "ball.obj: has no lights"),
     ):
-        assert main([*command, "-o", str(out), *words]) == 2
-        assert wanted in capsys.readouterr().err
+        assert main([*command, "-o", str(out), *arguments]) == 2
+        assert message in capsys.readouterr().err
     assert main(["strokes", "-o", str(out)]) == 2
     assert "give a mesh file" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "bpy", None)
@@ -870,17 +866,17 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert "needs Blender" in capsys.readouterr().err
 
 
-# --- what is wrong is said ---------------------------------------------------------------------------
+# --- errors ------------------------------------------------------------------------------------------
 
 
-def test_wrong_input_is_one_line(error_of):
+def test_errors_are_one_line(error_of):
     surface = plane()
-    instance = body_of(surface, 4)
+    instance = instance_of(surface, 4)
     assert "above 0" in error_of(trace_strokes, instance, 0.0)
     assert "too many" in error_of(trace_strokes, instance, 1e-6)
-    assert "no field" in error_of(trace_strokes, MeshInstance(surface, STILL), 0.1)
+    assert "no field" in error_of(trace_strokes, MeshInstance(surface, IDENTITY), 0.1)
     assert "zero all over" in error_of(
-        trace_strokes, MeshInstance(surface, STILL, RosyField(4, np.zeros((16, 3)))), 0.1
+        trace_strokes, MeshInstance(surface, IDENTITY, RosyField(4, np.zeros((16, 3)))), 0.1
     )
     assert "vertices" in error_of(trace_strokes, instance, np.ones(7))
     assert "first" in error_of(SeparationRules, min_separation=1.2)

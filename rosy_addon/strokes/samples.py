@@ -1,0 +1,306 @@
+"""`StrokeSamples`: the samples of growing strokes, their spatial grid, and which sides are covered.
+
+Strokes are sampled every half spacing. A side of a sample is covered if there is a stroke beside it
+on this side, and open if not. New strokes are seeded at open sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import RosyError
+from .column_table import ColumnTable
+from .point_grid import PointGrid
+from .surface_particles import SurfaceParticles
+from .tangent_mesh import TangentMesh
+
+#: Distance between consecutive samples of a stroke, in spacings.
+SAMPLE_STEP = 0.5
+
+#: Radius around a sample in which neighbors are searched, in spacings.
+SEARCH_RADIUS = 1.6
+
+#: Largest expected number of samples. It bounds memory and time.
+MAX_EXPECTED_SAMPLES = 5e7
+
+
+class CoveringPairs(NamedTuple):
+    """m pairs of samples of different strokes that are beside each other and cover these sides.
+
+    Attributes
+    ----------
+    sample, neighbor : (m,) ndarray of int
+        Numbers of the two samples.
+    sample_side : (m,) intp ndarray
+        The side of the sample on which the neighbor is: 0 for left and 1 for right.
+    neighbor_side : (m,) intp ndarray
+        The side of the neighbor on which the sample is.
+    """
+
+    sample: np.ndarray
+    neighbor: np.ndarray
+    sample_side: np.ndarray
+    neighbor_side: np.ndarray
+
+
+class StrokeSamples(ColumnTable):
+    """The samples of growing strokes on a tangent mesh, found by number or by position.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    corner_spacing : (T, 3) ndarray
+        Spacing at the corners of the triangles, in world space.
+
+    Attributes
+    ----------
+    expected_count : float
+        Estimate of the final number of samples.
+    current_step : int
+        Number of the current step of growth.
+
+    Raises
+    ------
+    RosyError
+        If the expected number of samples is too large.
+
+    Notes
+    -----
+    The columns, with a row for each sample:
+
+    frame : (4, 3) float64
+        Position, normal, direction of the stroke and member, in world space. They are together
+        because they are looked up together.
+    spacing : float64
+        Required spacing, in world space.
+    stroke : int32
+    arc : float64
+        Signed arc length from the seed, in world space.
+    step : int32
+        The step at which the sample was added.
+    alive : bool
+        False for removed samples.
+    covered : (2,) bool
+        Whether the left and the right side are covered.
+    side_neighbor : (2,) int32
+        The neighbor found last that covers the left and the right side, or -1. If this sample is
+        removed, the neighbor may be open again.
+    triangle, weights : int32, (3,) float64
+        Position as barycentric coordinates.
+    local_member, local_direction : complex128
+        Unit member and direction in the frame of the triangle.
+    """
+
+    frame: np.ndarray
+    spacing: np.ndarray
+    stroke: np.ndarray
+    arc: np.ndarray
+    step: np.ndarray
+    alive: np.ndarray
+    covered: np.ndarray
+    side_neighbor: np.ndarray
+    triangle: np.ndarray
+    weights: np.ndarray
+    local_member: np.ndarray
+    local_direction: np.ndarray
+
+    def __init__(self, mesh: TangentMesh, corner_spacing: np.ndarray) -> None:
+        super().__init__(
+            frame=((4, 3), float),
+            spacing=((), float),
+            stroke=((), np.int32),
+            arc=((), float),
+            step=((), np.int32),
+            alive=((), bool),
+            covered=((2,), bool),
+            side_neighbor=((2,), np.int32),
+            triangle=((), np.int32),
+            weights=((3,), float),
+            local_member=((), complex),
+            local_direction=((), complex),
+        )
+        self.mesh, self.corner_spacing = mesh, corner_spacing
+        mean_spacing = np.einsum("tk->t", corner_spacing) / 3
+        self.expected_count = (
+            float((mesh.area / mean_spacing**2).sum()) * mesh.family_count / SAMPLE_STEP
+        )
+        if not self.expected_count < MAX_EXPECTED_SAMPLES:
+            raise RosyError("the strokes would be too many: ask for a wider spacing")
+        self.grid = PointGrid(
+            1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
+        )
+        self.current_step = 0
+        # Open sides, as 2 * sample + side. Those that got covered stay in it until the next call of
+        # `open_sides`.
+        self._open_sides = np.empty(0, dtype=np.int64)
+        # Arrays of samples whose sides `reset_coverage` resets.
+        self._recheck: list[np.ndarray] = []
+
+    @property
+    def position(self) -> np.ndarray:
+        """The positions, in world space."""
+        return self.frame[:, 0]
+
+    @property
+    def normal(self) -> np.ndarray:
+        """The unit shading normals."""
+        return self.frame[:, 1]
+
+    @property
+    def direction(self) -> np.ndarray:
+        """The unit directions of strokes, in world space."""
+        return self.frame[:, 2]
+
+    def spacing_at(self, particles: SurfaceParticles) -> np.ndarray:
+        """Return (n,) float64: the required spacing at particles, in world space."""
+        return np.einsum("nk,nk->n", particles.weights, self.corner_spacing[particles.triangle])
+
+    # --- adding and removing ----------------------------------------------------------------------
+
+    def begin_step(self) -> None:
+        """Begin the next step of growth."""
+        self.current_step += 1
+
+    def add(self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray) -> np.ndarray:
+        """Add samples at n particles.
+
+        Parameters
+        ----------
+        particles : SurfaceParticles
+        stroke : (n,) ndarray of int
+        arc : (n,) ndarray
+            Signed arc lengths from the seeds.
+
+        Returns
+        -------
+        (n,) ndarray of int
+            Their numbers.
+        """
+        sample = self._append_at(particles, stroke, arc)
+        self.grid.add(self.position[sample])
+        return sample
+
+    @contextmanager
+    def probes(self, particles: SurfaceParticles) -> Iterator[np.ndarray]:
+        """Give the numbers of temporary samples at n particles, for a `with` block.
+
+        They can be compared with other samples, but others do not find them. Do not add samples in
+        the block.
+        """
+        count = self.count
+        try:
+            yield self._append_at(
+                particles, np.full(len(particles), -1, np.int32), np.zeros(len(particles))
+            )
+        finally:
+            self.count = count
+
+    def _append_at(
+        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray
+    ) -> np.ndarray:
+        """Append rows for particles, without adding them to the grid."""
+        mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
+        member = mesh.members_at(triangle, weights, particles.member)
+        member = np.where(member == 0, particles.member, member)
+        direction = mesh.directions_at(triangle, weights, member)
+        position = mesh.points_at(triangle, weights)
+        normal = mesh.shading_normals_at(triangle, weights)
+        world_direction = mesh.transport_to_normal(
+            triangle, mesh.to_world(triangle, direction), normal
+        )
+        world_member = world_direction
+        if direction is not member:
+            world_member = mesh.transport_to_normal(
+                triangle, mesh.to_world(triangle, member), normal
+            )
+        return self.append(
+            frame=np.stack([position, normal, world_direction, world_member], axis=1),
+            spacing=self.spacing_at(particles),
+            stroke=stroke,
+            arc=arc,
+            step=np.full(len(triangle), self.current_step),
+            alive=np.ones(len(triangle), dtype=bool),
+            side_neighbor=np.full((len(triangle), 2), -1),
+            triangle=triangle,
+            weights=weights,
+            local_member=member,
+            local_direction=direction,
+        )
+
+    def remove(self, sample: np.ndarray) -> None:
+        """Remove samples. The sides that they cover stay covered until `reset_coverage`."""
+        self.alive[sample] = False
+        self.grid.remove(sample)
+
+    def remove_strokes(self, stroke_alive: np.ndarray, first: int) -> None:
+        """Remove all samples of strokes that are not alive, and recheck their neighbors.
+
+        Parameters
+        ----------
+        stroke_alive : ndarray of bool
+            For each stroke.
+        first : int
+            Number of the first sample that may have to be removed.
+        """
+        removed = ~stroke_alive[self.stroke[first : self.count]]
+        removed &= self.alive[first : self.count]
+        sample = first + np.flatnonzero(removed)
+        neighbor = self.side_neighbor[sample].ravel()
+        self._recheck.append(neighbor[neighbor >= 0])
+        self.remove(sample)
+
+    # --- coverage of sides ------------------------------------------------------------------------
+
+    def mark_covered(self, pairs: CoveringPairs) -> None:
+        """Mark the sides on which samples and their neighbors have each other as covered."""
+        self.covered[pairs.sample, pairs.sample_side] = True
+        self.covered[pairs.neighbor, pairs.neighbor_side] = True
+        self.side_neighbor[pairs.sample, pairs.sample_side] = pairs.neighbor
+
+    def add_open_sides(self, sample: np.ndarray) -> None:
+        """Add the uncovered sides of samples to the open sides."""
+        covered = self.covered[sample]
+        added = np.concatenate([2 * sample[~covered[:, 0]], 2 * sample[~covered[:, 1]] + 1])
+        self._open_sides = np.concatenate([self._open_sides, added])
+
+    @property
+    def has_open_sides(self) -> bool:
+        """Whether any sides were open at the last call of `open_sides`, or were added since."""
+        return len(self._open_sides) > 0
+
+    def open_sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the samples (k,) and sides (k,) that are open: 0 is left, 1 is right."""
+        sample, side = self._open_sides >> 1, self._open_sides & 1
+        keep = self.alive[sample] & ~self.covered[sample, side]
+        self._open_sides = self._open_sides[keep]
+        return sample[keep], side[keep]
+
+    def close_sides(self, sample: np.ndarray, side: np.ndarray) -> None:
+        """Treat sides as covered until `reset_coverage`."""
+        self.covered[sample, side] = True
+        self._recheck.append(sample)
+
+    def close_open_sides(self) -> None:
+        """Forget all open sides until `reset_coverage`."""
+        self._recheck.append(np.unique(self._open_sides >> 1))
+        self._open_sides = np.empty(0, dtype=np.int64)
+
+    def reset_coverage(self) -> np.ndarray:
+        """Mark the sides of samples that have to be checked again as not covered.
+
+        These are the samples whose neighbors were removed or whose sides were closed.
+
+        Returns
+        -------
+        (k,) ndarray of int
+            Their numbers. The caller marks sides that are covered, then calls `add_open_sides`.
+        """
+        sample = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *self._recheck]))
+        sample = sample[self.alive[sample]]
+        self._recheck = []
+        self.covered[sample] = False
+        return sample

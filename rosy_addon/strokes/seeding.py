@@ -1,0 +1,209 @@
+"""Choose seeds of strokes: evenly distributed on a mesh, or beside strokes at the required spacing.
+
+Seeds beside strokes are those of Jobard and Lefer (1997), but along each side of a stroke only one
+is tried at a time, in the middle of the longest open run of samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..field.frames import dot
+from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
+from .samples import SAMPLE_STEP, StrokeSamples
+from .surface_particles import SurfaceParticles, trace_geodesics
+from .tangent_mesh import TangentMesh, nearest_member
+
+#: Candidate seeds per area of one squared spacing.
+CANDIDATE_DENSITY = 0.35
+
+#: After a seed was tried beside a stroke, no other is tried within this distance along the stroke,
+#: in spacings.
+RETRY_ARC = 1.0
+
+#: Largest distance between consecutive open samples in one run, in steps between samples.
+MAX_RUN_STEP = 1.6
+
+#: A seed has room if at least this fraction of the distance to it lies on the surface.
+MIN_WALKED_RATIO = 0.999
+
+#: Gaps that are wider than this in spacings are divided for two strokes, other gaps for one.
+MIN_TWO_STROKE_GAP = 2.5
+
+#: Seeds that are compared with samples at once. Bounds memory.
+SEED_BATCH_SIZE = 1 << 14
+
+
+# --- on the mesh ----------------------------------------------------------------------------------
+
+
+def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfaceParticles:
+    """Return seeds at evenly distributed points of the mesh, one for each line at each point.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    corner_spacing : (T, 3) ndarray
+        Spacing at the corners of the triangles, in world space.
+    """
+    spacing = corner_spacing.mean(axis=1)
+    cumulative = np.cumsum(CANDIDATE_DENSITY * mesh.area / spacing**2 * (mesh.z != 0).any(axis=1))
+    count = int(np.ceil(cumulative[-1]))
+    triangle = np.searchsorted(cumulative, (np.arange(count) + 0.5) * cumulative[-1] / count)
+    triangle = np.minimum(triangle, len(cumulative) - 1).astype(np.int32)
+    # A low-discrepancy sequence within triangles: multiples of irrational numbers.
+    u = np.modf((np.arange(count) + 1) * 0.7548776662466927)[0]
+    v = np.modf((np.arange(count) + 1) * 0.5698402909980532)[0]
+    fold = u + v > 1
+    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
+    weights = np.stack([1 - u - v, u, v], axis=1)
+    z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
+    member = nearest_member(np.ones(count, dtype=complex), z, mesh.degree)
+    rotations = np.exp(2j * np.pi * np.arange(mesh.family_count) / mesh.degree)
+    seeds = SurfaceParticles(
+        np.repeat(triangle, mesh.family_count),
+        np.repeat(weights, mesh.family_count, axis=0),
+        (member[:, None] * rotations).ravel(),
+        np.ones(count * mesh.family_count),
+    )
+    return seeds.take(np.flatnonzero(seeds.member != 0))
+
+
+def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
+    """Return the seeds that have no stroke of their family near."""
+    is_uncovered = np.zeros(len(seeds), dtype=bool)
+    for start in range(0, len(seeds), SEED_BATCH_SIZE):
+        batch = np.arange(start, min(start + SEED_BATCH_SIZE, len(seeds)))
+        with samples.probes(seeds.take(batch)) as probes:
+            neighbors = find_lateral_neighbors(samples, probes, MAX_COVERED_GAP, np.inf)
+        is_uncovered[batch] = ~neighbors.rejected
+    return seeds.take(np.flatnonzero(is_uncovered))
+
+
+def thinned_seeds(mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float) -> SurfaceParticles:
+    """Return the seeds at points that are about `cell_size` apart in world space.
+
+    All seeds at a chosen point are returned, one for each line.
+    """
+    if not len(seeds):
+        return seeds
+    position = mesh.points_at(seeds.triangle, seeds.weights)
+    low, extent = position.min(axis=0), np.ptp(position, axis=0)
+    # Divide the bounding box into cells, and choose the point nearest to the center of each cell.
+    cell_counts = np.maximum(np.ceil(extent / cell_size), 1)
+    grid_position = (position - low) * cell_counts / np.maximum(extent, 1e-300)
+    cell = np.minimum(np.floor(grid_position), cell_counts - 1)
+    center_offset = grid_position - cell - 0.5
+    cell_index = (cell[:, 0] * cell_counts[1] + cell[:, 1]) * cell_counts[2] + cell[:, 2]
+    order = np.lexsort((np.round(dot(center_offset, center_offset), 9), cell_index))
+    first = order[np.unique(cell_index[order], return_index=True)[1]]
+    cell_rank = np.searchsorted(cell_index[first], cell_index)
+    to_chosen = position - position[first[cell_rank]]
+    return seeds.take(np.flatnonzero(dot(to_chosen, to_chosen) == 0))
+
+
+# --- beside strokes -------------------------------------------------------------------------------
+
+
+def longest_open_runs(
+    samples: StrokeSamples, sample: np.ndarray, side: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Find the middle of the longest open run on each side of each stroke.
+
+    Parameters
+    ----------
+    samples : StrokeSamples
+    sample, side : (n,) ndarray of int
+        Samples and their open sides: 0 is left, 1 is right.
+
+    Returns
+    -------
+    sample, side : (k,) ndarray of int
+        The middle of each run.
+    nearby, nearby_side : (m,) ndarray of int
+        All open sides within `RETRY_ARC` of a middle. If a seed does not fit there, one beside
+        it rarely does.
+    """
+    arc, key = samples.arc[sample], 2 * samples.stroke[sample].astype(np.int64) + side
+    order = np.lexsort((arc, key))
+    sample, side, arc, key = sample[order], side[order], arc[order], key[order]
+    starts_run = np.ones(len(key), dtype=bool)
+    starts_run[1:] = (key[1:] != key[:-1]) | (
+        np.diff(arc) > MAX_RUN_STEP * SAMPLE_STEP * samples.spacing[sample[1:]]
+    )
+    first = np.flatnonzero(starts_run)
+    length = np.diff(np.append(first, len(key)))
+    by_length = np.lexsort((-length, key[first]))
+    longest = np.unique(key[first][by_length], return_index=True)[1]
+    run = by_length[longest]
+    middle = first[run] + length[run] // 2
+    run_middle = middle[np.searchsorted(key[middle], key)]
+    is_nearby = np.abs(arc - arc[run_middle]) <= RETRY_ARC * samples.spacing[sample]
+    return sample[middle], side[middle], sample[is_nearby], side[is_nearby]
+
+
+def lateral_seeds(
+    samples: StrokeSamples, sample: np.ndarray, side: np.ndarray
+) -> tuple[SurfaceParticles, np.ndarray]:
+    """Return seeds beside samples.
+
+    A seed is one spacing away. If there is a stroke on the other side of the gap, the seed divides
+    the gap evenly for one or two strokes.
+
+    Parameters
+    ----------
+    samples : StrokeSamples
+    sample, side : (n,) ndarray of int
+        Samples and sides: 0 is left, 1 is right.
+
+    Returns
+    -------
+    seeds : SurfaceParticles
+        n seeds.
+    has_room : (n,) bool ndarray
+        False if the surface ends before the seed, or the field is zero there.
+    """
+    seeds, has_room = _lateral_points(samples, sample, side, np.ones(len(sample)))
+    free_gap = _free_gap(samples, sample, seeds, has_room)
+    bounded = np.flatnonzero(np.isfinite(free_gap))
+    full_gap = 1 + free_gap[bounded]
+    shared_distance = full_gap / np.where(full_gap > MIN_TWO_STROKE_GAP, 3, 2)
+    moved_seeds, has_room[bounded] = _lateral_points(
+        samples, sample[bounded], side[bounded], shared_distance
+    )
+    seeds.assign(bounded, moved_seeds)
+    return seeds, has_room
+
+
+def _lateral_points(
+    samples: StrokeSamples, sample: np.ndarray, side: np.ndarray, distance: np.ndarray
+) -> tuple[SurfaceParticles, np.ndarray]:
+    """Return the points at (n,) distances beside samples, in spacings; see `lateral_seeds`."""
+    particles = SurfaceParticles(
+        samples.triangle[sample],
+        samples.weights[sample],
+        samples.local_member[sample],
+        np.ones(len(sample)),
+    )
+    direction = samples.local_direction[sample] * np.where(side == 0, 1j, -1j)
+    length = distance * samples.spacing[sample]
+    arrived, walked = trace_geodesics(samples.mesh, particles, direction, length)
+    return arrived, (walked >= MIN_WALKED_RATIO * length) & (arrived.member != 0)
+
+
+def _free_gap(
+    samples: StrokeSamples, sample: np.ndarray, seeds: SurfaceParticles, has_room: np.ndarray
+) -> np.ndarray:
+    """Return (n,) gaps from seeds to the next stroke on the side away from the sample.
+
+    They are in spacings, and infinite if there is no stroke or no room for the seed.
+    """
+    free_gap = np.full(len(sample), np.inf)
+    indices = np.flatnonzero(has_room)
+    with samples.probes(seeds.take(indices)) as probes:
+        to_sample = samples.position[sample[indices]] - samples.position[probes]
+        left = np.cross(samples.normal[probes], samples.direction[probes])
+        opposite_side = (dot(to_sample, left) > 0).astype(np.intp)
+        gap = find_lateral_neighbors(samples, probes, 0.0, np.inf).gap
+    free_gap[indices] = gap[np.arange(len(indices)), opposite_side]
+    return free_gap

@@ -142,8 +142,8 @@ def add_junit(counts: dict[str, int], results: Path) -> None:
 def add_window(counts: dict[str, int], said: Path) -> None:
     """Count what the run in a window wrote, step by step."""
     steps = json.loads(said.read_text()) if said.is_file() else {}
-    for step, failure in steps.items():
-        print(f"window: {step}: {failure or 'passed'}")
+    for step, (failure, seconds) in steps.items():
+        print(f"window: {step}: {failure or 'passed'} ({seconds} s)")
         counts["failed" if failure else "passed"] += 1
     if "the end" not in steps:
         print("the run in a window did not come to its end")

@@ -34,7 +34,7 @@ def _resume(work):
         try:
             pause = next(work)
         except StopIteration:
-            failed = any(json.loads(RESULTS.read_text()).values())
+            failed = any(error for error, _ in json.loads(RESULTS.read_text()).values())
             sys.stdout.flush()
             os._exit(1 if failed else 0)
         return 0.05 if pause is None else pause
@@ -45,14 +45,14 @@ def _resume(work):
 def _all(steps):
     results = {}
     for step in steps:
-        name = step.__name__.replace("_", " ")
+        start, error = time.monotonic(), ""
         try:
             yield from step()
-            results[name] = ""
         except Exception:
-            results[name] = traceback.format_exc()
+            error = traceback.format_exc()
+        results[step.__name__.replace("_", " ")] = error, round(time.monotonic() - start, 1)
         RESULTS.write_text(json.dumps(results))
-    results["the end"] = ""
+    results["the end"] = "", 0.0
     RESULTS.write_text(json.dumps(results))
 
 

@@ -53,6 +53,7 @@ def pixel_growth(plain, extended, camera):
     return lengths[1] - lengths[0]
 
 
+@pytest.mark.slow
 def test_extensions_at_borders_are_straight_and_of_different_lengths():
     plain, extended = draw_both([SQUARE], TOP_CAMERA, spacing=3.0)
     assert len(plain) == len(extended) > 50
@@ -80,6 +81,7 @@ def test_overshoot_of_zero_changes_nothing():
     assert np.array_equal(a.points, b.points) and np.array_equal(a.width, b.width)
 
 
+@pytest.mark.slow
 def test_extensions_cross_the_silhouette():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     assert len(plain) == len(extended)
@@ -108,6 +110,7 @@ def test_extensions_cross_the_silhouette():
     assert checked > 20
 
 
+@pytest.mark.slow
 def test_extensions_have_the_direction_of_their_strokes():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     plain_pixels, extended_pixels = (
@@ -145,6 +148,7 @@ def test_extensions_lie_on_occluders_in_front():
     assert np.allclose(extended.points[on_square, 2], 0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_extensions_into_the_light_follow_the_surface():
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0, tone=True, light="lamp")
     # Where the sphere is visible, points are on it, within about half a pixel.
@@ -183,21 +187,23 @@ def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     assert np.allclose(ends_of(plain)[facing], ends_of(extended)[facing])
 
 
+@pytest.mark.slow
 def test_closed_strokes_and_outlines_are_not_extended():
-    circles = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
-    plain, extended = draw_both([circles], TOP_CAMERA, spacing=12.0, outline=True)
+    circles = MeshInstance(icosphere(3), IDENTITY, axis_field(icosphere(3), 4, (0, 0, 1)))
+    plain, extended = draw_both([circles], TOP_CAMERA, spacing=18.0, outline=True)
     closed = plain.closed & extended.closed
     assert closed.sum() >= 4
     for number in np.flatnonzero(closed):
         assert np.array_equal(plain.select([number]).points, extended.select([number]).points)
     occluder = MeshInstance(plane(), moved(x=1.2, z=1.7))
-    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=12.0, outline=True)
+    plain, extended = draw_both([circles, occluder], TOP_CAMERA, spacing=18.0, outline=True)
     for kind in OUTLINE_KINDS:
         a, b = (s.select(s.family == s.names.index(kind)) for s in (plain, extended))
         assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
     assert (~extended.closed).any()
 
 
+@pytest.mark.slow
 def test_ends_at_creases_are_extended():
     smooth = cube()
     surface = build_surface(
@@ -269,6 +275,7 @@ def test_points_beside_and_behind_the_camera_are_finite():
         assert np.abs(drawing.strokes.points[:, 2]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_extensions_of_short_strokes_and_for_plotters():
     extended = draw_instances(
         [SPHERE], FRONT_CAMERA, StrokeStyle(spacing=9, overshoot=MAX_PIXELS)

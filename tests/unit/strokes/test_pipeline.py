@@ -28,6 +28,7 @@ SPHERE = MeshInstance(icosphere(3), IDENTITY, generate(icosphere(3), "smoothest"
 CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.radians(40))
 
 
+@pytest.mark.slow
 def test_families_of_several_instances_are_merged_by_name():
     degree_6 = MeshInstance(icosphere(3), moved(x=0.9), generate(icosphere(3), "smoothest", 6))
     occluder = MeshInstance(plane(), moved(z=-1.0))
@@ -53,6 +54,7 @@ def test_families_of_several_instances_are_merged_by_name():
     assert np.abs(np.linalg.norm(strokes.points - center, axis=1) - 1).max() < 0.02
 
 
+@pytest.mark.slow
 def test_a_floor_that_continues_behind_the_camera_is_drawn():
     """Beside the camera, outside the frame, spacings in pixels are almost zero in world space."""
     surface = plane(60, 60, size=40.0)
@@ -94,6 +96,7 @@ def test_light_is_that_of_lambert():
     np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun, point]), both, atol=0.02)
 
 
+@pytest.mark.slow
 def test_spacing_is_wider_in_the_light():
     style = StrokeStyle(unit="world", distance=0.05, tone=True)
     strokes = draw_instances([SPHERE], CAMERA, style, lights=[KEY_LIGHT]).strokes
@@ -105,6 +108,7 @@ def test_spacing_is_wider_in_the_light():
     assert [len(np.unique(family[tone])) for tone in (light > 0.75, light < 0.2)] == [1, 2]
 
 
+@pytest.mark.slow
 def test_simplified_strokes_are_within_the_tolerance():
     strokes = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12)).strokes
     simplified = simplify_strokes(strokes, CAMERA)
@@ -150,6 +154,7 @@ def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho
     assert (offset / pixel[compared] > steepness).all()
 
 
+@pytest.mark.slow
 def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
     drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, taper=0.0))
     geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colours=["#112233", "#445566"]))
@@ -162,6 +167,7 @@ def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
     )
 
 
+@pytest.mark.slow
 def test_errors(error_of):
     assert "there is no field" in error_of(
         draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA

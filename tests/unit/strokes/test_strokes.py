@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from conftest import long, mainly
 from field_helpers import bumpy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -166,6 +167,7 @@ def min_distance_by_brute_force(strokes):
 # --- directions ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(st.floats(0, np.pi), st.integers(1, 6), st.integers(1, 7))
 def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cells):
@@ -183,7 +185,8 @@ def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cell
     assert gaps.nearest_distance.min() > 0.5
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [3, 4, *long(1, 2, 6)])
 def test_directions_are_those_of_the_field_everywhere(degree):
     surface = icosphere(3)
     instance = instance_of(surface, degree, kind="smoothest")
@@ -192,6 +195,7 @@ def test_directions_are_those_of_the_field_everywhere(degree):
     assert direction_errors(mesh, strokes).max() < 1.0
 
 
+@pytest.mark.slow
 def test_on_a_torus_strokes_wind_at_the_angle_of_the_field():
     """The expected direction is in closed form: at an angle to the circles around the axis."""
     angle = np.radians(25)
@@ -221,6 +225,7 @@ def test_segments_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
     assert (strokes.face == instance.surface.triangle_face[strokes.triangle]).all()
 
 
+@pytest.mark.slow
 def test_strokes_look_like_the_render():
     """Strokes have the direction of the field in the G-buffer at the pixels that they cross."""
     instance = instance_of(icosphere(4), 4, kind="smoothest")
@@ -252,6 +257,7 @@ def test_strokes_look_like_the_render():
     assert np.percentile(error[compared], 99) < 1.0
 
 
+@pytest.mark.slow
 def test_strokes_stop_at_creases_unless_asked():
     surface = sharp_cube()
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (1, 0.3, 0.2)))
@@ -293,7 +299,8 @@ def test_straight_ahead_is_a_geodesic():
 # --- separation ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("degree", [2, 4])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [4, *long(2)])
 def test_spacing_on_a_torus(degree):
     surface = torus()
     instance = instance_of(surface, degree, kind="axis" if degree == 2 else "smoothest")
@@ -303,7 +310,8 @@ def test_spacing_on_a_torus(degree):
     assert gaps.nearest_distance.min() >= 0.5
 
 
-@pytest.mark.parametrize("degree", [2, 4, 6])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [4, *long(2, 6)])
 def test_no_strokes_are_too_close_around_singularities(degree):
     instance = instance_of(icosphere(4), degree, kind="smoothest")
     strokes = trace_strokes(instance, 0.09)
@@ -335,9 +343,11 @@ def closest_approaches(strokes, center):
     return np.array(sorted(found)).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("degree", [2, 4, 6])
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("phase", [0.3, 1.1])
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("degree", "sign", "phase"),
+    mainly([(2, -1, 1.1), (4, 1, 0.3), (6, -1, 0.3)], product([2, 4, 6], [1, -1], [0.3, 1.1])),
+)
 def test_around_singularities_strokes_are_alike_on_all_sides(degree, sign, phase):
     """There are N - 1 or N + 1 equal sectors. The closest stroke has the same distance in each."""
     center, spacing = (0.013, -0.007), 0.08
@@ -480,6 +490,7 @@ def test_thin_sheets_do_not_interfere():
     assert 18 <= is_upper.sum() <= 22 and 18 <= (~is_upper).sum() <= 22
 
 
+@pytest.mark.slow
 def test_same_strokes_again():
     a, b = (trace_strokes(instance_of(icosphere(3), 4, kind="smoothest"), 0.1) for _ in range(2))
     assert np.array_equal(a.points, b.points) and np.array_equal(a.family, b.family)
@@ -517,6 +528,7 @@ def test_ink_coverage_follows_a_ramp_of_tone():
     assert np.abs(coverage - expected).max() < 0.1
 
 
+@pytest.mark.slow
 def test_strokes_are_denser_where_the_surface_is_more_curved():
     """On an ellipsoid, the length of strokes per area is one over the required spacing."""
     sphere = icosphere(4)
@@ -559,7 +571,8 @@ def test_families_by_tone():
         np.testing.assert_allclose(selected.width, expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("slant", [0.0, 0.8, 1.2])
+@pytest.mark.slow
+@pytest.mark.parametrize("slant", [0.8, *long(0.0, 1.2)])
 def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
     """The density is the length of lines per area in the picture, averaged over directions."""
     floor = plane(20, 20)
@@ -584,6 +597,7 @@ def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
 # --- families --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_families_are_consistent_on_a_torus():
     instance = instance_of(torus(48, 24), 4)
     assert global_labels(build_tangent_mesh(instance)) is not None
@@ -651,6 +665,7 @@ def test_gaps_at_crossings():
     assert not len(find_crossings(with_crossing_gaps(strokes, 0.3, weave=True)).stroke)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
 def test_cut_intervals_remove_their_length(low, size):
@@ -745,6 +760,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
         assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plotter", [False, True])
 def test_closed_strokes_are_closed_paths(plotter):
     instance = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
@@ -831,6 +847,7 @@ def write_sphere(path):
     path.write_text("\n".join(lines) + "\n")
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path, capsys, monkeypatch):
     mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
     write_sphere(mesh)

@@ -63,8 +63,6 @@ def run(*command) -> str:
 
 def browser(svg, png):
     """Draw an SVG file with Chromium."""
-    if BROWSER is None:
-        pytest.skip("no Chromium on the PATH")
     run(
         BROWSER,
         *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -79,9 +77,17 @@ def browser(svg, png):
 
 def inkscape(svg, png, *options):
     """Draw an SVG file with Inkscape."""
-    if INKSCAPE is None:
-        pytest.skip("no Inkscape on the PATH")
     run(INKSCAPE, svg, "--export-type=png", f"--export-filename={png}", *options)
+
+
+needs_inkscape = pytest.mark.skipif(INKSCAPE is None, reason="no Inkscape on the PATH")
+
+PROGRAMS = [
+    pytest.param(
+        browser, marks=pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
+    ),
+    pytest.param(inkscape, marks=needs_inkscape),
+]
 
 
 def ink_of(png):
@@ -147,7 +153,7 @@ def strokes(scene):
 
 
 @pytest.mark.parametrize("width", [PEN_WIDTH, 5.0])
-@pytest.mark.parametrize("program", [browser, inkscape])
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_programs_draw_the_strokes_where_the_camera_sees_them(
     program, width, strokes, scene, tmp_path
 ):
@@ -161,7 +167,7 @@ def test_programs_draw_the_strokes_where_the_camera_sees_them(
     assert abs(found.sum() / expected.sum() - 1) < 0.01
 
 
-@pytest.mark.parametrize("program", [browser, inkscape])
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
     """Open paths end at their first point, so they look the same."""
     instance, camera = scene
@@ -186,6 +192,7 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
 
 
 @needs_inkscape
+@needs_inkscape
 def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
     svg = tmp_path / "a.svg"
     write_svg(svg, strokes, scene[1], Pen(width=PEN_WIDTH))
@@ -200,6 +207,7 @@ def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
 
 
 @needs_inkscape
+@needs_inkscape
 def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
     write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=PEN_WIDTH, millimetres=48))
     # 254 dpi are ten pixels per millimeter.
@@ -207,7 +215,7 @@ def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
     assert correlation(ink_of(tmp_path / "a.png"), raster(strokes, scene[1], PEN_WIDTH)) > 0.98
 
 
-@pytest.mark.parametrize("program", [browser, inkscape])
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_half_the_opacity_is_half_the_ink(program, tmp_path):
     surface = plane()
     instance = MeshInstance(

@@ -87,7 +87,14 @@ def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
             shutil.rmtree(copy / "dist", ignore_errors=True)
             subprocess.run([python, "tools/build_zip.py", "dist"], check=True, **options)
             (zipped,) = (copy / "dist").glob("*.zip")
-            lane = [sys.executable, "tests/blender/run.py", "stable", str(zipped), "--no-window"]
+            lane = [
+                sys.executable,
+                "tests/blender/run.py",
+                "stable",
+                str(zipped),
+                "--windows",
+                "none",
+            ]
             command = [*lane, *fault.tests]
         done = subprocess.run(command, check=False, timeout=TIME_LIMIT, **options)
     except subprocess.TimeoutExpired:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Install the built zip into an empty Blender and test it there, headless and in a window.
 
-    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--no-window] [--vulkan] [PYTEST...]
+    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--windows NAMES] [--vulkan] [PYTEST...]
 
 REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. The screenshots of the panel
 go to DIR. The exit status is 0 only if all tests passed; the last line sums up, as pytest does.
@@ -23,6 +23,9 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
+
+#: Scripts that test in a window, by what they test.
+WINDOWS = {"panel": "window.py", "presets": "window_presets.py", "live": "window_live.py"}
 
 
 def main() -> int:
@@ -54,7 +57,11 @@ def arguments() -> argparse.Namespace:
         default=REPOSITORY.parent / "shared/tools/real-blender",
     )
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
-    parser.add_argument("--no-window", action="store_true")
+    parser.add_argument(
+        "--windows",
+        default="panel,presets,live",
+        help="which tests to run in a window, by default panel,presets,live; none for headless",
+    )
     parser.add_argument("--only-window", action="store_true")
     parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
@@ -98,14 +105,15 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         blender(
             "run", *backend, "--python-exit-code", "1", "-P", str(HERE / "inside.py"), "--",
             "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
-            *(options.pytest or [str(HERE)]),
+            *options.pytest, str(HERE),
         )  # fmt: skip
         add_junit(counts, results)
-    if not options.no_window:
+    windows = [WINDOWS[name] for name in options.windows.split(",") if name != "none"]
+    if windows:
         shots = folder / "shots"
         shots.mkdir()
         environment["ROSY_SHOTS"] = str(shots)
-        for script in ("window.py", "window_presets.py", "window_live.py"):
+        for script in windows:
             said = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(said)
             patience = 900 if "ROSY_LIVE_MANY" in environment else 420

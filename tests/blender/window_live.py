@@ -25,7 +25,7 @@ from watching import SHOTS, captured, in_view, rosy, until, view, watch
 MANY = bool(os.environ.get("ROSY_LIVE_MANY"))
 
 #: Views that are compared, all around, and frames of an animation.
-VIEWS, FRAMES = (24, 24) if MANY else (8, 6)
+VIEWS, FRAMES = (24, 24) if MANY else (4, 4)
 
 
 def live():
@@ -156,7 +156,7 @@ def every_view_is_a_bake():
     found = []
     for number in range(VIEWS):
         look_from(2 * math.pi * number / VIEWS, -0.6 + 1.2 * (number * 7 % VIEWS) / VIEWS)
-        view()[1].spaces.active.region_3d.view_perspective = "ORTHO" if number % 6 == 5 else "PERSP"
+        view()[1].spaces.active.region_3d.view_perspective = "ORTHO" if number % 3 == 2 else "PERSP"
         yield from at_rest()
         name = f"live-view-{number:02d}"
         found.append(agrees(name, captured(name, view()[2]), by_hand()))
@@ -617,7 +617,7 @@ def bad_fields_are_named():
 
 def nothing_leaks():
     """Switched on and off, files opened, steps undone: memory comes back to where it was."""
-    toggles, loads, undos = (500, 200, 100) if MANY else (12, 6, 8)
+    toggles, loads, undos = (500, 200, 100) if MANY else (4, 5, 3)
     yield from fresh_scene(levels=1)
     # On software OpenGL textures lie in the memory of the process: one that stays is seen there.
     cards = []

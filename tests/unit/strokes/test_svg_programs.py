@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import long
 from PIL import Image
 from scipy.ndimage import binary_erosion, gaussian_filter, sobel
 from shapes import plane, torus
@@ -45,6 +44,7 @@ LAYERS = "--actions=select-all:layers;select-list"
 #: Width of the pen in pixels.
 PEN_WIDTH = 1.5
 
+needs_browser = pytest.mark.skipif(not BROWSER, reason="no Chromium on the PATH")
 needs_inkscape = pytest.mark.skipif(not INKSCAPE, reason="no Inkscape on the PATH")
 
 
@@ -80,12 +80,8 @@ def inkscape(svg, png, *options):
     run(INKSCAPE, svg, "--export-type=png", f"--export-filename={png}", *options)
 
 
-needs_inkscape = pytest.mark.skipif(INKSCAPE is None, reason="no Inkscape on the PATH")
-
 PROGRAMS = [
-    pytest.param(
-        browser, marks=pytest.mark.skipif(BROWSER is None, reason="no Chromium on the PATH")
-    ),
+    pytest.param(browser, marks=needs_browser),
     pytest.param(inkscape, marks=needs_inkscape),
 ]
 
@@ -192,7 +188,6 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
 
 
 @needs_inkscape
-@needs_inkscape
 def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
     svg = tmp_path / "a.svg"
     write_svg(svg, strokes, scene[1], Pen(width=PEN_WIDTH))
@@ -206,7 +201,6 @@ def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
     assert correlation(ink_of(tmp_path / "a.png"), expected) > 0.98
 
 
-@needs_inkscape
 @needs_inkscape
 def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
     write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=PEN_WIDTH, millimetres=48))
@@ -235,14 +229,14 @@ def test_half_the_opacity_is_half_the_ink(program, tmp_path):
     assert abs(right.sum() / left.sum() - 0.5) < 0.02
 
 
-@pytest.mark.parametrize("program", [browser, *long(inkscape)])
-def test_strokes_have_the_directions_of_the_render(program, scene, tmp_path):
+@needs_browser
+def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
     instance, camera = scene
     lines = clip_to_visible(
         trace_strokes(instance, pixel_spacing(instance, camera, 5.0)), [instance], camera
     )
     write_svg(tmp_path / "a.svg", lines, camera)
-    program(tmp_path / "a.svg", tmp_path / "a.png")
+    browser(tmp_path / "a.svg", tmp_path / "a.png")
     picture, inside = rendered(scene, Look(shading=0.0), border=12)
     product = line_directions(ink_of(tmp_path / "a.png")) * line_directions(picture).conj()
     error = np.degrees(np.abs(np.angle(product[inside])) / 2)
@@ -250,13 +244,13 @@ def test_strokes_have_the_directions_of_the_render(program, scene, tmp_path):
     assert np.cos(np.radians(2 * error)).mean() > 0.93
 
 
-@pytest.mark.parametrize("program", [inkscape, *long(browser)])
-def test_strokes_are_as_dark_as_the_render(program, scene, tmp_path):
+@needs_inkscape
+def test_strokes_are_as_dark_as_the_render(scene, tmp_path):
     instance, camera = scene
     style = StrokeStyle(spacing=4.0, tone=True, light="lamp")
     strokes = draw_instances([instance], camera, style, lights=[KEY_LIGHT]).strokes
     write_svg(tmp_path / "a.svg", strokes, camera, Pen(width=2.0))
-    program(tmp_path / "a.svg", tmp_path / "a.png")
+    inkscape(tmp_path / "a.svg", tmp_path / "a.png")
     ink = ink_of(tmp_path / "a.png")
     picture, inside = rendered(scene, Look(ink="hatch", shading=1.0, light="lamp"), border=4)
     weight = np.maximum(gaussian_filter(inside * 1.0, 12), 1e-9)

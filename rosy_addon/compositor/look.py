@@ -396,7 +396,7 @@ class Look:
         0.0,
         0.0,
         256.0,
-        "Maximum distance in pixels by which lines continue past tone borders, getting thinner",
+        "Maximum distance in pixels by which lines continue past the borders of tones, getting thinner",
         is_pixel_length=True,
         **_ink(),
     )

@@ -185,10 +185,11 @@ class GpuRenderer:
         camera = view.sample_camera
         if max(camera.width, camera.height) > self.device.max_texture_size:
             raise RosyError(
-                f"a picture of {camera.width} x {camera.height} pixels, subpixels counted, is too "
-                f"large for this graphics card, which draws up to {self.device.max_texture_size}"
+                f"a frame of {camera.width} x {camera.height} pixels, including supersampling, is too "
+                f"large for this graphics card (at most {self.device.max_texture_size}): choose a "
+                "smaller size, or the processor"
             )
-        yield Progress(0.0, "finding what is seen")
+        yield Progress(0.0, "finding visible pixels")
         look = look_in_pixels(view.look, camera, [item.instance for item in items])
         clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
         frame = _Frame(items, camera, look, view.lights, view.reference, clip_planes)
@@ -467,7 +468,7 @@ class GpuRenderer:
         for start in range(bottom, top, band_rows):
             band = left, start, right, min(start + band_rows, top)
             self._run(passes.LIC, band, textures, {"picture": picture}, uniforms)
-            yield Progress((start + band_rows - bottom) / (top - bottom), "following streamlines")
+            yield Progress((start + band_rows - bottom) / (top - bottom), "tracing streamlines")
 
     def _unfold(
         self, frame: _Frame, kind: FieldKind, box: Box, covering: dict[str, Any]

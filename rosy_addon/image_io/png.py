@@ -87,7 +87,7 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         per channel.
     """
     chunks = _read_chunks(path, read_bytes(path))
-    invalid_file = RosyError(f"{path}: is broken, or no .png file as it should be")
+    invalid_file = RosyError(f"{path}: is damaged, or not a valid .png file")
     try:
         width, height, bits, color_type, _, _, interlaced = struct.unpack(
             ">IIBBBBB", chunks[b"IHDR"]
@@ -96,7 +96,7 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         raise invalid_file from None
     if bits not in (8, 16) or color_type not in _CHANNELS_BY_COLOR_TYPE or interlaced:
         raise RosyError(
-            f"{path}: only pictures of 8 or 16 bits a channel that are not interlaced are read"
+            f"{path}: only .png files with 8 or 16 bits per channel, not interlaced, are supported"
         )
     bytes_per_sample = bits // 8
     bytes_per_pixel = _CHANNELS_BY_COLOR_TYPE[color_type] * bytes_per_sample

@@ -121,7 +121,7 @@ def read_mesh_field(
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
-            f"{label} has no attribute '{field_name}'; a vector on faces is wanted{_attribute_hint(mesh)}"
+            f"{label} has no attribute '{field_name}' with a vector on faces{_attribute_hint(mesh)}"
         )
     source = f"{label}, attribute '{field_name}'"
     values = _field_values(attribute, source, mesh)
@@ -158,7 +158,7 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     attribute = mesh.attributes[name]
     values = _field_values(attribute, source, mesh).astype(np.float64)
     if values.ndim == 1:
-        raise RosyError(f"{source}: found {_describe_type(attribute)}; a vector is wanted")
+        raise RosyError(f"{source}: expected a vector, found {_describe_type(attribute)}")
     apply_nonfinite_policy(values, source, attribute.domain.lower(), "error")
     if attribute.domain == "FACE":
         return values
@@ -199,7 +199,7 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
             None,
         )
         if obj is None:
-            raise RosyError(f"{source}: is neither an attribute nor a vertex group")
+            raise RosyError(f"{source}: no attribute or vertex group has this name")
         group = obj.vertex_groups[name].index
         domain, values = "POINT", np.zeros(len(mesh.vertices))
         for vertex in mesh.vertices:
@@ -237,7 +237,7 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     count, data_type = len(attribute.data), attribute.data_type
     if attribute.domain not in ("FACE", "POINT", "CORNER"):
         raise RosyError(
-            f"{source}: found {_describe_type(attribute)}; wanted on FACE, POINT or CORNER"
+            f"{source}: expected values on FACE, POINT or CORNER, found {_describe_type(attribute)}"
         )
     if data_type in ("FLOAT_COLOR", "BYTE_COLOR"):
         values = np.empty(4 * count, dtype=np.float32)
@@ -246,7 +246,7 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     dtypes = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
     if data_type not in dtypes:
         raise RosyError(
-            f"{source}: found {_describe_type(attribute)}; a number or a colour is wanted"
+            f"{source}: expected a number or a color, found {_describe_type(attribute)}"
         )
     values = np.empty(count, dtype=dtypes[data_type])
     attribute.data.foreach_get("value", values)
@@ -394,7 +394,7 @@ def _cached_field(
 
 #: Forms in which a field can be stored: label and description in the user interface.
 STORAGE_FORMS = {
-    "VECTOR": ("One Vector", "One direction on each face, the others follow from it"),
+    "VECTOR": ("One Vector", "One direction on each face, from which the others follow"),
     "DIRECTIONS": ("Directions", "All directions, as dir0, dir1 ... on faces"),
     "ANGLE": ("Angle", "The angle from each face's first edge, in radians"),
 }
@@ -441,7 +441,9 @@ def write_mesh_field(
             f"mesh '{mesh.name}' has {face_count} faces, but the field has {len(field.vectors)}"
         )
     if form == "ANGLE" and field.direction_ratios is not None:
-        raise RosyError(f"mesh '{mesh.name}': the directions of its field are no RoSy of one angle")
+        raise RosyError(
+            f"mesh '{mesh.name}': the directions of its field are not a RoSy, so one angle cannot store them"
+        )
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -490,8 +492,8 @@ def _check_attribute_type(mesh: bpy.types.Mesh, name: str, data_type: str) -> No
     attribute = mesh.attributes.get(name)
     if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", data_type):
         raise RosyError(
-            f"mesh '{mesh.name}' has an attribute '{name}' of another kind, {_describe_type(attribute)}; "
-            "remove it, or give the field another name"
+            f"mesh '{mesh.name}' already has an attribute '{name}' of another type "
+            f"({_describe_type(attribute)}): remove it, or choose another name for the field"
         )
 
 
@@ -506,7 +508,9 @@ def _get_or_create_attribute(
         if attribute is None or attribute.name != name:
             if attribute is not None:
                 mesh.attributes.remove(attribute)
-            raise RosyError(f"mesh '{mesh.name}': an attribute cannot be named '{name}'")
+            raise RosyError(
+                f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose another one"
+            )
     return attribute
 
 
@@ -514,11 +518,9 @@ def _check_writable(mesh: bpy.types.Mesh) -> None:
     """Raise an error if a mesh is linked from a library or in edit mode."""
     if not is_editable(mesh):
         library = mesh.library.filepath if mesh.library else "its library"
-        raise RosyError(
-            f"mesh '{mesh.name}' is linked from {library}: make it local to give it a field"
-        )
+        raise RosyError(f"mesh '{mesh.name}' is linked from {library}: make it local first")
     if mesh.is_editmode:
-        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave it (Tab) to give it a field")
+        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave edit mode (Tab) first")
 
 
 def _field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Mesh) -> np.ndarray:
@@ -534,13 +536,13 @@ def _field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.M
     vectors = [(domain, _VECTOR) for domain in ("FACE", "POINT", "CORNER")]
     if attribute_type not in [*vectors, ("FACE", _FLOAT)]:
         raise RosyError(
-            f"{source}: found {_describe_type(attribute)}; wanted FLOAT_VECTOR on FACE (or POINT or "
-            "CORNER), or angles as FLOAT on FACE"
+            f"{source}: expected FLOAT_VECTOR on FACE, POINT or CORNER, or angles as FLOAT on FACE, "
+            f"found {_describe_type(attribute)}"
         )
     columns = 3 if attribute.data_type == _VECTOR else 1
     elements = {"FACE": mesh.polygons, "POINT": mesh.vertices, "CORNER": mesh.loops}
     if len(attribute.data) != len(elements[attribute.domain]):
-        raise RosyError(f"{source}: cannot be read in edit mode: leave it (Tab) first")
+        raise RosyError(f"{source}: cannot be read in edit mode: leave edit mode (Tab) first")
     values = np.empty(len(attribute.data) * columns, dtype=np.float32)
     attribute.data.foreach_get("vector" if columns == 3 else "value", values)
     return values.reshape(-1, 3) if columns == 3 else values
@@ -558,7 +560,7 @@ def _attribute_hint(mesh: bpy.types.Mesh) -> str:
         for other in mesh.attributes
         if other.data_type == _VECTOR and other.name not in ("position", "rest_position")
     ]
-    return f"; there are {', '.join(names)}" if names else ""
+    return f": choose {' or '.join(names)}" if names else ": make or import a field"
 
 
 def _field_from_directions(
@@ -569,7 +571,9 @@ def _field_from_directions(
     while f"dir{degree}" in mesh.attributes:
         degree += 1
     if degree > MAX_DEGREE:
-        raise RosyError(f"{label}: has {degree} attributes dir0 ..., at most {MAX_DEGREE} are read")
+        raise RosyError(
+            f"{label}: has {degree} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
+        )
     first_attribute = mesh.attributes["dir0"]
     directions = []
     for index in range(degree):
@@ -581,8 +585,8 @@ def _field_from_directions(
             or attribute.domain != first_attribute.domain
         ):
             raise RosyError(
-                f"{source}: found {_describe_type(attribute)}; wanted FLOAT_VECTOR on FACE or POINT, the "
-                "same for all members"
+                f"{source}: expected FLOAT_VECTOR on FACE or POINT, the same for all directions, "
+                f"found {_describe_type(attribute)}"
             )
         directions.append(_field_values(attribute, source, mesh))
     source = f"{label}, attributes dir0 to dir{degree - 1}"

@@ -187,7 +187,7 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     """
     directory = scene.rosy.directory
     if directory.startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{directory}: save the .blend file first, or choose a folder")
+        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
     return Path(bpy.path.abspath(directory))
 
 
@@ -373,7 +373,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
     record = scene.rosy.bakes.get(camera)
     if record is None:
         names = ", ".join(f"'{other.name}'" for other in scene.rosy.bakes) or "none"
-        raise RosyError(f"nothing is baked from camera '{camera}'; there are {names}")
+        raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
     for entry in record.objects:
         obj = scene.objects.get(entry.name) or bpy.data.objects.get(entry.name)
         if obj is None or not is_editable(obj):
@@ -545,7 +545,7 @@ def _display_warnings(scene: bpy.types.Scene) -> list[str]:
     transform = scene.view_settings.view_transform
     if transform in NEUTRAL_VIEW_TRANSFORMS:
         return []
-    return [f"the view transform {transform} greys the lines; Standard shows them as drawn"]
+    return [f"the view transform {transform} changes the colors of pictures: choose Standard"]
 
 
 # --- whether a picture is out of date ---------------------------------------------------------
@@ -560,13 +560,13 @@ def _stale_reason(scene: bpy.types.Scene, record: bpy.types.PropertyGroup) -> st
     if record.camera_state:
         camera = scene.objects.get(record.name)
         if camera is None or camera.type != "CAMERA":
-            return f"camera '{record.name}' is gone"
+            return f"camera '{record.name}' was deleted"
         if record.camera_state != _camera_state(scene, camera):
             return f"camera '{record.name}' was changed"
     for entry in record.objects:
         obj = bpy.data.objects.get(entry.name)
         if obj is None:
-            return f"object '{entry.name}' is gone"
+            return f"object '{entry.name}' was deleted"
         transform_hash, mesh_state = entry.state.split(" ")
         current_transform_hash, current_mesh_state = _object_state(obj).split(" ")
         if transform_hash != current_transform_hash:

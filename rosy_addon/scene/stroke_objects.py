@@ -65,7 +65,9 @@ def target_objects(
         return objects
     selected = [obj for obj in objects if obj.select_get(view_layer=view_layer)]
     if not selected:
-        raise RosyError("none of the selected objects has a field: select one that has")
+        raise RosyError(
+            "no selected object has a field: select one with a field, or switch off Selected Only"
+        )
     return selected
 
 

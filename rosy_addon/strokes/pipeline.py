@@ -127,7 +127,7 @@ def draw_bodies_task(
     cache = Cache() if cache is None else cache
     body_indices = [index for index, instance in enumerate(instances) if instance.field is not None]
     if not body_indices:
-        raise RosyError("there is no field to draw strokes along")
+        raise RosyError("no object has a field: strokes need one")
     if clip_to_frame or not style.hidden:
         body_indices = [index for index in body_indices if _is_in_view(instances[index], camera)]
     body_strokes = []
@@ -136,17 +136,21 @@ def draw_bodies_task(
         work = _trace_body(instances[index], camera, style, lights, cache)
         body_strokes.append((yield from subtask(work, start, stop)))
     if not body_strokes:
-        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+        raise RosyError(
+            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
+        )
     strokes = reduce(Strokes.concatenate, body_strokes)
     if not len(strokes):
-        raise RosyError("there is no room for a stroke: ask for a narrower spacing")
+        raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clip_to_frame or not style.hidden:
-        yield Progress(0.85, "finding what is seen")
+        yield Progress(0.85, "finding visible strokes")
         strokes = clip_to_visible(strokes, instances, camera, remove_hidden=not style.hidden)
     if style.overshoot:
         strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
-        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+        raise RosyError(
+            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
+        )
     family_counts = [len(single.names) for single in body_strokes]
     body_index = np.repeat(np.array(body_indices, dtype=np.int32), family_counts)[strokes.family]
     return StrokeDrawing(_merge_families_by_name(strokes), body_index, style.hidden)

@@ -268,4 +268,6 @@ def test_no_end_is_loose_unless_something_ended_it():
 
 
 def test_wrong_input_is_one_line(error_of):
-    assert "setting 'overshoot' is -1, not from 0" in error_of(StrokeStyle, overshoot=-1)
+    assert "setting 'overshoot' is -1, expected a number from 0" in error_of(
+        StrokeStyle, overshoot=-1
+    )

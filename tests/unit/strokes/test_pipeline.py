@@ -143,15 +143,15 @@ def test_lines_have_the_width_of_the_pen():
 
 
 def test_what_is_wrong_is_said(error_of):
-    assert "there is no field" in error_of(draw_bodies, [MeshInstance(plane(), STILL)], CAMERA)
+    assert "no object has a field" in error_of(draw_bodies, [MeshInstance(plane(), STILL)], CAMERA)
     behind = MeshInstance(BALL.surface, moved(y=-50.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [behind], CAMERA)
+    assert "no stroke is visible" in error_of(draw_bodies, [behind], CAMERA)
     unseen = draw_bodies([behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False)
     assert 20 < len(unseen.strokes) < 2000
-    assert "no room" in error_of(draw_bodies, [BALL], CAMERA, StrokeStyle(spacing=500))
+    assert "no stroke fits" in error_of(draw_bodies, [BALL], CAMERA, StrokeStyle(spacing=500))
     away = MeshInstance(BALL.surface, moved(x=9.0), BALL.field)
-    assert "sees none" in error_of(draw_bodies, [away], CAMERA)
-    assert "setting 'spacing' is 0, not from 0.5" in error_of(StrokeStyle, spacing=0)
+    assert "no stroke is visible" in error_of(draw_bodies, [away], CAMERA)
+    assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
-    assert "'sun', not one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
+    assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
     assert "pen" in error_of(Pen, width=0.0)

@@ -879,9 +879,9 @@ def test_wrong_input_is_one_line(error_of):
     assert "above 0" in error_of(trace_strokes, instance, 0.0)
     assert "too many" in error_of(trace_strokes, instance, 1e-6)
     assert "no field" in error_of(trace_strokes, MeshInstance(surface, STILL), 0.1)
-    assert "zero all over" in error_of(
+    assert "zero everywhere" in error_of(
         trace_strokes, MeshInstance(surface, STILL, RosyField(4, np.zeros((16, 3)))), 0.1
     )
-    assert "vertices" in error_of(trace_strokes, instance, np.ones(7))
-    assert "first" in error_of(SeparationRules, min_separation=1.2)
-    assert "shortest" in error_of(SeparationRules, min_length=5.0, max_length=3.0)
+    assert "per vertex" in error_of(trace_strokes, instance, np.ones(7))
+    assert "min_separation" in error_of(SeparationRules, min_separation=1.2)
+    assert "min_length" in error_of(SeparationRules, min_length=5.0, max_length=3.0)

@@ -17,7 +17,7 @@ from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
 
 #: What Blender defines for shaders that draw into its views.
-BLENDER = "#define blender_srgb_to_framebuffer_space(colour) (colour)\n"
+BLENDER = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
 
 
 class EglDevice:

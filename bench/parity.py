@@ -1,10 +1,11 @@
 """The graphics card beside numpy: how far their G-buffers and their pictures agree.
 
     blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
+        [--data FOLDER]
 
-Draws sphere, torus, Suzanne, bunny and vase for N = 1 to 6, on whatever Blender draws with, and
-prints a row for each. The last two are meshes in ../shared/data, and left out where that is not.
-The tests measure with what is here, too.
+Draws a sphere, a torus and Suzanne for N = 1 to 6 with the graphics card that Blender uses, and
+prints a row for each. With `--data`, also the bunny and the vase, which are the files
+`meshes/stanford-bunny.obj` and `meshes/vase.off` in FOLDER. The tests use these functions too.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-MESHES = ROOT.parent / "shared" / "data" / "meshes"
 
 #: How far apart, in pixels, two points may be to be one. OpenGL rounds the corners of triangles to
 #: 1/256 of a pixel, and on steep parts depth changes by many pixels for each across.
@@ -33,7 +33,10 @@ ALIKE = 1e-3
 
 DEGREES = (1, 2, 3, 4, 5, 6)
 
-#: Azimuth, elevation and whether in perspective.
+#: Mesh files in the data folder, by the name of the shape.
+FILES = {"bunny": "stanford-bunny.obj", "vase": "vase.off"}
+
+#: Azimuth and elevation in degrees, and whether the view is in perspective.
 VIEWS = {
     "sphere": (30.0, 20.0, True),
     "torus": (20.0, 40.0, False),
@@ -190,7 +193,7 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
 def likeness(one: np.ndarray, other: np.ndarray) -> float:
     """The correlation of two (H, W, 4) linear pictures where both cover a pixel wholly.
 
-    Of grey pictures it is that of their grey values; of coloured ones the least of the channels.
+    For gray pictures, of their values; for colored ones, the smallest of the channels.
     """
     both = (one[..., 3] == 1) & (other[..., 3] == 1)
     one, other = one[both].astype(np.float64), other[both].astype(np.float64)
@@ -221,12 +224,12 @@ def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
         bpy.ops.object.delete()
 
 
-def surface_named(rosy: SimpleNamespace, name: str) -> Any:
-    """One of `VIEWS`, None if its file is not there."""
-    files = {"bunny": MESHES / "stanford-bunny.obj", "vase": MESHES / "vase.off"}
-    if name not in files:
+def surface_named(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
+    """The surface of a shape in `VIEWS`; None if its file is not in the data folder."""
+    if name not in FILES:
         return blender_surface(rosy, name)
-    return rosy.read_mesh(files[name]) if files[name].is_file() else None
+    path = None if data is None else data / "meshes" / FILES[name]
+    return rosy.read_mesh(path) if path is not None and path.is_file() else None
 
 
 def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
@@ -235,12 +238,12 @@ def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any
     return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
 
 
-def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
-    """A line of the table for each shape and degree."""
+def sweep(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) -> Iterator[str]:
+    """The lines of the table: its header, and a row for each shape and degree."""
     yield "| shape | triangles | N | pixels | agree % | correlation | shaded | card s | numpy s |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
     for name in VIEWS:
-        surface = surface_named(rosy, name)
+        surface = surface_named(rosy, name, data)
         if surface is None:
             continue
         camera = camera_for(rosy, name, surface, size)
@@ -263,15 +266,16 @@ def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """What the command line asks for."""
+    """Print the table, and write it to a file if requested."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--out", type=Path, help="write the table here, too")
+    parser.add_argument("--out", type=Path, help="also write the table to this file")
+    parser.add_argument("--data", type=Path, help="folder with the meshes of bunny and vase")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     rosy = rooms()
     device = module_of(rosy.package, "gpu.device").BlenderDevice()
     lines = []
-    for line in sweep(rosy, rosy.GpuRenderer(device), options.size):
+    for line in sweep(rosy, rosy.GpuRenderer(device), options.size, options.data):
         print(line, flush=True)
         lines.append(line)
     if options.out:

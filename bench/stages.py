@@ -52,7 +52,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
             corner_field_task(instance.surface, instance.matrix, instance.field, look.display)
         ),
         "project": lambda: project([instance], camera, look.display, cache),
-        "  of which rasterise": lambda: rasterize(clip, triangle, camera.width, camera.height),
+        "  of which rasterize": lambda: rasterize(clip, triangle, camera.width, camera.height),
         "compose": lambda: compose(gbuffer, look),
         "  of which links": lambda: neighbor_masks(gbuffer, look.crease_angle, look.cross_creases),
         "  of which axes on screen": lambda: screen_jacobians(gbuffer),

@@ -174,9 +174,9 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
 
 def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray:
     """(H, W, 4) uint8 colors of (H, W, 1) palette indices."""
-    colours = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
-    palette = np.full((len(colours), 4), 255, dtype=np.uint8)
-    palette[:, :3] = colours
+    colors = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
+    palette = np.full((len(colors), 4), 255, dtype=np.uint8)
+    palette[:, :3] = colors
     alpha = np.frombuffer(chunks.get(b"tRNS", b""), dtype=np.uint8)
     palette[: len(alpha), 3] = alpha
     return palette[values[..., 0]]

@@ -211,7 +211,7 @@ def test_writing(scene, monkey):
     before = contents()
     with pytest.raises(RosyError, match="'Suzanne' has 500 faces, but the field has 499"):
         write_mesh_field(monkey.data, RosyField(4, field.vectors[1:]))
-    with pytest.raises(RosyError, match="'UVMap' of another type .FLOAT2 on CORNER"):
+    with pytest.raises(RosyError, match=r"'UVMap' of another type \(FLOAT2 on CORNER"):
         write_mesh_field(monkey.data, field, "UVMap")
     with pytest.raises(RosyError, match="'position' of another type"):
         write_mesh_field(monkey.data, field, "position")

@@ -161,16 +161,16 @@ def test_strokes_of_frames(drawable, tmp_path):
     [
         (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
         (["--object", "Nobody"], "there is no object 'Nobody'"),
-        (["field.rosy"], "suzanne.blend: FIELD is for mesh files"),
-        (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh is for mesh files"),
-        (["--view", "0,90"], "suzanne.blend: --view is for mesh files"),
+        (["field.rosy"], "suzanne.blend: FIELD applies only to mesh files"),
+        (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh applies only to mesh files"),
+        (["--view", "0,90"], "suzanne.blend: --view applies only to mesh files"),
         (["--frames", "1-3"], "out.svg: several frames need #"),
         (
             ["--frames", "9", "--spacing", "9999", "--no-outline"],
             "frame 9: no stroke fits on the surface",
         ),
-        (["-o", "a.png"], "a.png: strokes are written to .svg files"),
-        (["-o", "/nowhere/a.svg"], "there is no folder /nowhere"),
+        (["-o", "a.png"], "a.png: the name of the file must end in .svg"),
+        (["-o", "/nowhere/a.svg"], "the folder /nowhere does not exist"),
     ],
 )
 def test_bad_input_for_strokes_is_one_line(words, wanted, drawable, tmp_path):

@@ -24,7 +24,6 @@ OTHERS = (
     "hero",
     "looks-page",
     "hatching-page",
-    "presets-page",
     "peers",
     "strokes-page",
     "fields-page",

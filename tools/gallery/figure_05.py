@@ -12,7 +12,7 @@ from .looks import MEASURED, RED
 from .measure import correlation
 from .page import Page
 from .plane import averaged, enlarged, points, singularity
-from .sheet import Panel, grey, inset, magnified, outlined
+from .sheet import Panel, gray, inset, magnified, outlined
 
 DEGREE, FINER = 3, 2
 #: Drawn larger than shown, so that no streamline ends at a border that is seen.
@@ -65,9 +65,9 @@ def write() -> None:
     page.picture(
         [
             [
-                Panel(grey(_shown(weight, SMALL)), "cos²(3θ/2), the share of I"),
-                Panel(grey(_shown(1 - weight, SMALL)), "sin²(3θ/2), the share of I′"),
-                Panel(grey(_shown(blend.images.blend, SMALL)), "the blend, not corrected"),
+                Panel(gray(_shown(weight, SMALL)), "cos²(3θ/2), the share of I"),
+                Panel(gray(_shown(1 - weight, SMALL)), "sin²(3θ/2), the share of I′"),
+                Panel(gray(_shown(blend.images.blend, SMALL)), "the blend, not corrected"),
             ]
         ],
         "The weights, and the blend before its contrast is corrected",
@@ -132,7 +132,7 @@ def _shown(values: np.ndarray, size: int) -> np.ndarray:
 
 
 def _contrasted(values: np.ndarray, size: int) -> np.ndarray:
-    return grey(0.5 + GAIN * (_shown(values, size) - 0.5))
+    return gray(0.5 + GAIN * (_shown(values, size) - 0.5))
 
 
 def _members(layers: DegreeLayer, name: str, guide: int) -> list[Panel]:

@@ -12,7 +12,7 @@ from rosy_addon.compositor.look import Look
 from .looks import MEASURED
 from .page import Page
 from .plane import PlanarField, channel, compose_field
-from .sheet import Panel, chart, grey
+from .sheet import Panel, chart, gray
 
 DEGREE, SIZE, WHOLE = 6, 256, 400
 LOOK = MEASURED.with_settings({"noise": "colour"})
@@ -53,7 +53,7 @@ def write() -> None:
     )
     images = [_cut(channel_wise) for _, channel_wise, _ in shown]
     panels = [
-        [Panel(grey(image), f"({letter}) {name}"), _histogram(image[..., 0], deviation)]
+        [Panel(gray(image), f"({letter}) {name}"), _histogram(image[..., 0], deviation)]
         for image, (name, _, deviation), letter in zip(images, shown, "abcdef", strict=True)
     ]
     for part, chosen in (("members", panels[:3]), ("blended", panels[3:])):

@@ -74,7 +74,7 @@ def peaks(spectrum: np.ndarray, least: float = 1.5) -> list[float]:
     """Orientations, in degrees, of the maxima that stand out of a spectrum.
 
     The spectrum is smoothed over 5 degrees; a maximum counts if it is `least` times the mean. Its
-    place is the centre of the power within 6 degrees of it.
+    place is the center of the power within 6 degrees of it.
     """
     bins = len(spectrum)
     degree = 180 / bins

@@ -136,14 +136,14 @@ def use_cycles() -> None:
     scene.cycles.max_bounces = 0
 
 
-def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
-    """A material that is of one colour, lit or not."""
+def plain(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
+    """A material of one color, which light does not change."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     glow = nodes.new("ShaderNodeEmission")
-    glow.inputs["Color"].default_value = (*colour, 1)
+    glow.inputs["Color"].default_value = (*color, 1)
     links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
 
@@ -227,7 +227,7 @@ def sketched(
 
 
 def shader(monkey: bpy.types.Object) -> None:
-    """EEVEE: light turned into colour, and bands of the window that get wider where it is darker."""
+    """EEVEE: light as color, and bands across the window that get wider in the dark."""
     scene = bpy.context.scene
     scene.render.engine = "BLENDER_EEVEE"
     scene.eevee.taa_render_samples = 16

@@ -17,7 +17,7 @@ PlanarField = Callable[[np.ndarray], np.ndarray]
 
 
 def points(size: int, finer: int = 1) -> np.ndarray:
-    """(size * finer,) * 2 complex centres of the pixels of a square, counted from its middle."""
+    """(size * finer,) * 2 complex centers of the pixels of a square, counted from its middle."""
     along = (np.arange(size * finer) + 0.5) / finer - size / 2
     return along + 1j * along[:, None]
 

@@ -13,7 +13,7 @@ from .sheet import display
 
 #: Of a picture of few hues; and between tones of a channel, where many hues blend. Neither is to
 #: be seen, and both make the files a third as large.
-COLOURS, TONE = 64, 8
+COLORS, TONE = 64, 8
 
 
 def write() -> None:
@@ -27,4 +27,4 @@ def _small(look: Look) -> Image.Image:
     if look.noise == "colour":
         return Image.fromarray(np.minimum(np.rint(shown / TONE) * TONE, 255).astype(np.uint8))
     few = Image.Quantize.MEDIANCUT
-    return Image.fromarray(shown).quantize(COLOURS, few, kmeans=2, dither=Image.Dither.NONE)
+    return Image.fromarray(shown).quantize(COLORS, few, kmeans=2, dither=Image.Dither.NONE)

@@ -77,7 +77,7 @@ def triple_torus(cells: int = 110) -> Surface:
     vertices = vertices.astype(np.float64) + low
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = np.bincount(ends[:, 0], minlength=len(vertices))[:, None]
-    # Marching cubes leave slivers: vertices drift to the middle of their neighbours, and back.
+    # Marching cubes leave slivers: vertices drift to the middle of their neighbors, and back.
     for _ in range(12):
         middle = np.zeros_like(vertices)
         np.add.at(middle, ends[:, 0], vertices[ends[:, 1]])
@@ -91,8 +91,8 @@ def _rings(points: np.ndarray, tube: float = 0.43, blend: float = 0.16) -> np.nd
     """(P,) how far points are from three rings of radius 1, smoothly joined; 0 on the surface."""
     total = np.zeros(len(points))
     for turn in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
-        centre = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
-        away = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1]) - 1
+        center = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
+        away = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1]) - 1
         total += np.exp(-np.hypot(away, points[:, 2]) / blend)
     return -blend * np.log(total) - tube
 

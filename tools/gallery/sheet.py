@@ -40,7 +40,7 @@ def display(rgba: np.ndarray) -> np.ndarray:
     return np.rint(shown[::-1] * 255).astype(np.uint8)
 
 
-def grey(tone: np.ndarray) -> np.ndarray:
+def gray(tone: np.ndarray) -> np.ndarray:
     """(H, W, 3) uint8 from the top, of (H, W) or (H, W, K) display values from the bottom."""
     tone = tone[..., None] if tone.ndim == 2 else tone
     shown = np.rint(np.clip(tone[::-1], 0, 1) * 255).astype(np.uint8)
@@ -55,25 +55,25 @@ def magnified(picture: np.ndarray, factor: int) -> np.ndarray:
 
 
 def outlined(
-    picture: np.ndarray, box: tuple[int, int, int, int], colour: tuple[int, int, int]
+    picture: np.ndarray, box: tuple[int, int, int, int], color: tuple[int, int, int]
 ) -> np.ndarray:
     """A picture with a rectangle (left, top, right, bottom) drawn around some pixels."""
     image = Image.fromarray(picture)
     left, top, right, bottom = box
     outline = (left - 2, top - 2, right + 1, bottom + 1)
-    ImageDraw.Draw(image).rectangle(outline, outline=colour, width=2)
+    ImageDraw.Draw(image).rectangle(outline, outline=color, width=2)
     return np.array(image)
 
 
-def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, colour) -> np.ndarray:
+def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, color) -> np.ndarray:
     """A picture with a small framed one in it."""
     picture = picture.copy()
     height, width = small.shape[:2]
     picture[top : top + height, left : left + width] = small
-    return outlined(picture, (left, top, left + width, top + height), colour)
+    return outlined(picture, (left, top, left + width, top + height), color)
 
 
-def dotted(picture: np.ndarray, x: float, y: float, colour: tuple[int, int, int]) -> np.ndarray:
+def dotted(picture: np.ndarray, x: float, y: float, color: tuple[int, int, int]) -> np.ndarray:
     """A picture with a dot at some pixels from the upper left."""
     size = 4
     disc = Image.new("L", (2 * size + 3,) * 2)
@@ -82,7 +82,7 @@ def dotted(picture: np.ndarray, x: float, y: float, colour: tuple[int, int, int]
     disc = disc.resize((2 * size + 3,) * 2, Image.Resampling.BOX)
     image = Image.fromarray(picture)
     place = (round(x) - size - 1, round(y) - size - 1)
-    image.paste(Image.new("RGB", disc.size, colour), place, disc)
+    image.paste(Image.new("RGB", disc.size, color), place, disc)
     return np.array(image)
 
 
@@ -132,7 +132,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def save(image: Image.Image, path: Path) -> None:
-    """Write a .png, in grey where it has no colour and with 256 colours where it has."""
+    """Write a .png, gray if it has no color, otherwise with a palette of 256 colors."""
     pixels = np.asarray(image)
     if (pixels == pixels[..., :1]).all():
         image = image.convert("L")

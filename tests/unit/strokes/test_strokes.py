@@ -857,8 +857,8 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
     for words, wanted in (
-        (["--camera", "Close"], "ball.obj: --camera is for .blend files"),
-        (["--frames", "1-3"], "ball.obj: --frames is for .blend files"),
+        (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
+        (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
         (["--tone", "--light", "scene"], "ball.obj: has no lights"),
     ):
         assert main([*command, "-o", str(out), *words]) == 2

@@ -1,4 +1,4 @@
-"""A bake in Blender after another that differs in one setting of the look, over a first bake."""
+"""Time of a second bake in Blender after one setting has changed, relative to the first bake."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A frame of an animation over a single bake, and two processes over one."""
+"""Time per frame of an animation relative to a single bake, and of two processes to one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn: a planar field with singularities, and a bumpy ball of any number of triangles."""
+"""Test cases: a planar field with singularities, and bumpy spheres of any number of triangles."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The shaders without Blender: a plain OpenGL context through EGL, on whatever card there is.
+"""The shaders without Blender: an OpenGL device with an EGL context.
 
-Stands in for `rosy_addon.gpu.device.BlenderDevice`; both are told the same by `passes`.
+A replacement of `rosy_addon.gpu.device.BlenderDevice` with the same interface.
 """
 
 from __future__ import annotations

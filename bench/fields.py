@@ -1,4 +1,4 @@
-"""The smoothest field by multigrid in numpy over SciPy's sparse LU, and how its time grows."""
+"""Time of the smoothest field relative to SciPy's sparse LU, and how it grows with the mesh."""
 
 from __future__ import annotations
 

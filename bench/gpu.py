@@ -1,8 +1,8 @@
-"""Milliseconds of the shaders alone on the graphics card that is here, beside the paper's.
+"""Times of the shaders on this graphics card in milliseconds, next to those of the paper.
 
-A frame is what a moved camera costs: from triangles and their field on the card to the picture on the
-card. Nothing is sent there or read back, and a frame ends when the card is done. It takes numpy,
-moderngl and a driver with EGL, and neither Blender nor a display.
+A frame is the work after the camera has moved: from triangles and fields on the card to the picture
+on the card. Nothing is uploaded or read back, and a frame ends when the card is done. Needs numpy,
+moderngl and a driver with EGL, but neither Blender nor a display.
 """
 
 from __future__ import annotations

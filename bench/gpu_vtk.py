@@ -1,8 +1,8 @@
-"""A frame of a cross field by the shaders over one of one vector field by VTK's surface LIC.
+"""Time of a frame of a cross field by the shaders, relative to VTK's surface LIC.
 
-Both on the same driver, Mesa's llvmpipe if there is no graphics card, with all cores; the same mesh,
-camera and coverage, 41 samples of a streamline. A frame is what a moved camera costs, until the
-driver is done; neither is read back.
+VTK draws one vector field. Both use the same driver (Mesa's llvmpipe if there is no graphics card)
+with all cores, the same mesh, camera and coverage, and 41 samples per streamline. A frame is the work
+after the camera has moved, until the driver is done; neither picture is read back.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The most memory that large pictures and meshes take, over what is allowed, each on its own."""
+"""Peak memory of large pictures and meshes, relative to a limit, each in its own process."""
 
 from __future__ import annotations
 

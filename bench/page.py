@@ -1,7 +1,9 @@
-"""Put measured cases into the tables of docs/performance.md: `python -m bench.page CASES.json ...`.
+"""Write measured cases into the tables of docs/performance.md.
 
-A table stands between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``; it has the cases whose names
-the regular expression finds.
+    python -m bench.page CASES.json ...
+
+A table stands between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``. It lists the cases whose names
+match the regular expression.
 """
 
 from __future__ import annotations

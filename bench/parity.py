@@ -1,4 +1,4 @@
-"""The graphics card beside numpy: how far their G-buffers and their pictures agree.
+"""Compare the G-buffers and pictures of the graphics card with those of numpy.
 
     blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
         [--data FOLDER]

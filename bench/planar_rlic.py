@@ -1,4 +1,4 @@
-"""A planar cross field over the four images of `rlic` that it replaces, one thread each."""
+"""Time of a planar cross field relative to the four images of `rlic` that it replaces."""
 
 from __future__ import annotations
 

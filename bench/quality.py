@@ -1,8 +1,8 @@
-"""Whether speed is paid for in pictures: sheets against brute force, by what can be measured.
+"""Compare the quality of the pictures of the method sheets with brute force.
 
-All numbers are to be small: how many times the larger of two deviations or sharpnesses is the
-smaller, and by how much autocorrelations differ at most. Meshes and fields of others come from a
-folder: --data FOLDER.
+Measures are the ratio of the larger to the smaller standard deviation, the same for sharpness, and the
+largest difference of autocorrelations. Meshes and fields of others are read from a folder:
+--data FOLDER.
 """
 
 from __future__ import annotations

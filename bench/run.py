@@ -1,7 +1,7 @@
-"""All benches, each in a process of its own; --quick for the paper's Table 1 alone.
+"""Run all benchmarks, each in its own process; --quick runs only Table 1 of the paper.
 
-A ratio is the median over alternating runs, and stands beside the least and the largest. With
---json FILE all cases are written there as a list of objects.
+A ratio is the median over alternating runs, printed with the smallest and the largest. --json FILE
+writes all cases to a file, as a list of objects.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How the time grows: with the length of streamlines, with N, pixels and triangles."""
+"""How time grows with the length of streamlines, the degree, the pixels and the triangles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the time of a frame goes: each stage over the whole."""
+"""Time of each stage of a frame, relative to the frame."""
 
 from __future__ import annotations
 

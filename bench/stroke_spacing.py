@@ -1,9 +1,9 @@
-"""How evenly strokes are spaced, measured: apart from what spaced them.
+"""Measure how evenly strokes are spaced, independently of the code that places them.
 
-At points along all strokes, and on either side of each, the gap is how far it is across the stroke
-to the next stroke of its family, over the spacing asked for there. The next stroke is that which
-passes abeam: where the line across the first meets it. Distances are chords, made longer by what
-the surface bends between the two normals.
+At sample points along all strokes, and on either side of each, the gap is the distance across the
+stroke to the next stroke of its family, divided by the requested spacing. The next stroke is the first
+one that the line across meets. Distances are chords, corrected for the curvature of the surface by the
+angle between the two normals.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""20,000 strokes on 200K faces: seconds, and over what the smoothest field itself takes there."""
+"""Time of 20,000 strokes on 200K faces, also relative to the smoothest field."""
 
 from __future__ import annotations
 

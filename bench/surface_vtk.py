@@ -1,7 +1,7 @@
-"""A frame of a cross field over a frame of one vector field by VTK's surface LIC, one core each.
+"""Time of a frame of a cross field relative to one vector field by VTK's surface LIC.
 
-The same mesh, camera and coverage, 41 samples of a streamline. VTK draws on the processor here, by
-Mesa's llvmpipe, unless the system gives it a graphics card; its renderer is printed.
+Both use one core, the same mesh, camera and coverage, and 41 samples per streamline. VTK draws with
+Mesa's llvmpipe unless the system has a graphics card; the name of its renderer is printed.
 """
 
 from __future__ import annotations

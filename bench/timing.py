@@ -1,4 +1,4 @@
-"""Two ways timed in turn, so that a noisy machine slows both, and what machine that was."""
+"""Ratios of alternating timings, which the load of the machine affects equally; command line."""
 
 from __future__ import annotations
 

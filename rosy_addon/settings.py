@@ -1,4 +1,4 @@
-"""Settings that describe themselves.
+"""Declarative settings: dataclass fields with a range, a label and a help text.
 
 A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
 `color`. Each field carries a `Setting`: its default, range, label, help text, place in the panels,

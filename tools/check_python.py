@@ -1,4 +1,4 @@
-"""Say in one line what is wrong with a Python that is to hold an environment."""
+"""Check that a Python can be used for an environment, and print why not in one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draw the gallery: every figure, or those named."""
+"""Draw the gallery: all figures, or the named ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pictures of docs/fields.md: what the generators make."""
+"""The pictures of docs/fields.md: fields of each generator."""
 
 from __future__ import annotations
 

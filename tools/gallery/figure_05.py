@@ -1,4 +1,4 @@
-"""Figure 5: the whole way from a 3-RoSy field to a picture."""
+"""Figure 5: the steps from a 3-RoSy field to a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure 6: what blending does to contrast, and how it is set right."""
+"""Figure 6: how blending reduces contrast, and the correction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure 9: the magnitude of a field as color, as length of its streaks, and as both."""
+"""Figure 9: the magnitude of a field as color, as the length of streaks, and as both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pictures of docs/hatching.md; its text is written by hand."""
+"""The pictures of docs/hatching.md, whose text is written by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture at the head of the README."""
+"""The picture at the top of the README."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The settings that the pages share."""
+"""Looks that the pages share."""
 
 from rosy_addon.compositor.look import Look
 

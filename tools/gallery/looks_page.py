@@ -1,4 +1,4 @@
-"""The page of looks: a table of all settings, and pictures of the main ones."""
+"""Write docs/looks.md: a table of all settings, and pictures of the main ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is measured in the pictures."""
+"""Measurements of pictures: correlation, orientation spectra and persistence of streaks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A page of the gallery: its words, its pictures, and the figures measured for it."""
+"""`Page`: a page of the gallery with its text, pictures and measurements."""
 
 from __future__ import annotations
 

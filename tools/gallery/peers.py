@@ -1,4 +1,4 @@
-"""Suzanne beside what Blender's own line renderers make of her, for docs/hatching.md."""
+"""Compose the comparison of RoSy with Blender's own line renderers for docs/hatching.md."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Suzanne as Blender's own line renderers draw her, and as RoSy does. Run by Blender 5:
+"""Draw Suzanne with Blender's own line renderers and with RoSy, in Blender 5.
 
     blender -b --factory-startup -P tools/gallery/peers_blender.py -- FOLDER [NAME ...]
 
-One mesh, one camera and one sun for all. Writes a .png for each into FOLDER, and `seconds.json`:
-the processor's time that each took, the render included. `python -m tools.gallery peers FOLDER`
-puts the pictures side by side.
+All use the same mesh, camera and sun. Writes a .png for each into FOLDER, and `seconds.json` with the
+processor time of each, including the render. `python -m tools.gallery peers FOLDER` puts the pictures
+side by side.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The pictures of docs/performance.md: sheets beside the other two ways, pixel by pixel.
+"""The pictures of docs/performance.md: sheets next to brute force and members.
 
-`python -m tools.gallery.performance FOLDER` also draws those of meshes and fields of others, from
-a folder with `meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
+`python -m tools.gallery.performance FOLDER` also draws the bunny and the vase, from a folder with
+`meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
 """
 
 from __future__ import annotations

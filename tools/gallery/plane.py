@@ -1,4 +1,4 @@
-"""Fields in the plane, and pictures of them."""
+"""Planar fields, and pictures of them."""
 
 from __future__ import annotations
 

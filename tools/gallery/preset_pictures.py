@@ -1,4 +1,4 @@
-"""The pictures of the presets that come with RoSy, which lie beside them and are in the zip."""
+"""The preview pictures of the shipped presets, which are part of the zip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of presets: each one large on one model and small on two others.
+"""Write docs/presets.md: each preset large on one model and small on two others.
 
 `python -m tools.gallery.presets_page FOLDER` draws and writes it. The folder contains
 `meshes/spot.obj` and `meshes/stanford-bunny.obj`, which are not part of this repository.

@@ -1,4 +1,4 @@
-"""Meshes that anyone may pass on: made here, or Blender's own."""
+"""Meshes without license restrictions: made in code, or Blender's own."""
 
 from __future__ import annotations
 

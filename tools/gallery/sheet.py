@@ -1,4 +1,4 @@
-"""Pictures side by side with a label under each, never scaled but by whole factors."""
+"""Sheets of labeled pictures, scaled only by whole factors."""
 
 from __future__ import annotations
 

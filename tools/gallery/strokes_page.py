@@ -1,4 +1,4 @@
-"""The pictures of docs/strokes.md; its text is written by hand."""
+"""The pictures of docs/strokes.md, whose text is written by hand."""
 
 from __future__ import annotations
 

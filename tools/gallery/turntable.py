@@ -1,4 +1,4 @@
-"""The film of docs/animation.md."""
+"""The turntable of docs/animation.md."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from rosy_addon.projection.camera import Camera
 from . import cases
 from .timing import Case, compare, main
 
-#: What a user turns, by turns.
+#: Settings that are changed one after the other.
 CHANGES: dict[str, tuple[object, ...]] = {
     "gain": (3.0, 3.5),
     "shading": (0.5, 0.6),
@@ -31,11 +31,11 @@ CHANGES: dict[str, tuple[object, ...]] = {
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Bakes of the ball as Blender's mesh."""
+    """Time the bakes of the ball as a mesh of Blender."""
     try:
         import bpy
     except ImportError:
-        print("changes of a look: left out, there is no bpy here", file=sys.stderr)
+        print("changes of a look: skipped, because bpy is not installed", file=sys.stderr)
         return
     from rosy_addon.bake import bake
     from rosy_addon.cache import BAKE_CACHE
@@ -68,7 +68,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def ball_scene(bpy, triangles: int) -> object:
-    """The ball with a field of degree 4, alone in Blender."""
+    """Open an empty scene with the ball and a field of degree 4."""
     from rosy_addon.scene.field_attributes import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 

@@ -24,11 +24,11 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: How far apart, in pixels, two points may be to be one. OpenGL rounds the corners of triangles to
-#: 1/256 of a pixel, and on steep parts depth changes by many pixels for each across.
+#: Largest distance of two points that count as equal, in pixels. OpenGL rounds the vertices of
+#: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
 NEAR = 0.1
 
-#: How far unit normals may be apart, and the representation, relative to the greater of the two.
+#: Largest distance of unit normals, and of representations relative to the larger of the two.
 ALIKE = 1e-3
 
 DEGREES = (1, 2, 3, 4, 5, 6)
@@ -47,12 +47,12 @@ VIEWS = {
 
 
 def module_of(package: str, module: str) -> Any:
-    """A module of RoSy, from the repository or from an extension that is installed."""
+    """Import a module of RoSy from the repository or from an installed extension."""
     return importlib.import_module(f"{package}.{module}")
 
 
 def rooms(package: str = "rosy_addon") -> SimpleNamespace:
-    """What is used here of RoSy."""
+    """Return the parts of RoSy that are used here."""
 
     def of(module: str) -> Any:
         return module_of(package, module)
@@ -75,7 +75,7 @@ def rooms(package: str = "rosy_addon") -> SimpleNamespace:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """The same picture from both.
+    """The same picture by the graphics card and by numpy.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ def drawn_twice(
     lights: Sequence[Any] = (),
     rendered: Any = None,
 ) -> Pair:
-    """Draw a picture on the card and with numpy, by brute force: with no averages shared.
+    """Draw a picture on the card and with numpy, by brute force, which shares no averages.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def drawn_twice(
 def drawn_on_card(
     rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
 ) -> np.ndarray:
-    """(H, W, 4) the picture from the card, without supersampling."""
+    """Draw a picture on the card: (H, W, 4), without supersampling."""
     view = rosy.ViewInput(tuple(instances), camera, look)
     items = card.upload(instances, look.display)
     texture = rosy.run_to_completion(card.render_texture_task(items, view))
@@ -151,7 +151,7 @@ def drawn_on_card(
 
 
 def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
-    """The share of pixels at which both G-buffers say the same.
+    """The fraction of pixels at which both G-buffers agree.
 
     Of all pixels that at least one of them covers with a field, those count that
 
@@ -191,7 +191,7 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
 
 
 def likeness(one: np.ndarray, other: np.ndarray) -> float:
-    """The correlation of two (H, W, 4) linear pictures where both cover a pixel wholly.
+    """The correlation of two (H, W, 4) linear pictures over the pixels that both cover fully.
 
     For gray pictures, of their values; for colored ones, the smallest of the channels.
     """
@@ -201,7 +201,7 @@ def likeness(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
-    """A surface that Blender itself makes: sphere, torus or Suzanne."""
+    """Return a primitive of Blender as a surface: sphere, torus or Suzanne."""
     import bpy
 
     if name == "sphere":
@@ -233,7 +233,7 @@ def surface_named(rosy: SimpleNamespace, name: str, data: Path | None = None) ->
 
 
 def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
-    """What `VIEWS` says of it, in a square frame."""
+    """Return the camera for a shape in `VIEWS`, with a square frame."""
     azimuth, elevation, perspective = VIEWS[name]
     return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
 

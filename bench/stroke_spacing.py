@@ -18,10 +18,10 @@ from rosy_addon.strokes.stroke_set import Strokes
 from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.strokes.tangent_mesh import TangentMesh
 
-#: Shares of the spacing: between the points of strokes that are compared, and how far is looked.
+#: Distance between sample points, and search radius, as fractions of the spacing.
 SAMPLE_STEP, SEARCH_RADIUS = 0.1, 2.0
 
-#: A stroke's gap to itself counts past so many spacings of its length.
+#: Distance along a stroke, in spacings, beyond which it counts as another stroke.
 MIN_SELF_ARC = 2.5
 
 
@@ -47,15 +47,15 @@ class LateralGaps(NamedTuple):
     nearest_distance: np.ndarray
 
     def evenness(self, tolerance: float = 0.25) -> float:
-        """Share of the gaps, of those on free sides, that are within a tolerance of 1."""
+        """Return the fraction of the gaps, on sides with room, that are within a tolerance of 1."""
         gap = self.gap[self.has_room]
         return float(np.mean(np.abs(gap - 1) <= tolerance)) if len(gap) else 1.0
 
 
 def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) -> LateralGaps:
-    """Measure strokes that were traced on a ground; all of them, before any is hidden or cut.
+    """Measure all strokes that were traced on a tangent mesh, before hidden ones are removed.
 
-    At `max_points` of their points or a few more, evenly taken.
+    The gaps are measured at about `max_points` evenly distributed points.
     """
     arc = strokes.arc
     step = np.diff(arc, prepend=0)

@@ -19,15 +19,15 @@ from .timing import Case, compare, main
 
 DEGREE = 4
 
-#: Of hatching: lines of up to a dozen spacings, so near to each other that about 20,000 come.
+#: Rules for hatching: strokes of up to a dozen spacings, dense enough for about 20,000.
 SPACING, LONGEST = 0.0102, 12.0
 
-#: Seconds that are allowed.
+#: Allowed time in seconds.
 SECONDS = 30.0
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """The ratio, beside it the milliseconds of both; what came of it goes to the error stream."""
+    """Time the strokes, and print a summary of the result to the error stream."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
     rules = SeparationRules(max_length=LONGEST)

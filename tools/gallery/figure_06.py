@@ -22,7 +22,7 @@ RANGE = (0.0, 1.0)
 
 
 def constant(angle: float, degree: int) -> PlanarField:
-    """One direction everywhere; radians."""
+    """Return a constant field; the angle is in radians."""
     return lambda p: np.full(p.shape, np.exp(1j * degree * angle))
 
 
@@ -31,7 +31,7 @@ def write() -> None:
     page = Page("figure-06", "Contrast")
     layers = compose_field(constant(MEMBER, DEGREE), DEGREE, WHOLE, LOOK).layers[0]
     expected = expected_std(LOOK)
-    # Streamlines are whole in the part that is shown.
+    # In the visible part, streamlines have their full length.
     gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
     blend = layers.images.blend
     shown = [
@@ -112,7 +112,7 @@ def write() -> None:
 
 
 def _corrected(degree: int, look: Look) -> list[float]:
-    """The factor of the correction, and the deviation after it over that of one member image."""
+    """Return the correction factor, and the corrected deviation relative to one member image."""
     found = []
     for seed in range(SEEDS):
         seeded = look.with_settings({"seed": seed})
@@ -127,7 +127,7 @@ def _corrected(degree: int, look: Look) -> list[float]:
 
 
 def _cut(image: np.ndarray) -> np.ndarray:
-    """(SIZE, SIZE, K) middle of a picture."""
+    """(SIZE, SIZE, K) center of a picture."""
     margin = (WHOLE - SIZE) // 2
     whole = np.stack([channel(image, WHOLE, k) for k in range(image.shape[1])], axis=-1)
     return whole[margin : margin + SIZE, margin : margin + SIZE]

@@ -11,13 +11,13 @@ from rosy_addon.presets.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
-#: Of a picture of few hues; and between tones of a channel, where many hues blend. Neither is to
-#: be seen, and both make the files a third as large.
+#: Size of the palette of pictures with few hues, and step of the tones of others. Neither is
+#: visible, and both reduce the files to a third.
 COLORS, TONE = 64, 8
 
 
 def write() -> None:
-    """Draw them all."""
+    """Draw all pictures."""
     for path in preset_files().values():
         _small(read_preset(path).look).save(preview_path(path), optimize=True)
 

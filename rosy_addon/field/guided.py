@@ -50,7 +50,7 @@ def guided_task(
     degree : int
     guides : (F, 3) ndarray
         One member vector for each face, in object space; zero where there is no guide. Lengths
-        matter: a guide of length 1/2 asks for a field of magnitude 1/2.
+        matter: a guide of length 1/2 requests a field of magnitude 1/2.
     weight : (F,) ndarray or float
         Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
         falls off over a distance of about 1 / sqrt(w).

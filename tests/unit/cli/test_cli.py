@@ -187,10 +187,10 @@ REFUSED = {
         ["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"],
         "unknown setting 'lenght'",
     ),
-    "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "no scene lights"),
+    "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "has no lights"),
     "lights of a turntable": (
         ["turntable", "{mesh}", "-o", "{out}.gif", "--set", "light=scene"],
-        "no scene lights",
+        "has no lights",
     ),
     "value": (
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],

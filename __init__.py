@@ -1,4 +1,4 @@
-"""RoSy as Blender sees it: what to register when the extension is switched on, and nothing else."""
+"""The entry point of the Blender extension: registration."""
 
 _cli_command = None
 

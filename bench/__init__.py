@@ -1,1 +1,1 @@
-"""Every claim about speed, as a script that prints ratios."""
+"""Benchmarks: one script for each claim about speed, which prints ratios."""

@@ -1,4 +1,4 @@
-"""A frame of an animation over a single bake, and two processes over one."""
+"""Time per frame of an animation relative to a single bake, and of two processes to one."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from .timing import Case, compare, main
 
 TRIANGLES = 50_000
 
-#: Frames that are timed at once.
+#: Number of frames in each timing.
 TOGETHER = 10
 
-#: Frames that processes share, 640 x 480.
+#: Number of frames of 640 x 480 pixels that the processes share.
 FRAMES = 80
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """What does not change between frames is not worked out again."""
+    """Time animations with unchanged parts, which are reused, and with several processes."""
     try:
         import bpy
     except ImportError:
-        print("animation: left out, there is no bpy here", file=sys.stderr)
+        print("animation: skipped, because bpy is not installed", file=sys.stderr)
         return
     from rosy_addon.animation import bake_animation
     from rosy_addon.bake import bake
@@ -45,7 +45,7 @@ def measure(runs: int) -> Iterator[Case]:
             scene = _scene(bpy, animate)
             number = itertools.count(1)
 
-            # The first of the frames is as costly as a bake.
+            # The first frame costs as much as a bake.
             def frames(scene=scene, number=number) -> None:
                 some = [next(number) for _ in range(TOGETHER)]
                 bake_animation(scene, some, look=cases.LOOK, settings=settings, show=False)
@@ -88,7 +88,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def _scene(bpy, animate) -> object:
-    """The ball before a camera, at 512 x 512."""
+    """Open a scene with the ball and a camera, 512 x 512 pixels."""
     scene = ball_scene(bpy, TRIANGLES)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)

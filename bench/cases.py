@@ -1,4 +1,4 @@
-"""What is drawn: a planar field with singularities, and a bumpy ball of any number of triangles."""
+"""Test cases: a planar field with singularities, and bumpy spheres of any number of triangles."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-#: The frame of the paper's Table 1.
+#: Side of the frame in Table 1 of the paper, in pixels.
 SIZE = 512
 
-#: As the original program draws: 40 steps each way, noise of a pixel and a half.
+#: The settings of the original program: 40 steps in each direction, noise cells of 1.5 pixels.
 LOOK = Look(length=40, step=1.0, grain=1.5)
 
 
 @lru_cache(maxsize=8)
 def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
-    """A planar field with singularities of index 1 / N and -1 / N, and noise for it."""
+    """Return a planar field with singularities of index 1 / N and -1 / N, and noise for it."""
     y, x = np.mgrid[0:size, 0:size] + 0.5
     plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
     minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
@@ -37,14 +37,14 @@ def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:
-    """The LIC stage alone: a planar field and noise to the images of its members."""
+    """Run the LIC stage: from a planar field and noise to the images of its members."""
     flow, noise = plane(degree, size)
     run_to_completion(METHODS[method](flow, look, noise))
 
 
 @lru_cache(maxsize=8)
 def ball(triangles: int, bumps: float = 0.06) -> Surface:
-    """A bumpy ball of about so many triangles, of even density; round without bumps."""
+    """Return a bumpy sphere with about this many triangles of similar size."""
     rows = round(np.sqrt(triangles / 4))
     columns = 2 * rows
     up = np.linspace(0, np.pi, rows + 1)[:, None]
@@ -58,7 +58,7 @@ def ball(triangles: int, bumps: float = 0.06) -> Surface:
 
 @lru_cache(maxsize=8)
 def torus(triangles: int, tube: float = 0.45) -> Surface:
-    """A torus about the z axis, of about so many triangles."""
+    """Return a torus around the z axis with about this many triangles."""
     rows = round(np.sqrt(triangles / 4))
     across = np.linspace(0, -2 * np.pi, rows + 1)[:, None]
     around = np.arange(2 * rows) * (np.pi / rows)
@@ -67,7 +67,7 @@ def torus(triangles: int, tube: float = 0.45) -> Surface:
 
 
 def _surface(name: str, point: np.ndarray) -> Surface:
-    """Triangles between rows of points from above; each row is a ring."""
+    """Return a surface of triangles between rings of points, from top to bottom."""
     rows, columns = point.shape[0] - 1, point.shape[1]
     here = np.arange(rows)[:, None] * columns + np.arange(columns)
     right = np.roll(here, -1, axis=1)
@@ -79,26 +79,26 @@ def _surface(name: str, point: np.ndarray) -> Surface:
     return build_surface(points, corners.ravel(), starts, name=f"{name} {len(corners)}")
 
 
-#: Corner fields of instances. A frame finds them here when only the camera has moved.
+#: Cache of corner fields, which frames reuse when only the camera has moved.
 CORNER_FIELDS = Cache()
 
 
 @lru_cache(maxsize=16)
 def instance(triangles: int, degree: int) -> MeshInstance:
-    """The ball with a field."""
+    """Return the ball with a field."""
     surface = ball(triangles)
     return MeshInstance(surface, np.eye(4), axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
 def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -> Camera:
-    """One of whose square frame the ball covers 85 %."""
+    """Return a camera in whose square frame the ball covers 85 %."""
     eye = 2.33 * np.array([np.sin(azimuth), -np.cos(azimuth), 0.35])
     view = look_at(eye, (0, 0, 0), (0, 0, 1))
     return perspective_camera(view, width, width if height is None else height, fov=0.8)
 
 
 def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
-    """A frame of a mesh that has not been drawn before: what a camera does not change is found."""
+    """Draw a mesh for the first time, including the work that does not depend on the camera."""
     fresh = instance(triangles, degree)
     gbuffer = project(
         [MeshInstance(_fresh(fresh.surface), fresh.matrix, fresh.field)], camera(size)
@@ -107,14 +107,14 @@ def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE
 
 
 def _fresh(surface: Surface) -> Surface:
-    """Without what has been worked out since it was built."""
+    """Return a copy without cached results."""
     return Surface(**{entry.name: getattr(surface, entry.name) for entry in fields(surface)})
 
 
 def frame(
     triangles: int, degree: int, look: Look = LOOK, size: int = SIZE, azimuth: float = 0.0
 ) -> np.ndarray:
-    """A mesh with a field to a picture: all that is done when the camera has moved."""
+    """Draw a mesh with a field: the work after the camera has moved."""
     eye = camera(size, azimuth=azimuth)
     gbuffer = project([instance(triangles, degree)], eye, look.display, CORNER_FIELDS)
     return compose(gbuffer, look).rgba

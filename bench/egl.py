@@ -1,6 +1,6 @@
-"""The shaders without Blender: a plain OpenGL context through EGL, on whatever card there is.
+"""The shaders without Blender: an OpenGL device with an EGL context.
 
-Stands in for `rosy_addon.gpu.device.BlenderDevice`; both are told the same by `passes`.
+A replacement of `rosy_addon.gpu.device.BlenderDevice` with the same interface.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 
 FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
 
-#: What Blender defines for shaders that draw into its views.
-BLENDER = "#define blender_srgb_to_framebuffer_space(colour) (colour)\n"
+#: The function that Blender defines for shaders that draw into its views.
+BLENDER = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
 
 
 class EglDevice:
@@ -30,7 +30,7 @@ class EglDevice:
 
     @property
     def name(self) -> str:
-        """The driver's word for what it draws with."""
+        """The name of the renderer that the driver reports."""
         return self.context.info["GL_RENDERER"]
 
     def texture(
@@ -100,7 +100,7 @@ class EglDevice:
         return np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
 
     def finish(self) -> None:
-        """Wait until all is done."""
+        """Wait until all commands have finished."""
         self.context.finish()
 
     def _bind(
@@ -114,7 +114,7 @@ class EglDevice:
             if _base_name(name) in program:
                 program[_base_name(name)] = slot
         for name, _ in shader.uniforms:
-            # A driver leaves out what has no effect.
+            # Drivers remove uniforms that have no effect.
             if name in program:
                 program[name] = uniforms[name]
         return program

@@ -1,4 +1,4 @@
-"""The smoothest field by multigrid in numpy over SciPy's sparse LU, and how its time grows."""
+"""Time of the smoothest field relative to SciPy's sparse LU, and how it grows with the mesh."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .timing import Case, compare, main
 
 DEGREE = 4
 
-#: Steps of inverse iteration: so many bring the energy within a thousandth.
+#: Steps of inverse iteration, enough for the energy to converge to a thousandth.
 ITERATIONS = 20
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Both ratios; both ways start from the same connection of the mesh."""
+    """Time both solvers, starting from the same connection of the mesh."""
     try:
         import scipy.sparse.linalg
     except ImportError:
-        print("SciPy's LU: left out, there is no scipy here", file=sys.stderr)
+        print("SciPy's LU: skipped, because scipy is not installed", file=sys.stderr)
         return
     connection = build_connection(cases.ball(200_000))
     matrix = laplacian(connection, DEGREE)
@@ -58,7 +58,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def _csc(matrix: CSRMatrix, connection: Connection) -> object:
-    """For SciPy, positive definite."""
+    """Convert a matrix to SciPy, made positive definite."""
     import scipy.sparse
 
     shape = len(matrix), matrix.column_count

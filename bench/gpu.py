@@ -1,8 +1,8 @@
-"""Milliseconds of the shaders alone on the graphics card that is here, beside the paper's.
+"""Times of the shaders on this graphics card in milliseconds, next to those of the paper.
 
-A frame is what a moved camera costs: from triangles and their field on the card to the picture on the
-card. Nothing is sent there or read back, and a frame ends when the card is done. It takes numpy,
-moderngl and a driver with EGL, and neither Blender nor a display.
+A frame is the work after the camera has moved: from triangles and fields on the card to the picture
+on the card. Nothing is uploaded or read back, and a frame ends when the card is done. Needs numpy,
+moderngl and a driver with EGL, but neither Blender nor a display.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ SIZES = ("512x512", "1920x1080", "3840x2160")
 DEGREES = (2, 3, 4, 6)
 
 #: Table 1 of the paper: its decomposition, 512 x 512 pixels and 12K triangles, on this card. Its
-#: objects are not ours, and it does not say how much of the frame they cover: ours do so to 85 %.
+#: objects are different, and it does not state their coverage of the frame; here it is 85 %.
 PAPER = {2: 17, 3: 46, 4: 32, 6: 46}
 PAPERS_CARD = "NVIDIA GeForce 8600 GTS"
 PAPERS_SIZE = (512, 512)
 
 TRIANGLES = 12_000
 
-#: Where the time goes is looked at for this.
+#: Degree for the times of the stages.
 STAGES_SIZE, STAGES_DEGREE = (1920, 1080), 4
 STAGES = {
     "G-buffer (visibility, resolve)": ("visibility", "resolve"),
@@ -44,40 +44,42 @@ STAGES = {
     "streamlines and light (lic)": ("lic",),
 }
 
-#: Frames that a time is the median of; fewer where they take longer than this together.
+#: Number of frames of a median, and the maximum of their total time in seconds.
 FRAMES = 21
 SECONDS = 6.0
 
-#: Seconds of drawing before times count, one frame at least: shaders are compiled, clocks rise.
+#: Seconds of drawing before the timing (at least one frame), to compile shaders and raise clocks.
 WARM_UP = 0.3
 
-#: Radians by which the camera goes on from frame to frame.
+#: Rotation of the camera between frames, in radians.
 ON = 0.01
 
 
 def device() -> Any:
-    """What there is to draw with, or None, with a line that says why."""
+    """Return the device; None if there is none, after printing the reason."""
     try:
         from .egl import EglDevice
     except ImportError:
-        print("shaders: left out, there is no moderngl here", file=sys.stderr)
+        print("shaders: skipped, because moderngl is not installed", file=sys.stderr)
         return None
     try:
         return EglDevice()
     except Exception as error:
         # moderngl raises bare exceptions.
         reason = " ".join(str(error).split())
-        print(f"shaders: left out, there is no OpenGL 4.3 by EGL here ({reason})", file=sys.stderr)
+        print(
+            f"shaders: skipped, because there is no OpenGL 4.3 with EGL ({reason})", file=sys.stderr
+        )
         return None
 
 
 def draw_texture(card: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
-    """Draw a picture that stays on the card."""
+    """Draw a picture and leave it on the card."""
     return run_to_completion(card.render_texture_task(items, ViewInput((), camera, look)))
 
 
 class Frames:
-    """One object in a frame of one size, again and again."""
+    """Repeated frames of one object at one size."""
 
     def __init__(self, drawn_by: Any, size: tuple[int, int], degree: int) -> None:
         self.device = drawn_by
@@ -89,7 +91,7 @@ class Frames:
         self.drawn = 0
 
     def draw(self) -> float:
-        """The next frame; how many seconds it took."""
+        """Draw the next frame and return its time in seconds."""
         camera = cases.camera(*self.size, azimuth=self.drawn * ON)
         self.drawn += 1
         start = time.perf_counter()
@@ -98,14 +100,14 @@ class Frames:
         return time.perf_counter() - start
 
     def warm_up(self) -> None:
-        """Draw for a while."""
+        """Draw frames until the clocks have risen."""
         start = time.perf_counter()
         self.draw()
         while time.perf_counter() - start < WARM_UP:
             self.draw()
 
     def times(self, frames: int) -> np.ndarray:
-        """Milliseconds of so many frames, or of fewer if they take long."""
+        """Return the times of frames in milliseconds; fewer frames if they take long."""
         self.warm_up()
         found: list[float] = []
         while len(found) < frames and sum(found) < SECONDS:
@@ -114,7 +116,7 @@ class Frames:
 
 
 class Staged:
-    """A device that is waited for after each pass, and knows how long each took."""
+    """A device that waits after each pass and records its time."""
 
     def __init__(self, device: Any) -> None:
         self._device = device
@@ -141,7 +143,7 @@ class Staged:
 
 
 def rows(drawn_by: Any, sizes: Sequence[tuple[int, int]], frames: int) -> Iterator[dict[str, Any]]:
-    """A time for each size and degree."""
+    """Yield the time for each size and degree."""
     for size in sizes:
         for degree in DEGREES:
             times = Frames(drawn_by, size, degree).times(frames)
@@ -158,7 +160,7 @@ def rows(drawn_by: Any, sizes: Sequence[tuple[int, int]], frames: int) -> Iterat
 
 
 def stages(drawn_by: Any, frames: int) -> dict[str, float]:
-    """Milliseconds a stage: medians, each with a wait of its own."""
+    """Return the median time of each stage in milliseconds, with a wait after each pass."""
     staged = Staged(drawn_by)
     again = Frames(staged, STAGES_SIZE, STAGES_DEGREE)
     again.warm_up()
@@ -172,7 +174,7 @@ def stages(drawn_by: Any, frames: int) -> dict[str, float]:
 
 
 def line(row: dict[str, Any]) -> str:
-    """A row as it is printed."""
+    """Format a row for printing."""
     size = f"{row['width']} x {row['height']}"
     spread = f"({row['least']:.2f} to {row['largest']:.2f})"
     paper = "" if row["paper"] is None else f"{row['paper']}"
@@ -181,12 +183,16 @@ def line(row: dict[str, Any]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """What the command line asks for."""
+    """Run the command line."""
     about, _, more = (__doc__ or "").partition("\n")
     parser = argparse.ArgumentParser(description=about, epilog=more.strip())
     parser.add_argument("--sizes", nargs="+", type=_size, default=[_size(name) for name in SIZES])
-    parser.add_argument("--frames", type=int, default=FRAMES, help="of each (%(default)s)")
-    parser.add_argument("--no-stages", action="store_true", help="only whole frames")
+    parser.add_argument(
+        "--frames", type=int, default=FRAMES, help="number of frames per case (%(default)s)"
+    )
+    parser.add_argument(
+        "--no-stages", action="store_true", help="time only whole frames, not stages"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
     chosen = parser.parse_args(arguments)
     drawn_by = device()

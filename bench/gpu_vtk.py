@@ -1,8 +1,8 @@
-"""A frame of a cross field by the shaders over one of one vector field by VTK's surface LIC.
+"""Time of a frame of a cross field by the shaders, relative to VTK's surface LIC.
 
-Both on the same driver, Mesa's llvmpipe if there is no graphics card, with all cores; the same mesh,
-camera and coverage, 41 samples of a streamline. A frame is what a moved camera costs, until the
-driver is done; neither is read back.
+VTK draws one vector field. Both use the same driver (Mesa's llvmpipe if there is no graphics card)
+with all cores, the same mesh, camera and coverage, and 41 samples per streamline. A frame is the work
+after the camera has moved, until the driver is done; neither picture is read back.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from .timing import Case, compare, main
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Few and many triangles."""
+    """Time a small and a large mesh."""
     if device() is None:
         return
     try:
         import vtk
     except ImportError:
-        print("shaders beside VTK: left out, there is no vtk here", file=sys.stderr)
+        print("shaders beside VTK: skipped, because vtk is not installed", file=sys.stderr)
         return
     for triangles in (12_000, 200_000):
         case = _compared(vtk, triangles, runs)
@@ -37,12 +37,12 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
-    """One mesh. Contexts of its own: with its window, VTK takes the display from all others."""
+    """Time one mesh. Each needs its own context, because VTK makes the context of its window current."""
     turn, read, theirs = renderer(vtk, triangles)
     drawn_by = device()
     print(f"shaders: {drawn_by.name}; VTK: {theirs}", flush=True)
     if drawn_by.name != theirs:
-        print("shaders beside VTK: left out, they are not drawn by the same", file=sys.stderr)
+        print("shaders beside VTK: skipped, because they use different renderers", file=sys.stderr)
         return None
     card = GpuRenderer(drawn_by)
     placed = card.upload([cases.instance(triangles, DEGREE)], LOOK.display)
@@ -53,7 +53,7 @@ def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
     azimuths = iter(np.arange(1, 10_000) * ON)
 
     def frame() -> None:
-        # VTK makes its own context the current one at each of its frames.
+        # VTK makes its own context current in every frame.
         with drawn_by.context:
             draw_texture(card, placed, cases.camera(azimuth=next(azimuths)), LOOK)
             drawn_by.finish()

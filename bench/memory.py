@@ -1,4 +1,4 @@
-"""The most memory that large pictures and meshes take, over what is allowed, each on its own."""
+"""Peak memory of large pictures and meshes, relative to a limit, each in its own process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .timing import Case, main
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: Gigabytes.
+#: Allowed memory in gigabytes.
 ALLOWED = 8.0
 
 WIDE = 3840, 2160
@@ -26,7 +26,7 @@ WIDE = 3840, 2160
 #: Names, triangles, N, and settings of the look.
 CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "3840 x 2160, N = 4": (12_000, 4, {}),
-    "3840 x 2160, N = 7, colour noise": (12_000, 7, {"noise": "colour"}),
+    "3840 x 2160, N = 7, color noise": (12_000, 7, {"noise": "colour"}),
     "3840 x 2160, N = 4, 2 x 2 samples a pixel": (12_000, 4, {"supersampling": 2}),
     "3840 x 2160, N = 4, brute": (12_000, 4, {"method": "brute", "length": 4}),
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
@@ -34,7 +34,7 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """One run each: memory is not noisy."""
+    """Measure each case once, because memory does not vary between runs."""
     for name in CASES:
         command = [sys.executable, "-m", "bench.memory", "--draw", name]
         done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
@@ -55,7 +55,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def draw(name: str) -> float:
-    """Draw a case, mesh and all; return the gigabytes that this process held at most."""
+    """Draw a case, including its mesh, and return the peak memory of this process in gigabytes."""
     import resource
 
     triangles, degree, settings = CASES[name]
@@ -77,5 +77,7 @@ if __name__ == "__main__":
         print(draw(chosen.draw))
         sys.exit()
     if os.name == "nt":
-        sys.exit("memory: this system does not say how much a process has held")
+        sys.exit(
+            "memory: skipped, because this system does not report the peak memory of a process"
+        )
     sys.exit(main(__doc__, measure, rest))

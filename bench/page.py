@@ -1,7 +1,9 @@
-"""Put measured cases into the tables of docs/performance.md: `python -m bench.page CASES.json ...`.
+"""Write measured cases into the tables of docs/performance.md.
 
-A table stands between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``; it has the cases whose names
-the regular expression finds.
+    python -m bench.page CASES.json ...
+
+A table stands between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``. It lists the cases whose names
+match the regular expression.
 """
 
 from __future__ import annotations
@@ -18,10 +20,12 @@ TABLE = re.compile(r"(<!-- cases: (?P<pattern>.*?) -->\n).*?(<!-- end -->)", re.
 
 
 def main() -> int:
-    """Rewrite all tables that the given files have cases for."""
+    """Rewrite all tables for which the files have cases."""
     about = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="python -m bench.page", description=about)
-    parser.add_argument("cases", nargs="+", type=Path, help="what benches wrote with --json")
+    parser.add_argument(
+        "cases", nargs="+", type=Path, help="files that benchmarks wrote with --json"
+    )
     entries = [
         entry for path in parser.parse_args().cases for entry in json.loads(path.read_text())
     ]

@@ -1,10 +1,11 @@
-"""The graphics card beside numpy: how far their G-buffers and their pictures agree.
+"""Compare the G-buffers and pictures of the graphics card with those of numpy.
 
     blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
+        [--data FOLDER]
 
-Draws sphere, torus, Suzanne, bunny and vase for N = 1 to 6, on whatever Blender draws with, and
-prints a row for each. The last two are meshes in ../shared/data, and left out where that is not.
-The tests measure with what is here, too.
+Draws a sphere, a torus and Suzanne for N = 1 to 6 with the graphics card that Blender uses, and
+prints a row for each. With `--data`, also the bunny and the vase, which are the files
+`meshes/stanford-bunny.obj` and `meshes/vase.off` in FOLDER. The tests use these functions too.
 """
 
 from __future__ import annotations
@@ -22,18 +23,20 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-MESHES = ROOT.parent / "shared" / "data" / "meshes"
 
-#: How far apart, in pixels, two points may be to be one. OpenGL rounds the corners of triangles to
-#: 1/256 of a pixel, and on steep parts depth changes by many pixels for each across.
+#: Largest distance of two points that count as equal, in pixels. OpenGL rounds the vertices of
+#: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
 NEAR = 0.1
 
-#: How far unit normals may be apart, and the representation, relative to the greater of the two.
+#: Largest distance of unit normals, and of representations relative to the larger of the two.
 ALIKE = 1e-3
 
 DEGREES = (1, 2, 3, 4, 5, 6)
 
-#: Azimuth, elevation and whether in perspective.
+#: Mesh files in the data folder, by the name of the shape.
+FILES = {"bunny": "stanford-bunny.obj", "vase": "vase.off"}
+
+#: Azimuth and elevation in degrees, and whether the view is in perspective.
 VIEWS = {
     "sphere": (30.0, 20.0, True),
     "torus": (20.0, 40.0, False),
@@ -44,12 +47,12 @@ VIEWS = {
 
 
 def module_of(package: str, module: str) -> Any:
-    """A module of RoSy, from the repository or from an extension that is installed."""
+    """Import a module of RoSy from the repository or from an installed extension."""
     return importlib.import_module(f"{package}.{module}")
 
 
 def rooms(package: str = "rosy_addon") -> SimpleNamespace:
-    """What is used here of RoSy."""
+    """Return the parts of RoSy that are used here."""
 
     def of(module: str) -> Any:
         return module_of(package, module)
@@ -72,7 +75,7 @@ def rooms(package: str = "rosy_addon") -> SimpleNamespace:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """The same picture from both.
+    """The same picture by the graphics card and by numpy.
 
     Attributes
     ----------
@@ -109,7 +112,7 @@ def drawn_twice(
     lights: Sequence[Any] = (),
     rendered: Any = None,
 ) -> Pair:
-    """Draw a picture on the card and with numpy, by brute force: with no averages shared.
+    """Draw a picture on the card and with numpy, by brute force, which shares no averages.
 
     Parameters
     ----------
@@ -140,7 +143,7 @@ def drawn_twice(
 def drawn_on_card(
     rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
 ) -> np.ndarray:
-    """(H, W, 4) the picture from the card, without supersampling."""
+    """Draw a picture on the card: (H, W, 4), without supersampling."""
     view = rosy.ViewInput(tuple(instances), camera, look)
     items = card.upload(instances, look.display)
     texture = rosy.run_to_completion(card.render_texture_task(items, view))
@@ -148,7 +151,7 @@ def drawn_on_card(
 
 
 def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
-    """The share of pixels at which both G-buffers say the same.
+    """The fraction of pixels at which both G-buffers agree.
 
     Of all pixels that at least one of them covers with a field, those count that
 
@@ -188,9 +191,9 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
 
 
 def likeness(one: np.ndarray, other: np.ndarray) -> float:
-    """The correlation of two (H, W, 4) linear pictures where both cover a pixel wholly.
+    """The correlation of two (H, W, 4) linear pictures over the pixels that both cover fully.
 
-    Of grey pictures it is that of their grey values; of coloured ones the least of the channels.
+    For gray pictures, of their values; for colored ones, the smallest of the channels.
     """
     both = (one[..., 3] == 1) & (other[..., 3] == 1)
     one, other = one[both].astype(np.float64), other[both].astype(np.float64)
@@ -198,7 +201,7 @@ def likeness(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
-    """A surface that Blender itself makes: sphere, torus or Suzanne."""
+    """Return a primitive of Blender as a surface: sphere, torus or Suzanne."""
     import bpy
 
     if name == "sphere":
@@ -221,26 +224,26 @@ def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
         bpy.ops.object.delete()
 
 
-def surface_named(rosy: SimpleNamespace, name: str) -> Any:
-    """One of `VIEWS`, None if its file is not there."""
-    files = {"bunny": MESHES / "stanford-bunny.obj", "vase": MESHES / "vase.off"}
-    if name not in files:
+def surface_named(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
+    """The surface of a shape in `VIEWS`; None if its file is not in the data folder."""
+    if name not in FILES:
         return blender_surface(rosy, name)
-    return rosy.read_mesh(files[name]) if files[name].is_file() else None
+    path = None if data is None else data / "meshes" / FILES[name]
+    return rosy.read_mesh(path) if path is not None and path.is_file() else None
 
 
 def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
-    """What `VIEWS` says of it, in a square frame."""
+    """Return the camera for a shape in `VIEWS`, with a square frame."""
     azimuth, elevation, perspective = VIEWS[name]
     return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
 
 
-def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
-    """A line of the table for each shape and degree."""
+def sweep(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) -> Iterator[str]:
+    """The lines of the table: its header, and a row for each shape and degree."""
     yield "| shape | triangles | N | pixels | agree % | correlation | shaded | card s | numpy s |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
     for name in VIEWS:
-        surface = surface_named(rosy, name)
+        surface = surface_named(rosy, name, data)
         if surface is None:
             continue
         camera = camera_for(rosy, name, surface, size)
@@ -263,15 +266,16 @@ def sweep(rosy: SimpleNamespace, card: Any, size: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """What the command line asks for."""
+    """Print the table, and write it to a file if requested."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--out", type=Path, help="write the table here, too")
+    parser.add_argument("--out", type=Path, help="also write the table to this file")
+    parser.add_argument("--data", type=Path, help="folder with the meshes of bunny and vase")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     rosy = rooms()
     device = module_of(rosy.package, "gpu.device").BlenderDevice()
     lines = []
-    for line in sweep(rosy, rosy.GpuRenderer(device), options.size):
+    for line in sweep(rosy, rosy.GpuRenderer(device), options.size, options.data):
         print(line, flush=True)
         lines.append(line)
     if options.out:

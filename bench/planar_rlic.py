@@ -1,4 +1,4 @@
-"""A planar cross field over the four images of `rlic` that it replaces, one thread each."""
+"""Time of a planar cross field relative to the four images of `rlic` that it replaces."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .timing import Case, compare, main, use_one_core
 
 DEGREE = 4
 
-#: 41 samples of a streamline.
+#: Look with 41 samples per streamline.
 LOOK = replace(cases.LOOK, length=20)
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """From angles to the picture, and from noise to the images of the members."""
+    """Time the picture from angles, and the images of the members from noise."""
     try:
         import rlic
     except ImportError:
-        print("planar images of rlic: left out, there is no rlic here", file=sys.stderr)
+        print("planar images of rlic: skipped, because rlic is not installed", file=sys.stderr)
         return
     use_one_core()
     flow, noise = cases.plane(DEGREE)

@@ -1,8 +1,8 @@
-"""Whether speed is paid for in pictures: sheets against brute force, by what can be measured.
+"""Compare the quality of the pictures of the method sheets with brute force.
 
-All numbers are to be small: how many times the larger of two deviations or sharpnesses is the
-smaller, and by how much autocorrelations differ at most. Meshes and fields of others come from a
-folder: --data FOLDER.
+Measures are the ratio of the larger to the smaller standard deviation, the same for sharpness, and the
+largest difference of autocorrelations. Meshes and fields of others are read from a folder:
+--data FOLDER.
 """
 
 from __future__ import annotations
@@ -40,25 +40,25 @@ from tools.gallery.measure import mean_spectrum, persistence
 from . import cases
 from .timing import Case, main
 
-#: Pixels along and across the field at which images are compared with themselves.
+#: Lags of the autocorrelation along and across the field, in pixels.
 ALONG, ACROSS = (1, 2, 4, 8, 16, 32), (1, 2, 3, 4, 6)
 
-#: Pixels nearer to the border of what is covered do not count: windows would reach over it.
+#: Width of the border in pixels that is left out, because windows would extend over it.
 BORDER = 34
 
 SEEDS = (0, 1, 2, 3)
 
-#: Radians, of uniform fields; one for each seed.
+#: Angles of uniform fields in radians, one for each seed.
 ANGLES = (0.05, 0.37, 0.8, 1.1)
 
 
-#: White noise of half the cells bright, as the paper's: the severer test.
+#: White noise with half of the cells bright, as in the paper, which is the harder test.
 PAPER = replace(cases.LOOK, density=0.5, high_pass=0.0)
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What is measured in the images of one method.
+    """The measurements of the images of one method.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Measured:
 
 
 def measure(runs: int, data: Path | None = None) -> Iterator[Case]:
-    """All fields; `runs` does not count, as pictures are not noisy."""
+    """Compare all fields. `runs` is ignored, because pictures do not vary."""
     del runs
     for name, make in _fields(data).items():
         flows = make()
@@ -107,7 +107,7 @@ def _compared(name: str, sheets: Measured, brute: Measured) -> Iterator[Case]:
 
 
 def _measured(flows: Sequence[PixelField], look: Look) -> Measured:
-    """Means over some seeds of the noise, or over some flows with one of them each."""
+    """Return means over several seeds, or over several fields with one seed each."""
     found = []
     for seed, flow in zip(SEEDS, flows * len(SEEDS) if len(flows) == 1 else flows, strict=True):
         noise = look_noise(flow, replace(look, seed=seed))
@@ -150,7 +150,7 @@ def _measured_in(flow: PixelField, images: LicImages) -> Measured:
 
 
 def _on_screen(flow: PixelField, member: np.ndarray) -> np.ndarray:
-    """(P,) unit directions in the picture of members in the view plane."""
+    """(P,) unit directions on the screen of members in the view plane."""
     if flow.screen_jacobian is not None:
         member = flow.screen_jacobian[:, 0] * member.real + flow.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
@@ -181,7 +181,7 @@ def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
 
 
 def _uniform(degree: int) -> list[PixelField]:
-    """Of several angles: of a single one, the pixels' grid and the streamlines' may beat."""
+    """Return uniform fields at several angles, because at one angle streamlines alias with the grid."""
     shape = cases.SIZE, cases.SIZE
     return [planar_pixel_field(np.full(shape, angle), degree) for angle in ANGLES]
 

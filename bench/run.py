@@ -1,7 +1,7 @@
-"""All benches, each in a process of its own; --quick for the paper's Table 1 alone.
+"""Run all benchmarks, each in its own process; --quick runs only Table 1 of the paper.
 
-A ratio is the median over alternating runs, and stands beside the least and the largest. With
---json FILE all cases are written there as a list of objects.
+A ratio is the median over alternating runs, printed with the smallest and the largest. --json FILE
+writes all cases to a file, as a list of objects.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if __name__ == "__main__":
 from bench.table1 import quick  # noqa: E402
 from bench.timing import RUNS, machine, write  # noqa: E402
 
-#: In the order in which they are run.
+#: The scripts, in the order in which they run.
 SCRIPTS = (
     "table1",
     "scaling",
@@ -35,18 +35,18 @@ SCRIPTS = (
     "strokes",
 )
 
-#: Runs of each way with --quick: a minute in all.
+#: Runs per case with --quick, about a minute in total.
 QUICK_RUNS = 3
 
 
 def main() -> int:
-    """What the command line asks for."""
+    """Run the command line."""
     about, _, more = (__doc__ or "").partition("\n")
     parser = argparse.ArgumentParser(description=about, epilog=more.strip())
     parser.add_argument("script", nargs="*", help=f"{', '.join(SCRIPTS)}; all if not given")
     parser.add_argument("--quick", action="store_true", help="only Table 1, without the peers")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
-    parser.add_argument("--runs", type=int, help=f"of each way ({RUNS}; --quick: {QUICK_RUNS})")
+    parser.add_argument("--runs", type=int, help=f"runs per case ({RUNS}; --quick: {QUICK_RUNS})")
     chosen = parser.parse_args()
     unknown = [name for name in chosen.script if name not in SCRIPTS]
     if unknown:
@@ -68,7 +68,7 @@ def main() -> int:
 
 
 def _run(name: str, runs: int) -> list[dict[str, object]]:
-    """The entries of one script."""
+    """Run one script and return its entries."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "cases.json"
         command = [sys.executable, "-m", f"bench.{name}", "--runs", str(runs), "--json", str(file)]

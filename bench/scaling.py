@@ -1,4 +1,4 @@
-"""How the time grows: with the length of streamlines, with N, pixels and triangles."""
+"""How time grows with the length of streamlines, the degree, the pixels and the triangles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEGREE = 4
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """All ratios; those of pixels and N over as many times the work."""
+    """Time all cases."""
     for times in (2, 4, 8):
         long = replace(cases.LOOK, length=times * cases.LOOK.length)
         target = 1.6 if times == 8 else None

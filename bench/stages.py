@@ -1,4 +1,4 @@
-"""Where the time of a frame goes: each stage over the whole."""
+"""Time of each stage of a frame, relative to the frame."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEGREE = 4
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """All stages, for few and for many triangles."""
+    """Time all stages for a small and a large mesh."""
     for triangles in (12_000, 200_000):
         for name, work in _stages(triangles).items():
             yield compare(
@@ -38,7 +38,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def _stages(triangles: int) -> dict[str, Callable[[], object]]:
-    """What a frame does, each alone, on what the stages before have left."""
+    """Return the stages of a frame, each on the results of the earlier ones."""
     look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
     cache = Cache()
     gbuffer = project([instance], camera, look.display, cache)
@@ -48,14 +48,16 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
     return {
-        "carry the field to the corners, once a mesh": lambda: run_to_completion(
+        "average the field at the corners, once per mesh": lambda: run_to_completion(
             corner_field_task(instance.surface, instance.matrix, instance.field, look.display)
         ),
         "project": lambda: project([instance], camera, look.display, cache),
-        "  of which rasterise": lambda: rasterize(clip, triangle, camera.width, camera.height),
+        "  of which rasterize": lambda: rasterize(clip, triangle, camera.width, camera.height),
         "compose": lambda: compose(gbuffer, look),
-        "  of which links": lambda: neighbor_masks(gbuffer, look.crease_angle, look.cross_creases),
-        "  of which axes on screen": lambda: screen_jacobians(gbuffer),
+        "  of which neighbor links": lambda: neighbor_masks(
+            gbuffer, look.crease_angle, look.cross_creases
+        ),
+        "  of which directions on screen": lambda: screen_jacobians(gbuffer),
         "  of which noise": lambda: look_noise(flow, look),
         "  of which streamlines": lambda: run_to_completion(
             METHODS[look.method](flow, look, grain)

@@ -1,7 +1,7 @@
-"""A frame of a cross field over a frame of one vector field by VTK's surface LIC, one core each.
+"""Time of a frame of a cross field relative to one vector field by VTK's surface LIC.
 
-The same mesh, camera and coverage, 41 samples of a streamline. VTK draws on the processor here, by
-Mesa's llvmpipe, unless the system gives it a graphics card; its renderer is printed.
+Both use one core, the same mesh, camera and coverage, and 41 samples per streamline. VTK draws with
+Mesa's llvmpipe unless the system has a graphics card; the name of its renderer is printed.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from .timing import Case, compare, main, use_one_core
 
 DEGREE = 4
 
-#: 41 samples of a streamline.
+#: Look with 41 samples per streamline.
 LOOK = replace(cases.LOOK, length=20)
 
-#: Radians by which both cameras go on from frame to frame.
+#: Rotation of both cameras between frames, in radians.
 ON = 0.01
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Few and many triangles."""
+    """Time a small and a large mesh."""
     use_one_core()
-    # Before the library is loaded: llvmpipe counts the cores of the machine, not of the process.
+    # Set before the library is loaded: llvmpipe counts the cores of the machine, not of the process.
     os.environ["LP_NUM_THREADS"] = "0"
     try:
         import vtk
     except ImportError:
-        print("surfaces of VTK: left out, there is no vtk here", file=sys.stderr)
+        print("surfaces of VTK: skipped, because vtk is not installed", file=sys.stderr)
         return
     for triangles in (12_000, 200_000):
         turn, read, name = renderer(vtk, triangles)
@@ -110,7 +110,7 @@ def renderer(vtk: Any, triangles: int) -> tuple[Callable[[], None], Callable[[],
 
 
 def _poly_data(vtk: Any, triangles: int) -> Any:
-    """The ball with a member of the field, averaged at its points."""
+    """Return the ball with one member of the field, averaged at its points."""
     from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 
     instance = cases.instance(triangles, DEGREE)

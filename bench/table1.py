@@ -1,4 +1,4 @@
-"""The paper's Table 1: our way over the paper's two, by N, for pictures and for whole frames."""
+"""Table 1 of the paper: the method sheets relative to members and brute force, by degree."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from . import cases
 from .timing import Case, compare, main
 
-#: What is to be reached, for each degree: the LIC stage, and frames of few and of many triangles.
+#: Target ratios by degree: of the LIC stage, and of frames of a small and of a large mesh.
 LIC = {2: 4.0, 3: 8.0, 4: 12.0, 6: 16.0}
 FRAMES = {
     12_000: {2: 2.5, 3: 5.0, 4: 7.0, 6: 10.0},
@@ -23,7 +23,7 @@ BRUTE = replace(cases.LOOK, method="brute")
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """All rows."""
+    """Time all rows."""
     yield from quick(runs)
     yield from _frames("first frame of a mesh", cases.first_frame, runs)
     for triangles in FRAMES:
@@ -37,7 +37,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def quick(runs: int, cold: bool = False) -> Iterator[Case]:
-    """The rows of the table itself: the camera has moved since the last frame."""
+    """Time only the rows of the table, in which the camera has moved since the last frame."""
     for degree, target in LIC.items():
         yield compare(
             f"brute / sheets, LIC stage, N = {degree}",
@@ -53,7 +53,7 @@ def quick(runs: int, cold: bool = False) -> Iterator[Case]:
 def _frames(
     name: str, frame: Callable[..., np.ndarray], runs: int, cold: bool = False
 ) -> Iterator[Case]:
-    """Few and many triangles, every degree."""
+    """Time a small and a large mesh at every degree."""
     for triangles, targets in FRAMES.items():
         for degree, target in targets.items():
             yield compare(

@@ -1,4 +1,4 @@
-"""Two ways timed in turn, so that a noisy machine slows both, and what machine that was."""
+"""Ratios of alternating timings, which the load of the machine affects equally; command line."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-#: Runs of each way that a ratio is the median of.
+#: Number of runs of each function, of which a ratio is the median.
 RUNS = 7
 
 
 @dataclass(frozen=True)
 class Case:
-    """One line of a bench: how many times as much one thing takes as another.
+    """One line of a benchmark: the ratio of two times or amounts.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class Case:
 
     @property
     def reached(self) -> bool:
-        """Whether the ratio is what it is to be."""
+        """Whether the ratio reaches its target."""
         if self.target is None:
             return True
         return self.ratio >= self.target if self.higher_is_better else self.ratio <= self.target
 
     def line(self) -> str:
-        """As it is printed."""
+        """Format the case for printing."""
         wanted = ""
         if self.target is not None:
             sign = "at least" if self.higher_is_better else "at most"
@@ -66,7 +66,7 @@ class Case:
         return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{wanted}"
 
     def entry(self) -> dict[str, object]:
-        """As it is written to a file."""
+        """Return the case as an object for JSON."""
         return asdict(self)
 
 
@@ -80,7 +80,7 @@ def compare(
     runs: int = RUNS,
     cold: bool = False,
 ) -> Case:
-    """Time two things in turn, after each has run once.
+    """Time two functions in turn, after each has run once.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def compare(
     target : float, optional
     higher_is_better : bool
     runs : int
-        Of each, beside the first.
+        Runs of each function, not counting the first.
     cold : bool
-        Time the first run of `one` too: it is slow, and leaves nothing for the next.
+        Time the first run of `one` as well, because it is slow and leaves no cached results.
     """
     if not cold:
         one()
@@ -124,7 +124,7 @@ def main(
     measure: Callable[[int], Iterable[Case]],
     arguments: Sequence[str] | None = None,
 ) -> int:
-    """A bench as a program: what it measures is printed, and written if so asked.
+    """Run a benchmark as a program: print its cases, and write them to a file with --json.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def main(
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
-    parser.add_argument("--runs", type=int, default=RUNS, help="of each way (%(default)s)")
+    parser.add_argument("--runs", type=int, default=RUNS, help="runs per case (%(default)s)")
     chosen = parser.parse_args(arguments)
     print(machine(), flush=True)
     cases = list(measure(chosen.runs))
@@ -147,14 +147,14 @@ def main(
 
 
 def write(path: Path, entries: Sequence[dict[str, object]]) -> None:
-    """Cases as a list of objects, each with the machine it was measured on."""
+    """Write cases as a list of JSON objects, each with the machine that it was measured on."""
     path.parent.mkdir(parents=True, exist_ok=True)
     named = [{**entry, "machine": machine()} for entry in entries]
     path.write_text(json.dumps(named, indent=1) + "\n", encoding="utf-8")
 
 
 def machine() -> str:
-    """What is measured on: processor, cores, threads in use, versions."""
+    """Describe the machine: processor, cores, threads in use, versions."""
     versions = [f"Python {platform.python_version()}"]
     for package in ("numpy", "rlic", "vtk", "bpy"):
         try:
@@ -166,11 +166,11 @@ def machine() -> str:
 
 
 def use_one_core() -> None:
-    """Keep this process to one core, so that a library's threads have no more than RoSy's one."""
+    """Limit this process to one core, so that the threads of libraries have no advantage."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     else:
-        print("this system keeps no process to one core: peers may use more", file=sys.stderr)
+        print("this system cannot limit a process to one core: peers may use more", file=sys.stderr)
 
 
 def _processor() -> str:

@@ -1,8 +1,8 @@
-"""Draw the fields of a .blend file from its camera, render it, and save it beside the original.
+"""Bake the fields of a .blend file, render it, and save a copy next to the picture.
 
     blender -b SCENE.blend -P examples/bake_scene.py -- OUT.png
 
-Meshes without a field get one along the directions of their curvature.
+Meshes without a field get a curvature field.
 """
 
 import sys
@@ -23,14 +23,16 @@ from rosy_addon.ui.properties import ensure_registered
 def main(output: Path) -> None:
     ensure_registered()
     scene = bpy.context.scene
-    for thing in scene.objects:
-        if thing.type == "MESH" and not has_field(thing):
-            surface = mesh_surface(thing.data)
-            write_mesh_field(thing.data, generate(surface, "curvature", 4))
-    for baked in bake(scene):
-        names = ", ".join(thing.name for thing in baked.objects)
-        print(f"{names} drawn from {baked.camera}, {tuple(baked.image.size)} pixels")
-        print(*baked.warnings, sep="\n")
+    for obj in scene.objects:
+        if obj.type == "MESH" and not has_field(obj):
+            surface = mesh_surface(obj.data)
+            write_mesh_field(obj.data, generate(surface, "curvature", 4))
+    for result in bake(scene):
+        names = ", ".join(obj.name for obj in result.objects)
+        width, height = result.image.size
+        print(f"{names} drawn from {result.camera}, {width} x {height} pixels")
+        for warning in result.warnings:
+            print(warning)
     scene.render.filepath = str(output.resolve())
     bpy.ops.render.render(write_still=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve().with_suffix(".blend")), copy=True)

@@ -1,4 +1,4 @@
-"""Suzanne with a cross field along her curvature, drawn and rendered in her scene.
+"""Build a scene with Suzanne, bake a cross field along her curvature, and render it.
 
 python examples/demo.py [DEMO.png]           with Blender's Python module, bpy
 blender -b -P examples/demo.py -- [DEMO.png]
@@ -22,7 +22,7 @@ from rosy_addon.ui.properties import ensure_registered
 
 SIZE = 800, 640
 
-#: Light comes from the scene, so the picture itself has none.
+#: The lights of the scene shade the picture, so it has no shading of its own.
 LOOK = Look(shading=0.0, supersampling=2)
 
 
@@ -45,7 +45,7 @@ def main(output: Path) -> None:
 
 
 def add_suzanne():
-    """Suzanne, the modifier that subdivides her applied: curvature wants a smooth surface."""
+    """Add Suzanne, subdivided, because curvature needs a smooth surface."""
     bpy.ops.mesh.primitive_monkey_add(rotation=(radians(-8), 0.0, 0.0))
     suzanne = bpy.context.object
     suzanne.modifiers.new("Subdivision", "SUBSURF").levels = 3
@@ -55,10 +55,11 @@ def add_suzanne():
 
 
 def add_backdrop(suzanne):
-    """A floor under Suzanne that bends up into a wall behind her."""
+    """Add a floor under Suzanne that curves up into a wall behind her."""
     floor = min((suzanne.matrix_world @ vertex.co).z for vertex in suzanne.data.vertices)
     bend = [
-        (4 + 3 * sin(turn), floor + 3 - 3 * cos(turn)) for turn in (pi / 48 * i for i in range(25))
+        (4 + 3 * sin(angle), floor + 3 - 3 * cos(angle))
+        for angle in (pi / 48 * i for i in range(25))
     ]
     profile = [(-15.0, floor), *bend, (7.0, floor + 15)]
     vertices = [(x, y, z) for y, z in profile for x in (-20.0, 20.0)]
@@ -91,11 +92,11 @@ def add_lamp(name, location, energy, size):
     aim(lamp, location, (0.0, 0.0, 0.0))
 
 
-def aim(thing, location, target):
-    """Place something so that it points at a target."""
-    thing.location = location
-    toward = Vector(target) - Vector(location)
-    thing.rotation_euler = toward.to_track_quat("-Z", "Y").to_euler()
+def aim(obj, location, target):
+    """Move an object to a location and point its -Z axis at a target."""
+    obj.location = location
+    direction = Vector(target) - Vector(location)
+    obj.rotation_euler = direction.to_track_quat("-Z", "Y").to_euler()
 
 
 def set_render(scene):
@@ -109,10 +110,10 @@ def set_render(scene):
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y = SIZE
     render.image_settings.file_format = "PNG"
-    # Not every build has the denoiser.
+    # The denoiser is off, because not every build of Blender has it.
     scene.cycles.device, scene.cycles.samples, scene.cycles.use_denoising = "CPU", 32, False
 
 
 if __name__ == "__main__":
-    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
-    main(Path(words[0] if words else "demo.png"))
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    main(Path(arguments[0] if arguments else "demo.png"))

@@ -18,14 +18,14 @@ from .poll import poll_has_field
 
 
 class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
-    """Draw the fields of the scene as the chosen camera sees them, and put the picture on the meshes"""
+    """Draw the fields of the scene from the chosen camera, and apply the picture to the meshes"""
 
     bl_idname = "rosy.bake"
     bl_label = "Bake"
     bl_options = {"UNDO"}
 
     camera: bpy.props.EnumProperty(
-        name="Camera", description="From where the fields are drawn", items=CAMERA_ITEMS
+        name="Camera", description="Camera to draw from", items=CAMERA_ITEMS
     )
 
     @classmethod
@@ -63,7 +63,7 @@ def view_camera(context: bpy.types.Context) -> Camera:
     """
     area = context.area
     if area is None or area.type != "VIEW_3D":
-        raise RosyError("the current view is that of a 3D view: start this from one")
+        raise RosyError("there is no current view: run the operator in a 3D view")
     region = next(region for region in area.regions if region.type == "WINDOW")
     return camera_of_view(region, area.spaces.active.region_3d)
 

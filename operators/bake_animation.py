@@ -18,16 +18,16 @@ from .poll import poll_has_field
 
 
 class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
-    """Draw the fields at every frame of the scene into a folder, and let materials play the pictures back. Frames that are up to date are kept; after a stop with ESC, the next run continues from there"""
+    """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
 
     bl_idname = "rosy.bake_animation"
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
-    cancel_note = "frames that are done stay"
+    cancel_note = "completed frames were kept"
 
-    first: bpy.props.IntProperty(name="First", description="Frame", default=1)
-    last: bpy.props.IntProperty(name="Last", description="Frame", default=250)
-    step: bpy.props.IntProperty(name="Step", description="From frame to frame", default=1, min=1)
+    first: bpy.props.IntProperty(name="First", description="First frame", default=1)
+    last: bpy.props.IntProperty(name="Last", description="Last frame", default=250)
+    step: bpy.props.IntProperty(name="Step", description="Step between frames", default=1, min=1)
     all_cameras: bpy.props.BoolProperty(
         name="All Cameras",
         description="A sequence of pictures from each camera, instead of one from the camera that "
@@ -51,7 +51,8 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
         frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
         if not len(frames):
             raise RosyError(
-                f"frames {frame_settings['first']} to {frame_settings['last']}: there are none"
+                f"the last frame, {frame_settings['last']}, is before the first, "
+                f"{frame_settings['first']}"
             )
         cameras = scene_cameras(scene) if self.all_cameras else None
         # Frames are saved in the scene's folder, even if single pictures are packed.
@@ -65,7 +66,7 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
         for sequence in result:
             self.report(
                 {"INFO"},
-                f"{len(sequence.rendered)} frames drawn, {len(sequence.skipped)} were there: {sequence.sequence.path}",
+                f"{len(sequence.rendered)} frames drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
             )
 
 

@@ -15,7 +15,7 @@ from .poll import poll_has_field
 
 
 class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
-    """Store how much of the sky each part of the meshes with a field sees, and take tones from that"""
+    """Compute the ambient occlusion of all meshes with a field, store it as an attribute, and use it as the tone"""
 
     bl_idname = "rosy.occlusion"
     bl_label = "Tone by Occlusion"
@@ -23,7 +23,7 @@ class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
 
     directions: bpy.props.IntProperty(
         name="Directions",
-        description="From how many sides it is looked at: more take longer and are smoother",
+        description="Number of sampled directions of light. More are smoother and take longer",
         default=DIRECTION_COUNT,
         min=1,
         soft_min=32,
@@ -46,7 +46,8 @@ class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
         settings = context.scene.rosy
         settings.tone_attribute, settings.look.tone = OCCLUSION_ATTRIBUTE, "attribute"
         self.report(
-            {"INFO"}, f"Stored as attribute '{OCCLUSION_ATTRIBUTE}', which the tone now comes from"
+            {"INFO"},
+            f"Stored ambient occlusion as attribute '{OCCLUSION_ATTRIBUTE}', the source of the tone",
         )
 
 

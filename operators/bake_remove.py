@@ -9,7 +9,7 @@ from .poll import poll_idle
 
 
 class ROSY_OT_remove(bpy.types.Operator):
-    """Take away the pictures and all that RoSy put on objects to show them; fields stay"""
+    """Remove the pictures of this scene, and the modifiers and materials that show them. Fields are kept"""
 
     bl_idname = "rosy.remove"
     bl_label = "Remove Pictures"
@@ -20,7 +20,7 @@ class ROSY_OT_remove(bpy.types.Operator):
         if not poll_idle(cls):
             return False
         if not list_bakes(context.scene):
-            cls.poll_message_set("Nothing is baked in this scene")
+            cls.poll_message_set("This scene has no baked pictures")
             return False
         return True
 

@@ -10,7 +10,7 @@ from .poll import poll_idle
 
 
 class ROSY_OT_show(bpy.types.Operator):
-    """Show the picture that was baked from this camera"""
+    """Show the picture that was baked from this camera on the meshes"""
 
     bl_idname = "rosy.show"
     bl_label = "Show Picture"

@@ -34,7 +34,7 @@ class _FieldOperator:
 
 
 class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
-    """Give the fields of the selected meshes another degree, turn them, smooth them, or give them other magnitudes"""
+    """Change the degree of the fields of the selected meshes, rotate or smooth them, or replace their magnitudes"""
 
     bl_idname = "rosy.field_convert"
     bl_label = "Convert Field"
@@ -42,14 +42,14 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
 
     degree: bpy.props.IntProperty(
         name="Degree",
-        description="A multiple or a divisor of the field's; 0: the same",
+        description="New degree, a multiple or a divisor of the present one. 0: keep the degree",
         min=0,
         max=MAX_DEGREE,
         default=0,
     )
     angle: bpy.props.FloatProperty(
-        name="Turn",
-        description="Counter-clockwise, all directions",
+        name="Rotate",
+        description="Rotate all directions counter-clockwise by this angle",
         subtype="ANGLE",
         min=-2 * pi,
         max=2 * pi,
@@ -57,7 +57,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     )
     smooth: bpy.props.FloatProperty(
         name="Smooth",
-        description="Let the field diffuse over this share of the size of the mesh",
+        description="Diffuse the field over this fraction of the size of the mesh",
         min=0.0,
         max=10.0,
         soft_max=0.2,
@@ -67,11 +67,15 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     )
     magnitude: bpy.props.EnumProperty(
         name="Magnitude",
-        description="What lengths the directions get",
+        description="Lengths of the directions",
         items=[
-            ("keep", "Keep", "As they are"),
+            ("keep", "Keep", "Keep the present lengths"),
             *((kind, kind.capitalize(), text) for kind, text in MAGNITUDES.items()),
-            ("values", "Values", "Of an attribute or a vertex group: painted weights, a colour"),
+            (
+                "values",
+                "Values",
+                "Values of an attribute or a vertex group, such as painted weights or a color",
+            ),
         ],
     )
     values: bpy.props.StringProperty(
@@ -89,7 +93,9 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
             field = read_mesh_field(mesh, surface=surface)
             values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
             if values is not None and values.min() < 0:
-                raise RosyError(f"{surface.name}: '{self.values}' has values below 0, no lengths")
+                raise RosyError(
+                    f"{surface.name}: '{self.values}' has negative values, which cannot be lengths"
+                )
             magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
             conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
             task = convert_task(surface, field, conversion)
@@ -123,7 +129,7 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
-        description="Name of the attribute, of vectors or angles; empty: 'rosy', and 'rosy_angle'",
+        description="Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles",
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

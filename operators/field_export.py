@@ -15,17 +15,17 @@ from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_
 
 #: File formats by suffix: label and description in the user interface.
 FIELD_FORMATS = {
-    ".rosy": ("RoSy", "One member vector a face"),
-    ".rawfield": ("Raw Field", "All directions of a face in a row, as Directional reads them"),
-    ".txt": ("Text", "All directions of a face in a row, numbers alone"),
-    ".npy": ("NumPy", "An array with all directions of a face in a row"),
-    ".obj": ("fieldgen OBJ", "The mesh, and a direction at each vertex, as fieldgen writes it"),
-    ".sings": ("Singularities", "Vertices and their indices, as Directional reads them"),
+    ".rosy": ("RoSy", "One member vector per face"),
+    ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
+    ".txt": ("Text", "One row per face with all directions, without a header"),
+    ".npy": ("NumPy", "An array with one row per face with all directions"),
+    ".obj": ("fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
+    ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
 
 
 class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
-    """Write the field of the active mesh to a file, one row a face"""
+    """Write the field of the active mesh to a file"""
 
     bl_idname = "rosy.field_export"
     bl_label = "Export Field"

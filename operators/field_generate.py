@@ -41,7 +41,7 @@ def _mesh_item_names(context: bpy.types.Context, collection: str) -> list[str]:
 
 
 class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
-    """Make a field on the selected meshes, one direction and its rotations a face"""
+    """Generate a field on the selected meshes"""
 
     bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
@@ -49,22 +49,22 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
 
     kind: bpy.props.EnumProperty(
         name="From",
-        description="Where the directions come from",
+        description="Method that generates the field",
         items=KIND_ITEMS,
         default="curvature",
     )
     degree: bpy.props.IntProperty(
         name="Degree",
-        description="In how many directions the field looks the same: 2 lines, 4 crosses, 6 "
-        "triangles and hexagons",
+        description="Number of directions at each point: 2 for lines, 4 for crosses, 6 for triangles "
+        "and hexagons",
         min=1,
         max=MAX_DEGREE,
         default=4,
     )
     reach: bpy.props.FloatProperty(
         name="Reach",
-        description="How far clearly curved parts reach into those that are hardly curved, as a "
-        "share of the size of the mesh; at 0 every face has its own curvature's directions",
+        description="Distance by which curvature extends into flat parts, or by which guides are "
+        "smoothed, as a fraction of the size of the mesh. 0: do not smooth",
         min=0.0,
         max=10.0,
         soft_max=0.2,
@@ -74,15 +74,15 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     )
     edges: bpy.props.EnumProperty(
         name="Edges",
-        description="Which edges the field runs along",
+        description="Edges that the field follows",
         items=[
-            ("FEATURES", "By Angle", "Borders, and where the surface bends sharply"),
+            ("FEATURES", "By Angle", "Borders and sharp edges"),
             *((mark, name, text) for mark, (_, name, text) in EDGE_MARKS.items()),
         ],
     )
     sharp_angle: bpy.props.FloatProperty(
         name="Sharp Angle",
-        description="By how much the surface bends at a sharp edge, at least",
+        description="Smallest angle between the faces of a sharp edge",
         subtype="ANGLE",
         min=0.0,
         max=pi,
@@ -90,43 +90,43 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     )
     guides: bpy.props.EnumProperty(
         name="Follow",
-        description="What the field follows, one or several",
+        description="Kinds of guides that the field follows",
         options={"ENUM_FLAG"},
         items=[
-            ("OBJECTS", "Objects", "Strokes, curves and empties: the one named, or the selected"),
+            ("OBJECTS", "Objects", "Grease Pencil, curves and empties"),
             ("EDGES", "Edges", "Borders and sharp edges, or marked ones"),
             ("UV", "UV Map", "The axes of a UV map"),
-            ("ATTRIBUTE", "Vectors", "An attribute of vectors, where they are not zero"),
+            ("ATTRIBUTE", "Vectors", "A vector attribute, where it is not zero"),
         ],
         default={"OBJECTS"},
     )
     guide: bpy.props.StringProperty(
         name="Object",
-        description="Grease Pencil, curves or an empty that the field follows; empty: all of these "
-        "that are selected. Empties guide along their z axis, as far as they are drawn",
+        description="Grease Pencil, curve or empty that the field follows. Empty: all that are "
+        "selected. An empty guides along its z axis, within its display size",
         search=lambda self, context, typed: [
             obj.name for obj in guide_objects(context.scene.objects)
         ],
     )
     uv_map: bpy.props.StringProperty(
         name="UV Map",
-        description="Empty: the active one",
+        description="UV map that the field follows. Empty: the active one",
         search=lambda self, context, typed: _mesh_item_names(context, "uv_layers"),
     )
     vectors: bpy.props.StringProperty(
         name="Vectors",
-        description="Attribute of vectors on faces, points or corners",
+        description="Vector attribute on faces, points or corners that the field follows",
         search=lambda self, context, typed: _mesh_item_names(context, "attributes"),
     )
     axis: bpy.props.FloatVectorProperty(
         name="Axis",
-        description="Direction in the object's own space that is projected to the surface",
+        description="Direction in object space that is projected to the surface",
         subtype="XYZ",
         default=(0.0, 0.0, 1.0),
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
-        description="Name of the mesh attribute that holds the field; one that is there is replaced",
+        description="Name of the mesh attribute that stores the field. An existing field is replaced",
         default="rosy",
     )
 
@@ -184,13 +184,15 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
             objects = guide_objects(context.selected_objects)
             if not objects:
                 raise RosyError(
-                    "there is nothing to follow: name an object, or select Grease Pencil, curves "
-                    "or empties beside the mesh"
+                    "there are no guides: choose an object, or select Grease Pencil, curves or "
+                    "empties in addition to the mesh"
                 )
             return objects
         obj = context.scene.objects.get(self.guide)
         if obj is None or not guide_objects([obj]):
-            raise RosyError(f"object '{self.guide}' is no Grease Pencil, curve or empty here")
+            raise RosyError(
+                f"object '{self.guide}' is not a Grease Pencil, curve or empty of this scene"
+            )
         return [obj]
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:

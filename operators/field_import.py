@@ -13,7 +13,7 @@ from .poll import poll_editable, selected_mesh_objects, store_fields
 
 
 class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
-    """Read a field of the active mesh from a file, one row a face (or a vertex)"""
+    """Read the field of the active mesh from a file"""
 
     bl_idname = "rosy.field_import"
     bl_label = "Import Field"
@@ -25,30 +25,30 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
     )
     degree: bpy.props.IntProperty(
         name="Degree",
-        description="What the file has to hold, or what one that does not say so holds; 0: any",
+        description="Degree that the file must have, or degree of files that do not state it. 0: any, or 4",
         min=0,
         max=MAX_DEGREE,
         default=0,
     )
     mesh_file: bpy.props.StringProperty(
         name="Its Mesh",
-        description="Mesh file whose faces the field counts, if these are others than the mesh "
-        "has here: triangulated, or in another order. The field follows by position; a file of "
-        "the same name beside it is found by itself if the numbers of faces differ",
+        description="Mesh file that the field was made for, if its faces differ from those of this "
+        "mesh. The field is transferred by position. If the numbers of faces differ, a mesh file "
+        "of the same name in the same folder is used by default",
         subtype="FILE_PATH",
     )
     undefined: bpy.props.EnumProperty(
         name="Not Finite",
-        description="What to do about vectors with NaN or infinite components",
+        description="Treatment of vectors that are NaN or infinite",
         items=[
-            ("error", "Refuse", "Say where the first one is and read nothing"),
-            ("zero", "Leave Out", "Take the field for undefined on those faces"),
+            ("error", "Refuse", "Report the first one, and import nothing"),
+            ("zero", "Leave Out", "Treat the field as undefined on those faces"),
         ],
         default="error",
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
-        description="Name of the mesh attribute that holds the field; one that is there is replaced",
+        description="Name of the mesh attribute that stores the field. An existing field is replaced",
         default="rosy",
     )
 

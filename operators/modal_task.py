@@ -33,7 +33,7 @@ _current_job: Job | None = None
 def stop_current_job() -> None:
     """Cancel the current job, if any, like ESC."""
     if _current_job is not None:
-        _current_job.stop("RoSy was switched off")
+        _current_job.stop("RoSy was disabled")
 
 
 class Job:
@@ -114,7 +114,7 @@ class Job:
             self.stop("done")
             return True
         except ReferenceError:
-            self.stop("something it needs was deleted")
+            self.stop("required data was deleted")
             return False
         except BaseException:
             self.stop("an error")
@@ -126,12 +126,12 @@ class Job:
         """Return why the job cannot continue; None if it can."""
         try:
             if context.scene != self.scene:
-                return "the scene was changed"
+                return "another scene was chosen"
             for data_block in self.required_data:
                 if isinstance(data_block, bpy.types.Object) and not data_block.users_scene:
                     return f"'{data_block.name}' was deleted"
         except ReferenceError:
-            return "something it needs was deleted"
+            return "required data was deleted"
         return None
 
     def _show_progress(self, context: bpy.types.Context, progress: Progress) -> None:

@@ -35,7 +35,7 @@ def poll_editable(operator: type[bpy.types.Operator], context: bpy.types.Context
         operator.poll_message_set("Select a mesh object first")
         return False
     if context.mode != "OBJECT":
-        operator.poll_message_set("Leave this mode first: press Tab or choose Object Mode")
+        operator.poll_message_set("Switch to Object Mode first (Tab)")
         return False
     return True
 
@@ -43,7 +43,7 @@ def poll_editable(operator: type[bpy.types.Operator], context: bpy.types.Context
 def poll_idle(operator: type[bpy.types.Operator]) -> bool:
     """Whether no modal task is running. Sets the poll message if one is."""
     if job_status.current is not None:
-        operator.poll_message_set("RoSy is at work: wait, or press ESC to cancel")
+        operator.poll_message_set("RoSy is busy: wait, or press ESC to cancel")
         return False
     return True
 

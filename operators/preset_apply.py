@@ -13,7 +13,7 @@ from ..rosy_addon.ui import preset_library
 
 
 class ROSY_OT_preset_apply(bpy.types.Operator):
-    """Give the scene the look of this preset"""
+    """Replace the look of the scene by the look of this preset"""
 
     bl_idname = "rosy.preset_apply"
     bl_label = "Apply Preset"
@@ -21,7 +21,7 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
 
     preset: bpy.props.StringProperty(
         name="Preset",
-        description="Name of a preset, RoSy's or your own, or the path of a .json file",
+        description="Name of a preset, or path of a .json file",
         search=lambda self, context, typed: preset_library.preset_keys(),
         search_options={"SUGGESTION"},
     )

@@ -15,7 +15,7 @@ from .preset_shared import PRESET_ARGUMENTS, target_preset
 
 
 class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
-    """Write a preset to a file that others can import; its picture is drawn again there"""
+    """Write a preset to a file that others can import"""
 
     bl_idname = "rosy.preset_export"
     bl_label = "Export Preset"

@@ -11,7 +11,7 @@ from ..rosy_addon.scene.paths import user_presets_folder
 
 
 class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
-    """Add a preset from a file to your own, and draw its picture"""
+    """Add a preset from a file to your presets"""
 
     bl_idname = "rosy.preset_import"
     bl_label = "Import Preset"
@@ -20,8 +20,8 @@ class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
     filename_ext = ".json"
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
     replace: bpy.props.BoolProperty(
-        name="Replace the One There",
-        description="Let it take the place of a preset of yours that is called the same",
+        name="Replace Existing",
+        description="Replace your preset of the same name",
         options={"SKIP_SAVE"},
     )
 
@@ -32,7 +32,7 @@ class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
         except RosyError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"Added preset '{preset.name}' to your own")
+        self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
         return {"FINISHED"}
 
 

@@ -12,7 +12,7 @@ from .preset_shared import PRESET_ARGUMENTS, poll_user_presets, target_preset
 
 
 class ROSY_OT_preset_remove(bpy.types.Operator):
-    """Delete a preset of your own and its picture; the look of the scene stays"""
+    """Delete one of your presets. The look of the scene does not change"""
 
     bl_idname = "rosy.preset_remove"
     bl_label = "Delete Preset"

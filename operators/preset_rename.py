@@ -18,7 +18,7 @@ from .preset_shared import (
 
 
 class ROSY_OT_preset_rename(bpy.types.Operator):
-    """Give a preset of your own another name or sentence"""
+    """Change the name or the description of one of your presets"""
 
     bl_idname = "rosy.preset_rename"
     bl_label = "Rename Preset"
@@ -28,7 +28,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
         search=lambda self, context, typed: preset_library.user_preset_keys(), **PRESET_ARGUMENTS
     )
     name: bpy.props.StringProperty(
-        name="Name", description="What the preset is to be called", maxlen=MAX_NAME_LENGTH
+        name="Name", description="New name of the preset", maxlen=MAX_NAME_LENGTH
     )
     sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
 

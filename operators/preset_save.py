@@ -15,19 +15,19 @@ from .preset_shared import DESCRIPTION_ARGUMENTS, draw_name_and_description
 
 
 class ROSY_OT_preset_save(bpy.types.Operator):
-    """Keep the look of this scene as a preset of your own, with a picture of it"""
+    """Save the look of this scene as one of your presets"""
 
     bl_idname = "rosy.preset_save"
     bl_label = "Save Preset"
     bl_options = {"REGISTER"}
 
     name: bpy.props.StringProperty(
-        name="Name", description="What the preset is called", maxlen=MAX_NAME_LENGTH
+        name="Name", description="Name of the preset", maxlen=MAX_NAME_LENGTH
     )
     sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
     replace: bpy.props.BoolProperty(
-        name="Replace the One There",
-        description="Let this preset take the place of one of yours that is called the same",
+        name="Replace Existing",
+        description="Replace your preset of the same name",
         options={"SKIP_SAVE"},
     )
 
@@ -41,7 +41,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
         layout = self.layout
         draw_name_and_description(layout, self)
         if _is_user_preset(self.name):
-            layout.label(text="You have a preset of this name", icon="INFO")
+            layout.label(text="You already have a preset of this name", icon="INFO")
             layout.prop(self, "replace")
 
     def execute(self, context: bpy.types.Context) -> set[str]:

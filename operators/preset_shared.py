@@ -12,13 +12,13 @@ from ..rosy_addon.ui import preset_library
 #: Arguments of the property that selects a preset.
 PRESET_ARGUMENTS = {
     "name": "Preset",
-    "description": "What the preset is called by; empty: the one whose look the scene has",
+    "description": "Name of the preset. Empty: the active preset of the scene",
 }
 
 
 #: Arguments of the property for the description of a preset.
 DESCRIPTION_ARGUMENTS = {
-    "name": "Sentence",
+    "name": "Description",
     "description": "What the look is like, or what it is for",
     "maxlen": MAX_DESCRIPTION_LENGTH,
 }
@@ -39,6 +39,6 @@ def target_preset(operator: Any, context: bpy.types.Context) -> str:
 def poll_user_presets(operator: type[bpy.types.Operator]) -> bool:
     """Whether the user has presets. Sets the poll message if not."""
     if not preset_library.user_preset_keys():
-        operator.poll_message_set("You have no presets of your own yet: save one first")
+        operator.poll_message_set("You have no presets yet: save one first")
         return False
     return True

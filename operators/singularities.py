@@ -16,7 +16,7 @@ from .poll import poll_active_field, poll_idle, selected_mesh_objects
 
 
 class ROSY_OT_singularities(bpy.types.Operator):
-    """Show where the fields of the selected meshes are singular: orange dots of positive index, blue ones of negative"""
+    """Show the singularities of the fields of the selected meshes: orange for positive index, blue for negative index"""
 
     bl_idname = "rosy.singularities"
     bl_label = "Singularities"
@@ -26,9 +26,9 @@ class ROSY_OT_singularities(bpy.types.Operator):
         name="Show",
         items=[
             ("OVERLAY", "Overlay", "Dots and indices in the 3D view"),
-            ("POINTS", "Points", "An object of points with an attribute 'index', in units of 1/N"),
+            ("POINTS", "Points", "A point object with an attribute 'index', in units of 1/N"),
             ("BOTH", "Both", "Overlay and points"),
-            ("NONE", "Hide", "Neither: take away what was shown"),
+            ("NONE", "Hide", "Remove the overlay and the points"),
         ],
     )
 
@@ -54,7 +54,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
         if self.show != "NONE":
             count = sum(map(len, singularities_by_object.values()))
             total = "; ".join(
-                f"'{obj.name}': indices add up to "
+                f"'{obj.name}': sum of the indices "
                 f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
                 for obj, singularities in singularities_by_object.items()
             )

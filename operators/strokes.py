@@ -17,7 +17,7 @@ from .poll import poll_has_field, poll_idle
 
 
 class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
-    """Cover the meshes that have a field with evenly spaced strokes along it, as the camera sees them"""
+    """Draw evenly spaced strokes along the fields of the meshes, as seen from the camera"""
 
     bl_idname = "rosy.strokes"
     bl_label = "Draw Strokes"
@@ -25,22 +25,22 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
 
     kind: bpy.props.EnumProperty(
         name="Make",
-        description="What the strokes are made into; as the scene says if not given",
+        description="Type of object or file. Default: the setting of the scene",
         items=STROKE_KIND_ITEMS,
     )
     camera: bpy.props.EnumProperty(
         name="Camera",
-        description="From where strokes are seen; as the scene says if not given",
+        description="Viewpoint of the strokes. Default: the setting of the scene",
         items=STROKE_CAMERA_ITEMS,
     )
     filepath: bpy.props.StringProperty(
-        name="File", description="The .svg file; as the scene says if not given"
+        name="File", description="Path of the .svg file. Default: the setting of the scene"
     )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != "OBJECT":
-            cls.poll_message_set("Leave this mode first: press Tab or choose Object Mode")
+            cls.poll_message_set("Switch to Object Mode first (Tab)")
             return False
         return poll_has_field(cls, context)
 
@@ -74,7 +74,7 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
 
 
 class ROSY_OT_strokes_remove(bpy.types.Operator):
-    """Take away the strokes that RoSy put into this scene; fields, pictures and files stay"""
+    """Remove the stroke objects of this scene. Fields, pictures and files are kept"""
 
     bl_idname = "rosy.strokes_remove"
     bl_label = "Remove Strokes"
@@ -85,13 +85,13 @@ class ROSY_OT_strokes_remove(bpy.types.Operator):
         if not poll_idle(cls):
             return False
         if not stroke_objects(context.scene):
-            cls.poll_message_set("There are no strokes in this scene")
+            cls.poll_message_set("This scene has no strokes")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = remove_strokes(context.scene)
-        self.report({"INFO"}, f"Removed {count} object{'s' if count > 1 else ''} of strokes")
+        self.report({"INFO"}, f"Removed {count} object{'s' if count > 1 else ''} with strokes")
         return {"FINISHED"}
 
 

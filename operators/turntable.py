@@ -32,7 +32,7 @@ VIDEO_SETTINGS = ("filepath", "film", "pictures", "rate", "width", "height", "el
 
 
 class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
-    """Draw the active mesh with its field from all around, by the scene's look, as a film"""
+    """Render a turntable video of the active mesh with its field, with the look of the scene"""
 
     bl_idname = "rosy.turntable"
     bl_label = "Turntable"
@@ -44,20 +44,20 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
     filename_ext = ".mp4"
     filter_glob: bpy.props.StringProperty(default="*.mp4;*.gif", options={"HIDDEN"})
     film: bpy.props.EnumProperty(
-        name="Film",
-        items=[(".mp4", "MP4", "H.264"), (".gif", "GIF", "256 colours, for web pages")],
+        name="Format",
+        items=[(".mp4", "MP4", "H.264"), (".gif", "GIF", "256 colors, for web pages")],
     )
     pictures: bpy.props.IntProperty(
-        name="Pictures", description="Of a full turn", default=72, min=2, max=10_000
+        name="Pictures", description="Pictures in a full turn", default=72, min=2, max=10_000
     )
     rate: bpy.props.FloatProperty(
-        name="Rate", description="Pictures a second", default=24.0, min=0.1, max=120.0
+        name="Rate", description="Pictures per second", default=24.0, min=0.1, max=120.0
     )
     width: bpy.props.IntProperty(name="Width", subtype="PIXEL", default=512, min=16, max=8192)
     height: bpy.props.IntProperty(name="Height", subtype="PIXEL", default=512, min=16, max=8192)
     elevation: bpy.props.FloatProperty(
         name="Elevation",
-        description="From how far above it is looked at",
+        description="Angle of the camera above the horizon",
         subtype="ANGLE",
         default=0.35,
         min=-1.5,
@@ -66,7 +66,7 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
 
     skip_browser: bpy.props.BoolProperty(
         name="Skip Browser",
-        description="Start at once, without a file browser",
+        description="Start without a file browser",
         options={"HIDDEN", "SKIP_SAVE"},
     )
 

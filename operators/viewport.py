@@ -9,7 +9,7 @@ from ..rosy_addon.viewport import session
 
 
 class ROSY_OT_viewport(bpy.types.Operator):
-    """Draw the fields of all meshes in this 3D view, however it is turned, without baking anything"""
+    """Draw the fields of all meshes in this 3D view at every redraw, without baking"""
 
     bl_idname = "rosy.viewport"
     bl_label = "Live Fields"
@@ -18,17 +18,21 @@ class ROSY_OT_viewport(bpy.types.Operator):
     show: bpy.props.EnumProperty(
         name="Show",
         items=[
-            ("TOGGLE", "Toggle", "On if off, off if on"),
+            ("TOGGLE", "Toggle", "Switch on or off"),
             ("ON", "On", "Draw the fields in this view"),
-            ("OFF", "Off", "Leave the view as it was"),
+            ("OFF", "Off", "Do not draw the fields in this view"),
         ],
     )
 
     device: bpy.props.EnumProperty(
         name="Device",
-        description="What the fields are drawn with",
+        description="Device that draws the fields",
         items=[
-            ("AUTO", "Graphics Card", "The graphics card, or the processor if it cannot"),
+            (
+                "AUTO",
+                "Graphics Card",
+                "The graphics card, or the processor if the card cannot be used",
+            ),
             ("CPU", "Processor", "The processor, at reduced size"),
         ],
     )
@@ -36,7 +40,7 @@ class ROSY_OT_viewport(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.space_data is None or context.space_data.type != "VIEW_3D":
-            cls.poll_message_set("Only in a 3D view")
+            cls.poll_message_set("Available only in a 3D view")
             return False
         return True
 

@@ -105,7 +105,7 @@ def bake_animation_task(
     """
     settings = read_output_settings(scene) if settings is None else settings
     if settings.folder is None:
-        raise RosyError("frames are saved to a folder: choose Output > Store: In a Folder")
+        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
     check_folder(settings.folder)
     frames = list(frames)
     original_frame = scene.frame_current, scene.frame_subframe

@@ -89,7 +89,7 @@ def bake_task(
         camera_object = find_camera_object(scene, source)
         rendered_views.append(RenderedView(picture, view.camera, camera_object))
     BAKE_CACHE.evict_over_limit()
-    yield Progress(0.97, "putting the picture on")
+    yield Progress(0.97, "applying the pictures")
     return [
         apply_picture(scene, scene_views.scene_data, rendered_view, settings)
         for rendered_view in rendered_views

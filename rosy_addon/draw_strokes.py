@@ -121,7 +121,7 @@ def draw_strokes_task(
     )
     drawing = yield from subtask(work, 0.05, 0.95)
     BAKE_CACHE.evict_over_limit()
-    yield Progress(0.97, "putting the strokes there")
+    yield Progress(0.97, "storing the strokes")
     if kind == "SVG":
         write_svg(path, drawing.strokes, view, pen)
         return StrokeResult(view.name, drawing, path=path)
@@ -146,10 +146,10 @@ def svg_path(path: Path | str) -> Path:
         .svg, or if the file cannot be written.
     """
     if str(path).startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{path}: save the .blend file first, or choose a folder")
+        raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
     path = Path(bpy.path.abspath(str(path)))
     if path.suffix.lower() != ".svg":
-        raise RosyError(f"{path}: strokes are written to .svg files")
+        raise RosyError(f"{path}: the name of the file must end in .svg")
     check_writable(path)
     return path
 
@@ -164,4 +164,7 @@ def _notes(scene: bpy.types.Scene, obj: bpy.types.Object, style: StrokeStyle) ->
     has_depth_pass = any(layer.use_pass_z for layer in scene.view_layers)
     if not style.hidden or obj.type == "CURVES" or has_depth_pass:
         return []
-    return ["renders show Grease Pencil through surfaces, unless the view layer has the pass Z"]
+    return [
+        "renders will show these strokes through surfaces: enable the Depth pass of the view layer "
+        "(Z before Blender 5.0)"
+    ]

@@ -32,10 +32,10 @@ def read_bytes(
         with open(path, "rb") as file:
             head = file.read(4096)
             if reject_binary and b"\0" in head:
-                raise RosyError(f"{path}: holds binary data, text is wanted")
+                raise RosyError(f"{path}: expected text, found binary data")
             data = head + file.read(-1 if max_bytes is None else max(max_bytes + 1 - len(head), 0))
         if max_bytes is not None and len(data) > max_bytes:
-            raise RosyError(f"{path}: is too large: {max_bytes:,} bytes at most")
+            raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
         return data
     except RosyError:
         raise
@@ -83,7 +83,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     if target.is_dir():
         raise RosyError(f"{path}: cannot be written: it is a folder")
     if not target.parent.is_dir():
-        raise RosyError(f"{path}: cannot be written: there is no folder {target.parent}")
+        raise RosyError(f"{path}: cannot be written: the folder {target.parent} does not exist")
     if not os.access(target.parent, os.W_OK) or (
         target.exists() and not os.access(target, os.W_OK)
     ):

@@ -59,7 +59,7 @@ def _parse_range(part: str, text: str) -> range:
     last = int(match[2]) if match and match[2] else first
     step = int(match[3]) if match and match[3] else 1
     if match is None or last < first or not step:
-        raise RosyError(f"frames '{text}': A, A-B or A-B:STEP is wanted, such as 1-250 or 1-250:10")
+        raise RosyError(f"frames '{text}': expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10")
     return range(first, last + 1, step)
 
 
@@ -184,7 +184,7 @@ def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Ite
     try:
         client = Client(address)
     except (OSError, ValueError) as reason:
-        raise RosyError(f"--scheduler {address}: no answer: {reason}") from None
+        raise RosyError(f"--scheduler {address}: cannot connect: {reason}") from None
     failures = []
     with client:
         frames = list(frames)
@@ -255,5 +255,5 @@ def _error_line(output: Sequence[str]) -> str:
     """
     lines = [line for line in output if line.strip()]
     output = [line for line in lines if line.startswith("rosy: ")]
-    message = (output or lines or ["ended without a word"])[-1].removeprefix("rosy: ")
+    message = (output or lines or ["ended without output"])[-1].removeprefix("rosy: ")
     return re.sub(r"^frame -?\d+: ", "", message)

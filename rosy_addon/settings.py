@@ -1,4 +1,4 @@
-"""Settings that describe themselves.
+"""Declarative settings: dataclass fields with a range, a label and a help text.
 
 A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
 `color`. Each field carries a `Setting`: its default, range, label, help text, place in the panels,
@@ -93,7 +93,7 @@ class Setting:
 
     def _refuse(self, value: Any, expected: str) -> None:
         # `reprlib` keeps the message to one short line, whatever a file holds.
-        raise RosyError(f"setting '{self.name}' is {reprlib.repr(value)}, not {expected}")
+        raise RosyError(f"setting '{self.name}' is {reprlib.repr(value)}, expected {expected}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +130,7 @@ class Number(Setting):
         if isinstance(value, bool) or not isinstance(value, types):
             self._refuse(value, f"a {'whole ' * self.is_integer}number")
         if not self.low <= value <= self.high:
-            self._refuse(value, f"from {self.low} to {self.high}")
+            self._refuse(value, f"a number from {self.low} to {self.high}")
 
     def parse(self, text: str) -> Any:
         """Return the number that a text stands for."""

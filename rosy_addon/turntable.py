@@ -170,7 +170,7 @@ class VideoWriter:
             write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
             return
         folder = Path(self._temp_folder.name)
-        video_path = folder / "film.mp4"
+        video_path = folder / "video.mp4"
         self._encode(folder, self._count, self._size, self._fps, video_path)
         write_bytes(self._path, video_path.read_bytes())
 
@@ -188,7 +188,7 @@ def check_video_path(path: Path) -> None:
     RosyError
     """
     if path.suffix.lower() not in VIDEO_SUFFIXES:
-        raise RosyError(f"{path}: films are written to {' and '.join(VIDEO_SUFFIXES)} files")
+        raise RosyError(f"{path}: the name of the video must end in {' or '.join(VIDEO_SUFFIXES)}")
 
 
 def _encode_with_ffmpeg(

@@ -30,7 +30,7 @@ def main() -> int:
 
 
 def _builder() -> str:
-    """The script behind `blender --command extension`. Finding it does not start Blender."""
+    """Import the script behind `blender --command extension`, without starting Blender."""
     spec = importlib.util.find_spec("bpy")
     places = list(spec.submodule_search_locations or []) if spec else []
     for place in places:

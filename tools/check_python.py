@@ -1,11 +1,11 @@
-"""Say in one line what is wrong with a Python that is to hold an environment."""
+"""Check that a Python can be used for an environment, and print why not in one line."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-#: PyPI has one build of Blender's module a version, for the Python of that Blender.
+#: PyPI has one build of each version of Blender's module, for the Python of that Blender.
 BLENDERS_PYTHON = (3, 11)
 
 
@@ -18,7 +18,7 @@ def main() -> int:
         print(f"PyPI has no bpy for Python {shown}, only for 3.11: make PYTHON=/path/to/python3.11")
         return 1
     if found < BLENDERS_PYTHON:
-        print(f"Python {shown} is too old, 3.11 is wanted: make PYTHON=/path/to/python3.11")
+        print(f"Python {shown} is too old, 3.11 is required: make PYTHON=/path/to/python3.11")
         return 1
     return 0
 

@@ -1,6 +1,7 @@
 """Compare the outputs of two commits, byte for byte.
 
     .venv-bpy42/bin/python tools/compare_outputs.py OLD [NEW] [--only TEXT] [--keep DIR]
+        [--data DIR]
     .venv-bpy42/bin/python tools/compare_outputs.py OLD --blender "COMMAND"
 
 OLD and NEW are git revisions. NEW is the working tree if it is not given. Each revision is copied
@@ -49,7 +50,6 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / "build" / "compare"
-REAL_DATA = ROOT.parent / "shared" / "data"
 
 #: Cases that one child process runs, and seconds after which it is stopped.
 BATCH_SIZE, BATCH_TIMEOUT = 12, 900
@@ -521,22 +521,22 @@ def off_text(mesh: Mesh) -> str:
 
 
 def ply_file(mesh: Mesh, binary: bool = False) -> bytes:
-    """Return a .ply file with a colour and a number `weight` at each vertex."""
+    """Return a .ply file with a color and a number `weight` at each vertex."""
     kinds = dict.fromkeys(("x", "y", "z", "weight"), "double")
     kinds |= dict.fromkeys(("red", "green", "blue"), "uchar")
     numbers = np.column_stack([mesh.vertices, np.sin(4 * mesh.vertices[:, 0])])
-    colours = (127.5 + 127.5 * np.sin(3 * mesh.vertices)).astype(int)
-    vertices = list(zip(numbers, colours, strict=True))
+    colors = (127.5 + 127.5 * np.sin(3 * mesh.vertices)).astype(int)
+    vertices = list(zip(numbers, colors, strict=True))
     header = ["ply", f"format {'binary_little_endian' if binary else 'ascii'} 1.0"]
     header += [f"element vertex {len(vertices)}"]
     header += [f"property {kind} {name}" for name, kind in kinds.items()]
     header += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices"]
     head = "\n".join([*header, "end_header", ""])
     if binary:
-        rows = [struct.pack("<4d3B", *number, *colour) for number, colour in vertices]
+        rows = [struct.pack("<4d3B", *number, *color) for number, color in vertices]
         rows += [struct.pack(f"<B{len(face)}i", len(face), *face) for face in mesh.faces]
         return head.encode() + b"".join(rows)
-    lines = [f"{row} {r} {g} {b}" for row, (r, g, b) in zip(rows_of(numbers), colours, strict=True)]
+    lines = [f"{row} {r} {g} {b}" for row, (r, g, b) in zip(rows_of(numbers), colors, strict=True)]
     lines += [" ".join(map(str, (len(face), *face))) for face in mesh.faces]
     return (head + "\n".join([*lines, ""])).encode()
 
@@ -561,10 +561,10 @@ def stl_bytes(mesh: Mesh) -> bytes:
     return bytes(80) + struct.pack("<I", len(corners)) + records.tobytes()
 
 
-def png_file(grey: np.ndarray) -> bytes:
-    """Return a grey .png file of (H, W) uint8 values."""
-    height, width = grey.shape
-    rows = np.column_stack([np.zeros(height, np.uint8), grey]).tobytes()
+def png_file(gray: np.ndarray) -> bytes:
+    """Return a gray .png file of (H, W) uint8 values."""
+    height, width = gray.shape
+    rows = np.column_stack([np.zeros(height, np.uint8), gray]).tobytes()
     header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
@@ -573,8 +573,11 @@ def png_file(grey: np.ndarray) -> bytes:
     )
 
 
-def write_inputs(folder: Path) -> None:
-    """Write the meshes, fields and images that cases name with `@`."""
+def write_inputs(folder: Path, data: Path | None) -> None:
+    """Write the meshes, fields and images that cases name with `@`.
+
+    Files in the subfolders of `data`, if it is given, are copied.
+    """
     ring, pair = torus(), two_parts()
     texts = {
         "torus.obj": obj_text(ring),
@@ -616,12 +619,12 @@ def write_inputs(folder: Path) -> None:
     np.save(folder / "member.npy", member)
     np.save(folder / "guides.npy", guides)
     v, u = np.mgrid[:48, :64] / 48
-    grey = (127.5 + 127.5 * np.sin(9 * u + 4 * v * v)).astype(np.uint8)
-    (folder / "tone.png").write_bytes(png_file(grey))
+    gray = (127.5 + 127.5 * np.sin(9 * u + 4 * v * v)).astype(np.uint8)
+    (folder / "tone.png").write_bytes(png_file(gray))
     (folder / "bumpy.ply").write_bytes(ply_file(bumpy_sphere()))
     (folder / "star.ply").write_bytes(ply_file(star(), binary=True))
     (folder / "pair-binary.stl").write_bytes(stl_bytes(pair))
-    for path in sorted(REAL_DATA.glob("*/*")):
+    for path in sorted(data.glob("*/*")) if data is not None else []:
         shutil.copy(path, folder)
 
 
@@ -1073,7 +1076,7 @@ def read_pixels(path: Path) -> np.ndarray:
     import bpy
 
     image = bpy.data.images.load(str(path))
-    image.alpha_mode = "CHANNEL_PACKED"  # leaves the colour of transparent pixels as it is
+    image.alpha_mode = "CHANNEL_PACKED"  # keeps the color of transparent pixels
     pixels = pixels_of(image)
     bpy.data.images.remove(image)
     return np.rint(255 * pixels)
@@ -1094,9 +1097,17 @@ def parse_arguments() -> argparse.Namespace:
     """Return the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("old", nargs="?", metavar="OLD", help="git revision")
-    parser.add_argument("new", nargs="?", metavar="NEW", help="the working tree if not given")
+    parser.add_argument(
+        "new", nargs="?", metavar="NEW", help="git revision; by default the working tree"
+    )
     parser.add_argument("--only", default="", metavar="TEXT", help="cases with this in their name")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep outputs and differing pairs")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        help="folder with the meshes and fields of others, for the cases that use them",
+    )
     parser.add_argument("--list", action="store_true", help="list the cases and end")
     parser.add_argument(
         "--blender",
@@ -1123,7 +1134,7 @@ def main() -> int:
     CACHE.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=CACHE, prefix="work-") as name:
         work = Path(name)
-        write_inputs(work / INPUTS)
+        write_inputs(work / INPUTS, options.data)
         inputs = {path.name for path in (work / INPUTS).iterdir()} | {MISSING}
         chosen = [case for case in cases if inputs.issuperset(re.findall(INPUT, case.code))]
         revisions = [
@@ -1134,7 +1145,7 @@ def main() -> int:
         counts = report(revisions, chosen, options.keep)
     print(
         f"{len(chosen)} cases: {counts['same']} same, {counts['DIFFERS']} differ, "
-        f"{counts['failed']} failed; {len(cases) - len(chosen)} left out for want of their input"
+        f"{counts['failed']} failed; {len(cases) - len(chosen)} left out because an input is missing (--data)"
     )
     return 0 if chosen and counts["same"] == len(chosen) else 1
 

@@ -20,14 +20,14 @@ const JOB_TYPE = {
             key: "chunk_size",
             type: "int32",
             default: 10,
-            description: "Frames that one worker draws in one go",
+            description: "Number of frames in each task",
             visible: "submission",
         },
         {
             key: "cameras",
             type: "string",
             default: "",
-            description: "Names of cameras, with commas between, a sequence of each; empty: the camera "
+            description: "Names of cameras, separated by commas, for one sequence each. Empty: the camera "
                 + "that renders each frame",
         },
         {
@@ -36,20 +36,20 @@ const JOB_TYPE = {
             subtype: "dir_path",
             required: true,
             eval: "bpy.path.abspath(C.scene.rosy.directory)",
-            description: "Where the pictures go; all workers must be able to write there",
+            description: "Folder of the pictures. All workers must be able to write to it",
         },
         {
             key: "preset",
             type: "string",
             default: "",
-            description: "A look by its name; empty: the scene's",
+            description: "Name of a preset. Empty: the look of the scene",
         },
         {
             key: "blendfile",
             type: "string",
             required: true,
             eval: "bpy.data.filepath",
-            description: "The scene",
+            description: "Path of the .blend file",
             visible: "web",
         },
     ],

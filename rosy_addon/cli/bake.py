@@ -22,13 +22,19 @@ def add_bake_command(subparsers: Any) -> None:
     """Add the command `bake`."""
     parser = add_subcommand(subparsers, "bake", run_bake)
     parser.add_argument(
-        "scene", nargs="?", type=Path, metavar="SCENE.blend", help="by default the open file"
+        "scene",
+        nargs="?",
+        type=Path,
+        metavar="SCENE.blend",
+        help="Blender file; by default the open one",
     )
     parser.add_argument(
         "--object", nargs="+", metavar="NAME", help="objects to draw; by default all with a field"
     )
     cameras = parser.add_mutually_exclusive_group()
-    cameras.add_argument("--camera", metavar="NAME", help="by default the scene's active camera")
+    cameras.add_argument(
+        "--camera", metavar="NAME", help="camera to draw from; by default the scene's active one"
+    )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
     add_look_options(parser)
     parser.add_argument(
@@ -40,8 +46,8 @@ def add_bake_command(subparsers: Any) -> None:
     parser.add_argument(
         "--device",
         choices=list(RENDER_DEVICES),
-        help="draw with the processor, the graphics card, or the graphics card if there is one; by "
-        "default as set in the scene",
+        help="draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is "
+        "one (auto); by default as set in the scene",
     )
     parser.add_argument("--save", action="store_true", help="save the Blender file")
     parser.add_argument(
@@ -65,7 +71,7 @@ def run_bake(options: argparse.Namespace) -> None:
     """Draw the fields of a Blender file from its cameras, at one frame or several."""
     _check_bake_options(options)
     if options.out is None and not options.save:
-        raise RosyError("the pictures would be lost: give --out DIR, --save, or both")
+        raise RosyError("the pictures would not be saved: give --out DIR, --save, or both")
     if uses_workers(options):
         run_workers(options)
         if not options.save:
@@ -140,7 +146,7 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
     )
     for result in _run_with_log(task):
         if result.skipped:
-            print(f"{len(result.skipped)} frames of {result.camera} were there")
+            print(f"{len(result.skipped)} frames of {result.camera} are up to date")
         print(f"{result.camera}: {result.sequence.path}")
     if options.save:
         print(save_blend())

@@ -113,7 +113,7 @@ def _compare(
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(
-            f"{options.against}: belongs to a field of degree {degree}, not {field.degree}"
+            f"{options.against}: is for a field of degree {degree}, but this field has degree {field.degree}"
         )
     own_pairs = set(zip(vertex.tolist(), index.tolist(), strict=True))
     other_pairs = set(zip(other_element.tolist(), other_index.tolist(), strict=True))
@@ -138,7 +138,7 @@ def _format_info(facts: dict[str, Any]) -> str:
             f"Euler characteristic {facts['euler_characteristic']}",
             f"magnitude {low:.4g} to {high:.4g}, undefined on {facts['undefined_faces']} faces",
             f"energy {facts['energy']:.6g}",
-            *([] if facts["is_rosy"] else ["directions at free angles, no RoSy"]),
+            *([] if facts["is_rosy"] else ["directions at free angles, not a RoSy"]),
             *_format_comparison(facts.get("against")),
             f"{len(singularity_lines)} singularities",
             *singularity_lines,

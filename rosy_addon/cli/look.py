@@ -31,7 +31,8 @@ def add_look_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--preset",
         metavar="NAME",
-        help=f"{', '.join(preset_keys())}, one of your own, or a .json file; `presets` lists them",
+        help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
+        "`presets` lists them",
     )
     parser.add_argument(
         "--set",
@@ -71,7 +72,7 @@ def _parse_setting(text: str) -> tuple[str, Any]:
     if not separator:
         raise RosyError(f"--set {text}: expected NAME=VALUE")
     if name not in settings:
-        raise RosyError(f"--set {text}: there is no setting '{name}', only {', '.join(settings)}")
+        raise RosyError(f"--set {text}: unknown setting '{name}': choose {', '.join(settings)}")
     try:
         return name, settings[name].parse(value)
     except ValueError:
@@ -114,7 +115,7 @@ def load_tone_map(options: argparse.Namespace, surface: Surface) -> SurfaceTone 
 def _load_vertex_tone(mesh: Path, name: str) -> np.ndarray:
     """Return (V,) values of the vertices of a .ply file: a property, or the luminance of the color."""
     if mesh.suffix.lower() != ".ply":
-        raise RosyError(f"{mesh}: has no vertex properties; they are read only from .ply files")
+        raise RosyError(f"{mesh}: has no vertex properties, which only .ply files have")
     values = read_vertex_values(mesh)
     rgb = [values.get(channel) for channel in ("red", "green", "blue")]
     if name == VERTEX_COLOR and all(channel is not None for channel in rgb):

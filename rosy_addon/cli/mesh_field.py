@@ -70,7 +70,7 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
         type=float_between(0.0, 180.0),
         default=30.0,
         metavar="DEGREES",
-        help="angle between faces from which an edge is sharp, for --generate features (%(default)g)",
+        help="smallest angle between the faces of a sharp edge, for --generate features (%(default)g)",
     )
     parser.add_argument(
         "--strokes",
@@ -92,8 +92,8 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
         "--field-mesh",
         type=Path,
         metavar="MESH",
-        help="the mesh that the field file belongs to, if it is another one; the field is "
-        "transferred by position",
+        help="mesh file that the field file belongs to, if it is not MESH; the field is transferred by "
+        "position",
     )
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
@@ -147,5 +147,5 @@ def load_uv_map(mesh: Path) -> np.ndarray:
     """
     uv = read_uv(mesh) if mesh.suffix.lower() == ".obj" else None
     if uv is None:
-        raise RosyError(f"{mesh}: has no UV map; UV maps are read only from .obj files")
+        raise RosyError(f"{mesh}: has no UV map, which only .obj files can have")
     return uv

@@ -36,7 +36,7 @@ def run_presets(options: argparse.Namespace) -> None:
     width = max(len(record["preset"]) for record in records)
     for record in records:
         print(f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}")
-    print(f"your own are in {folder}")
+    print(f"Your presets are in {folder}")
 
 
 def user_presets_folder() -> Path:

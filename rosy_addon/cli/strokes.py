@@ -35,7 +35,7 @@ SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
     parser = add_subcommand(subparsers, "strokes", run_strokes)
-    parser.description += " For a .blend file, options that are not given are as in the scene."
+    parser.description += " For a .blend file, the defaults are the settings of the scene."
     add_mesh_options(parser, allow_scene=True)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
     add_view_options(parser, None)
@@ -60,10 +60,10 @@ def add_strokes_command(subparsers: Any) -> None:
 def run_strokes(options: argparse.Namespace) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file."""
     if options.output.suffix.lower() != ".svg":
-        raise RosyError(f"{options.output}: strokes are written to .svg files")
+        raise RosyError(f"{options.output}: the name of the file must end in .svg")
     check_writable(options.output)
     if options.mesh is None and "bpy" not in sys.modules:
-        raise RosyError("there is nothing to draw: give a mesh file, or SCENE.blend")
+        raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
         _reject_options(options, MESH_ONLY_DEFAULTS, "mesh files")
         _draw_scene_strokes(options)
@@ -150,4 +150,6 @@ def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_
     for name, default in defaults.items():
         if getattr(options, name) != default:
             option = "FIELD" if name == "field" else "--" + name.replace("_", "-")
-            raise RosyError(f"{options.mesh or 'the open file'}: {option} is for {file_kind}")
+            raise RosyError(
+                f"{options.mesh or 'the open file'}: {option} applies only to {file_kind}"
+            )

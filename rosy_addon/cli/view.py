@@ -22,12 +22,13 @@ def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | No
         type=float_tuple(2, "AZ,EL"),
         default=DEFAULT_VIEW,
         metavar="AZ,EL",
-        help="view angles in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from above",
+        help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
+        "above",
     )
     parser.add_argument(
         "--up",
         choices=list(UP_AXIS_MATRIX),
-        help="the axis of the file that points up; by default y for .obj and .off, otherwise z",
+        help="upward axis of the file; by default y for .obj and .off, otherwise z",
     )
     parser.add_argument(
         "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"

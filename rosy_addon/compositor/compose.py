@@ -77,7 +77,7 @@ def compose_task(
     camera = gbuffer.camera
     look = look_in_pixels(look, camera, gbuffer.instances)
     pixel_look = supersampled_look(look)
-    colour = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
+    color = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache)
@@ -95,16 +95,16 @@ def compose_task(
             modulation = yield from subtask(
                 _line_modulation_task(stages, field, pixel_look, tone), stop, stop
             )
-            colour[index], alpha[index] = render_hatching(
+            color[index], alpha[index] = render_hatching(
                 field, images, pixel_look, tone, modulation
             )
         else:
-            colour[index] = _colorize(field, layer, pixel_look)
+            color[index] = _colorize(field, layer, pixel_look)
         layers.append(layer)
     if not is_hatched(look):
-        colour *= tone_rgb
+        color *= tone_rgb
     rgba = _resolve_pixels(
-        gbuffer.pixel, colour, alpha, camera.width, camera.height, look.supersampling
+        gbuffer.pixel, color, alpha, camera.width, camera.height, look.supersampling
     )
     return Picture(rgba, tuple(layers))
 
@@ -151,10 +151,10 @@ def compose_planar(
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = replace(look, supersampling=1)
     layer = _build_layer(field, look, run_to_completion(lic_task(field, look, noise)))
-    colour = _colorize(field, layer, look)
+    color = _colorize(field, layer, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
     return Picture(
-        _resolve_pixels(field.pixel, colour, opaque, field.width, field.height, 1), (layer,)
+        _resolve_pixels(field.pixel, color, opaque, field.width, field.height, 1), (layer,)
     )
 
 
@@ -224,7 +224,7 @@ def _colorize(field: PixelField, layer: DegreeLayer, look: Look) -> np.ndarray:
 
 def _resolve_pixels(
     pixel: np.ndarray,
-    colour: np.ndarray,
+    color: np.ndarray,
     alpha: np.ndarray,
     width: int,
     height: int,
@@ -236,7 +236,7 @@ def _resolve_pixels(
     ----------
     pixel : (P,) int32 ndarray
         Flat indices into the supersampled frame.
-    colour : (P, 3) or (P, 1) float32 ndarray
+    color : (P, 3) or (P, 1) float32 ndarray
         Linear, not premultiplied.
     alpha : (P,) float32 ndarray
     width, height : int
@@ -251,7 +251,7 @@ def _resolve_pixels(
     """
     pixel_rgba = np.empty((len(pixel), 4), dtype=np.float32)
     # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
-    pixel_rgba[:, :3] = colour if supersampling == 1 else colour * alpha[:, None]
+    pixel_rgba[:, :3] = color if supersampling == 1 else color * alpha[:, None]
     pixel_rgba[:, 3] = alpha
     if len(pixel) == height * width:
         rgba = pixel_rgba

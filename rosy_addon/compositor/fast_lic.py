@@ -295,7 +295,7 @@ def _cover_all_lines_task(
         for batch_seeds in _batches(seeds, batch_size):
             averages.write(batch.trace(batch_seeds))
             covered_steps += batch.covered_steps
-            yield Progress(1 - len(missing) / total, "Following streamlines")
+            yield Progress(1 - len(missing) / total, "tracing streamlines")
         missing = averages.missing_lines()
         if len(missing) <= MAX_UNCOVERED_FRACTION * total:
             break
@@ -313,7 +313,7 @@ def _cover_all_lines_task(
     batch = StreamlineBatch(covering, look, step_limit, 0, batch_size)
     for batch_seeds in _batches(missing, batch_size):
         averages.write(batch.trace(batch_seeds))
-        yield Progress(0.95, "Following streamlines")
+        yield Progress(0.95, "tracing streamlines")
 
 
 def _batch_size(half_length: int) -> int:

@@ -90,7 +90,7 @@ def render_hatching(
 
     Returns
     -------
-    colour : (P, 3) float32 ndarray
+    color : (P, 3) float32 ndarray
         Linear color of ink and paper, or of the ink alone if `look.clear_paper`.
     alpha : (P,) float32 ndarray
         1, or the coverage by ink if `look.clear_paper`.
@@ -158,10 +158,10 @@ def _render_many_inks(
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
         transmitted *= 1 - modulation.outline[:, None] * (1 - inks.transmittance(ink))
         bare_paper *= 1 - modulation.outline
-    colour = inks.complement_if_light(inks.complement_if_light(inks.paper) * transmitted)
+    color = inks.complement_if_light(inks.complement_if_light(inks.paper) * transmitted)
     coverage = 1 - bare_paper
-    # colour = paper + coverage * (ink - paper), solved for the ink.
-    ink = inks.paper + (colour - inks.paper) / np.maximum(coverage, MIN_COVERAGE)[:, None]
+    # color = paper + coverage * (ink - paper), solved for the ink.
+    ink = inks.paper + (color - inks.paper) / np.maximum(coverage, MIN_COVERAGE)[:, None]
     return np.clip(ink, 0, 1), coverage
 
 

@@ -97,7 +97,7 @@ def convolve_members_task(
             members[member, block] = normalize_variance(mean, weights.effective_samples, look)
             effective_samples[block] += weights.effective_samples
             fraction = (member + block.stop / count) / len(tracers)
-            yield Progress(fraction, "Following streamlines")
+            yield Progress(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
     return LicImages(
         members, members.mean(axis=0), effective_samples, np.ones(count, dtype=np.float32)

@@ -96,7 +96,7 @@ class Look:
         "smooth",
         "How face values become pixel values",
         {
-            "smooth": "Average them at the corners and interpolate",
+            "smooth": "Average the face values at the corners and interpolate",
             "flat": "Use the value of the face",
         },
         panel="quality",
@@ -173,7 +173,7 @@ class Look:
     )
     anchor: str = choice(
         "picture",
-        "What the noise, and so the streaks, stay attached to when something moves",
+        "What the noise stays attached to when something moves",
         {
             "picture": "The picture: for still pictures, as in the paper",
             "surface": "The surface: streaks move and bend with it and keep their width, for "
@@ -396,7 +396,7 @@ class Look:
         0.0,
         0.0,
         256.0,
-        "Maximum distance in pixels by which lines continue past tone borders, getting thinner",
+        "Maximum distance in pixels by which lines continue past the borders of tones, getting thinner",
         is_pixel_length=True,
         **_ink(),
     )

@@ -115,7 +115,7 @@ def integrate_noise(
         Number of these samples.
     """
     end = len(field.pixel)
-    neighbours = field.neighbors.reshape(-1)
+    neighbors = field.neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
@@ -137,7 +137,7 @@ def integrate_noise(
         pixel_step = np.clip(np.rint(offset), -1, 1)
         offset -= pixel_step
         neighbor_offset = pixel_step[:, 0] + 3 * pixel_step[:, 1]
-        entry = neighbours.take((neighbor_offset.astype(np.intp) + 4) * (end + 1) + entry)
+        entry = neighbors.take((neighbor_offset.astype(np.intp) + 4) * (end + 1) + entry)
         if step_limit is not None:
             entry[step_limit < step_index] = end
         active = entry != end

@@ -52,8 +52,8 @@ class ReferenceRender:
         ratio = width / height * self.camera.height / self.camera.width
         if not 1 - ASPECT_TOLERANCE <= ratio <= 1 + ASPECT_TOLERANCE:
             raise RosyError(
-                f"{self.name}: is {width} x {height} pixels, which is not the shape of the frame of "
-                f"camera '{self.camera.name}', {self.camera.width} x {self.camera.height}"
+                f"{self.name}: has {width} x {height} pixels, but camera '{self.camera.name}' has "
+                f"{self.camera.width} x {self.camera.height}: the aspect ratios must be equal"
             )
 
     @cached_property
@@ -144,12 +144,9 @@ def check_tone(look: Look, body_tones: Sequence[object], reference: ReferenceRen
         "image" and no mesh instance has a tone.
     """
     if look.tone == "picture" and reference is None:
-        raise RosyError("the tone is to come from a picture, but none is given")
+        raise RosyError("tone 'picture' needs a picture, but none is given")
     if look.tone in ("attribute", "image") and all(tone is None for tone in body_tones):
-        source_name = {"attribute": "such an attribute", "image": "an image"}[look.tone]
-        raise RosyError(
-            f"the tone is to come from the {look.tone}, but no object has {source_name}"
-        )
+        raise RosyError(f"tone '{look.tone}' needs an {look.tone}, but no object has one")
 
 
 def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:

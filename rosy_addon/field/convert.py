@@ -103,7 +103,7 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
         return RosyField(degree, field.vectors)
     if field.degree % degree:
         raise RosyError(
-            f"{surface.name}: degree {degree} is neither a multiple nor a divisor of {field.degree}"
+            f"{surface.name}: cannot convert degree {field.degree} to {degree}, which is neither a multiple nor a divisor"
         )
     return RosyField(degree, comb_members(surface, field, field.degree // degree))
 
@@ -206,7 +206,7 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
     """
     _check_rosy(surface, field)
     if not time > 0 or not np.isfinite(time):
-        raise RosyError(f"{surface.name}: a diffusion time is above 0, not {time}")
+        raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
@@ -254,4 +254,6 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
 def _check_rosy(surface: Surface, field: RosyField) -> None:
     """Raise an error if the directions of a field are not a RoSy."""
     if field.direction_ratios is not None:
-        raise RosyError(f"{surface.name}: the directions of its field are no RoSy")
+        raise RosyError(
+            f"{surface.name}: only RoSy fields can be converted, but the directions of this field are not a RoSy"
+        )

@@ -106,14 +106,16 @@ def load_field(
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
     if path.suffix.lower() in SINGULARITY_SUFFIXES:
-        raise RosyError(f"{path}: holds singularities, and no directions")
+        raise RosyError(f"{path}: contains singularities, not directions: choose a field file")
     if reader is None:
         raise RosyError(
-            f"{path}: fields are read from {_join_names(READ_SUFFIXES)}, not from '{path.suffix}' files"
+            f"{path}: is not a field file: its name must end in {_join_names(READ_SUFFIXES)}"
         )
     raw = reader(path)
     if degree is not None and raw.degree is not None and raw.degree != degree:
-        raise RosyError(f"{path}: holds a field of degree {raw.degree}, not {degree}")
+        raise RosyError(
+            f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
+        )
     source_surface = _source_surface(path, raw, surface, mesh)
     if source_surface is None:
         return LoadedField(_field_from_raw(raw, surface, degree, str(path), nonfinite), "")
@@ -125,8 +127,9 @@ def load_field(
     )
     return LoadedField(
         field,
-        f"{path.name}: its {source_surface.face_count:,} faces are not the {surface.face_count:,} of the mesh; "
-        f"the field followed by position, from {Path(source_surface.name).name}",
+        f"{path.name}: the field has {source_surface.face_count:,} faces, but the mesh has "
+        f"{surface.face_count:,}; the field was transferred by position from "
+        f"{Path(source_surface.name).name}",
     )
 
 
@@ -138,9 +141,11 @@ def _field_from_raw(
     values = raw.values
     if raw.tensors:
         if not has_finite_square(values).all():
-            raise RosyError(f"{source}: holds tensors that are not finite")
+            raise RosyError(f"{source}: contains tensors that are not finite")
         if len(values) != surface.face_count:
-            raise RosyError(f"{source}: holds tensors on vertices; they are read on faces alone")
+            raise RosyError(
+                f"{source}: contains tensors on vertices; only tensors on faces are supported"
+            )
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE
@@ -159,11 +164,11 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
     )
     if raw.header_count not in (None, row_count) and not vertices_over_faces:
         raise RosyError(
-            f"{source}: says {raw.header_count} rows of {raw.columns} numbers, but holds {row_count}"
+            f"{source}: declares {raw.header_count} rows of {raw.columns} numbers, but contains {row_count}"
         )
     if raw.domain is None and infer_domain(surface, row_count) is None:
         raise RosyError(
-            f"{source}: holds {row_count} rows, but the mesh {surface.name} has "
+            f"{source}: contains {row_count} rows, but the mesh {surface.name} has "
             f"{surface.face_count} faces and {len(surface.vertices)} vertices"
         )
 
@@ -217,12 +222,12 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     suffix = path.suffix.lower()
     if suffix not in WRITE_SUFFIXES:
         raise RosyError(
-            f"{path}: fields are written to {_join_names(WRITE_SUFFIXES)}, not to '{path.suffix}' files"
+            f"{path}: cannot be written as a field: its name must end in {_join_names(WRITE_SUFFIXES)}"
         )
     if suffix in (".rosy", ".obj") and field.direction_ratios is not None:
         raise RosyError(
-            f"{path}: a {suffix} file has room for one member a row, but the directions of this "
-            "field are no RoSy: write a .rawfield, .txt or .npy file"
+            f"{path}: a {suffix} file stores one member per row, but the directions of this field "
+            "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     if suffix == ".rosy":
         data = rosy_text(field)
@@ -244,5 +249,5 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
 
 
 def _join_names(names: tuple[str, ...]) -> str:
-    """Join names as in "a, b and c"."""
-    return f"{', '.join(names[:-1])} and {names[-1]}"
+    """Join names as in "a, b or c"."""
+    return f"{', '.join(names[:-1])} or {names[-1]}"

@@ -31,19 +31,19 @@ from .surface import Surface, build_surface, sum_per_face
 
 #: Kinds of generated fields, with the descriptions shown in the interface.
 GENERATORS = {
-    "smoothest": "As smooth as can be, with as few singularities as the shape allows",
+    "smoothest": "The smoothest field, with few singularities",
     "curvature": "Along the principal directions of curvature (even degrees)",
     "features": "Along borders and sharp edges, and smooth between them",
-    "guided": "Along what you give: strokes, edges, a UV map, vectors, empties; smooth between",
+    "guided": "Along guides (strokes, edges, a UV map, vectors or empties), and smooth between them",
     "axis": "Along a direction, projected to the surface",
     "uv": "Along the axes of a UV map",
 }
 
 #: Kinds of magnitudes of a field, with the descriptions shown in the interface.
 MAGNITUDES = {
-    "unit": "1 everywhere",
-    "confidence": "How clear the direction of curvature is, from 0 to 1",
-    "curvature": "How much the surface bends where it bends most, by the size of the mesh",
+    "unit": "1 on all faces",
+    "confidence": "How well the principal directions are defined, from 0 to 1",
+    "curvature": "The larger principal curvature, multiplied by the size of the mesh",
 }
 
 #: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
@@ -122,7 +122,7 @@ def generate_task(
         If the kind is unknown, or cannot make a field of this degree on this surface.
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
-    yield Progress(0.0, "making a field")
+    yield Progress(0.0, "generating the field")
     if settings.kind == "smoothest":
         return (yield from smoothest_task(surface, degree))
     if settings.kind == "axis":
@@ -141,9 +141,9 @@ def generate_task(
         return (yield from _guides_task(surface, settings, degree))
     if settings.kind == "uv":
         if settings.uv is None:
-            raise RosyError(f"{surface.name}: it has no UV map to follow")
+            raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")
         return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
-    raise RosyError(f"no generator is named '{settings.kind}'; there are {', '.join(GENERATORS)}")
+    raise RosyError(f"unknown generator '{settings.kind}': choose {', '.join(GENERATORS)}")
 
 
 def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
@@ -153,12 +153,14 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
     if ends is None:
         ends = feature_edges(surface, settings.sharp_angle)
     if not len(ends):
-        raise RosyError(f"{surface.name}: there is no border or sharp edge to follow")
+        raise RosyError(
+            f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
+        )
     guides = guides_from_edges(surface, ends, degree)
     if not guides.any():
         raise RosyError(
-            f"{surface.name}: the edges of each face contradict each other in a field of degree "
-            f"{degree}"
+            f"{surface.name}: on each face, the edges cancel each other in a field of degree "
+            f"{degree}: choose another degree"
         )
     return (yield from _guided_or_smoothest_task(surface, degree, guides))
 
@@ -201,7 +203,9 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
     if settings.vectors is not None:
         guide_sets.append(normalize(settings.vectors))
     if not guide_sets:
-        raise RosyError(f"{surface.name}: there is nothing to follow")
+        raise RosyError(
+            f"{surface.name}: no guides are given: give strokes, edges, a UV map, vectors or axes"
+        )
     faces = np.tile(np.arange(surface.face_count), len(guide_sets))
     guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
     weight = (
@@ -233,7 +237,9 @@ def axis_field(
     direction = np.asarray(axis, dtype=np.float64).reshape(-1)
     length = np.linalg.norm(direction)
     if direction.shape != (3,) or not np.isfinite(length) or length == 0:
-        raise RosyError(f"axis {tuple(axis)} is not a direction")
+        raise RosyError(
+            f"axis {tuple(axis)} is not a direction: give three finite numbers that are not all zero"
+        )
     direction = direction / length
     normal = surface.face_normal
     vectors = direction - (normal @ direction)[:, None] * normal
@@ -261,7 +267,7 @@ def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
     if kind == "confidence":
         return curvature_field(surface, 4).magnitude
     if kind != "curvature":
-        raise RosyError(f"no magnitude is named '{kind}'; there are {', '.join(MAGNITUDES)}")
+        raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
     smooth_surface = _with_smooth_normals(surface)
     mean, deviator = _face_curvature(smooth_surface, *face_frames(smooth_surface))
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
@@ -313,8 +319,8 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     """
     degree = check_degree(degree)
     if degree % 2:
-        raise RosyError(f"a curvature field has an even degree, not {degree}")
-    label = "finding the directions of curvature"
+        raise RosyError(f"a curvature field needs an even degree, not {degree}")
+    label = "computing principal directions"
     yield Progress(0.0, label)
     smooth_surface = _with_smooth_normals(surface)
     yield Progress(0.3, label)

@@ -50,7 +50,7 @@ def guided_task(
     degree : int
     guides : (F, 3) ndarray
         One member vector for each face, in object space; zero where there is no guide. Lengths
-        matter: a guide of length 1/2 asks for a field of magnitude 1/2.
+        matter: a guide of length 1/2 requests a field of magnitude 1/2.
     weight : (F,) ndarray or float
         Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
         falls off over a distance of about 1 / sqrt(w).
@@ -73,15 +73,15 @@ def guided_task(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    yield Progress(0.0, "connecting the vertices")
+    yield Progress(0.0, "building the connection Laplacian")
     x, y = face_frames(surface)
     target = to_representation(np.asarray(guides, dtype=np.float64), x, y, degree)
     hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
     if not target.any():
-        raise RosyError(f"{surface.name}: there is no guide on any face with an area")
+        raise RosyError(f"{surface.name}: no guide lies on a face with area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
     connection = build_connection(surface)
-    yield Progress(0.04, "carrying the guides to the vertices")
+    yield Progress(0.04, "averaging the guides at the vertices")
     frame_angle = corner_frame_angles(surface, connection, x, y)
     to_node = np.exp(-1j * degree * frame_angle)
     corner_face = np.repeat(surface.triangle_face, 3)
@@ -95,16 +95,16 @@ def guided_task(
     fixed = np.abs(fixed_z) > 1e-6 * max_modulus
     fixed_z[~fixed] = 0
     fixed_z[fixed] /= np.abs(fixed_z[fixed])
-    yield Progress(0.06, "connecting the vertices")
+    yield Progress(0.06, "building the connection Laplacian")
     z = fixed_z.copy()
     free = np.flatnonzero(~fixed)
     if len(free):
         matrix = laplacian(connection, degree)
-        yield Progress(0.08, "connecting the vertices")
+        yield Progress(0.08, "building the connection Laplacian")
         matrix, fixed_terms = _eliminate_fixed(matrix, penalty, fixed, fixed_z)
         solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free])
         z[free] = yield from subtask(solver, 0.1, 0.95)
-    yield Progress(0.95, "carrying the field to the faces")
+    yield Progress(0.95, "averaging the field on the faces")
     face_z = node_sum_per_face(surface, connection, z, frame_angle, degree)
     modulus = np.abs(face_z)
     defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
@@ -164,7 +164,7 @@ def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarr
     tolerance = RELATIVE_TOLERANCE * np.sqrt(_real_inner_product(rhs, rhs))
     direction, previous = None, 1.0
     for iteration in range(MAX_ITERATIONS):
-        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), "smoothing between the guides")
+        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), "interpolating between the guides")
         if np.sqrt(_real_inner_product(residual, residual)) <= tolerance:
             break
         preconditioned = w_cycle(levels, residual)

@@ -115,7 +115,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
         is_close = distance <= MAX_STROKE_DISTANCE * surface.extent
         face, direction = surface.triangle_face[triangle[is_close]], direction[is_close]
     if not len(sample) or not len(face):
-        raise RosyError(f"{surface.name}: no stroke comes near it")
+        raise RosyError(f"{surface.name}: no stroke is near the surface")
     return average_guides(surface, face, direction, degree)
 
 

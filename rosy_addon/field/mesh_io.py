@@ -59,7 +59,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        suffixes = ", ".join(READERS)
-        raise RosyError(f"{path}: meshes are read from {suffixes}, not from '{path.suffix}' files")
+        *suffixes, last = READERS
+        raise RosyError(
+            f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
+        )
     polygons = reader(path)
     return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)

@@ -69,13 +69,15 @@ class RosyField:
         object.__setattr__(self, "degree", check_degree(self.degree))
         vectors = np.ascontiguousarray(self.vectors, dtype=np.float64)
         if vectors.ndim != 2 or vectors.shape[1] != 3:
-            raise RosyError(f"a field holds one vector a face, (F, 3), not {vectors.shape}")
+            raise RosyError(f"a field needs one vector per face, (F, 3), not {vectors.shape}")
         object.__setattr__(self, "vectors", vectors)
         if self.direction_ratios is None:
             return
         direction_ratios = np.ascontiguousarray(self.direction_ratios, dtype=np.complex128)
         if direction_ratios.shape != (len(vectors), self.degree):
-            raise RosyError(f"deviations are (F, N) numbers, not {direction_ratios.shape}")
+            raise RosyError(
+                f"direction ratios must have the shape (F, N), not {direction_ratios.shape}"
+            )
         object.__setattr__(self, "direction_ratios", direction_ratios)
 
     @property

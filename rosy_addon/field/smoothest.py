@@ -68,13 +68,13 @@ def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    yield Progress(0.0, "connecting the vertices")
+    yield Progress(0.0, "building the connection Laplacian")
     connection = build_connection(surface)
     if not connection.mass.any():
-        raise RosyError(f"{surface.name}: no face has an area, so there is no room for a field")
+        raise RosyError(f"{surface.name}: no face has an area")
     z, _ = yield from subtask(smallest_eigenvectors_task(connection, degree), 0.1, 0.95)
     z = _align_to_edges(connection, z, degree)
-    yield Progress(0.95, "carrying the field to the faces")
+    yield Progress(0.95, "averaging the field on the faces")
     return RosyField(degree, face_vectors_from_nodes(surface, connection, z, degree))
 
 
@@ -186,7 +186,7 @@ def _lobpcg_task(
     energy = _component_sums(component, z.conj() * image, component_count).real
     for iteration in range(max_iterations):
         # 20 to 50 iterations are usual; the progress bar is scaled for that.
-        yield Progress(1 - 0.95**iteration, "finding the smoothest field")
+        yield Progress(1 - 0.95**iteration, "solving for the smoothest field")
         residual = image - broadcast(energy) * (mass * z)
         direction = w_cycle(levels, residual)
         direction -= (

@@ -205,7 +205,7 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
     levels = []
     unknown_count = len(matrix)
     while True:
-        yield Progress(1 - len(matrix) / (unknown_count + 1), "building levels")
+        yield Progress(1 - len(matrix) / (unknown_count + 1), "building multigrid levels")
         jacobi_weight = _jacobi_weights(matrix)
         aggregation = _build_aggregates(matrix) if len(matrix) > DIRECT_SOLVE_SIZE else None
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
@@ -214,7 +214,7 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
             return levels
         prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
-        yield Progress(1 - len(matrix) / (unknown_count + 1), "building levels")
+        yield Progress(1 - len(matrix) / (unknown_count + 1), "building multigrid levels")
         matrix = matrix_product(prolongation.adjoint, matrix_product(matrix, prolongation))
 
 

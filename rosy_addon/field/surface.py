@@ -344,8 +344,8 @@ def orientation_warning(surface: Surface) -> str:
     if not count:
         return ""
     return (
-        f"{surface.name}: along {count} edges faces disagree on which side is out, and the field is "
-        "cut there: recalculate the normals, unless it is a Möbius strip, which has but one side"
+        f"{surface.name}: the faces at {count} edges are oriented inconsistently, so the field is cut "
+        "there: recalculate the normals (not possible for one-sided surfaces such as a Möbius strip)"
     )
 
 
@@ -359,7 +359,7 @@ def _check_polygons(
     if corner_counts.min() < 3:
         face = int(np.argmin(corner_counts))
         raise RosyError(
-            f"{name}: face {face} has {corner_counts[face]} corners, at least 3 are wanted"
+            f"{name}: face {face} has {corner_counts[face]} corners, expected 3 or more"
         )
     if corner_vertex.min() < 0 or corner_vertex.max() >= len(vertices):
         raise RosyError(f"{name}: a face refers to a vertex that does not exist")

@@ -57,8 +57,9 @@ def transfer_field(
     unmatched = is_far & normal.any(axis=1)
     if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(is_far):
         raise RosyError(
-            f"{field_name}: {unmatched.sum()} of {len(is_far)} faces of {target.name} are away from "
-            f"{source.name} by up to {distance.max():.3g}: it is another shape, or in another place"
+            f"{field_name}: {unmatched.sum()} of {len(is_far)} faces of {target.name} do not lie on "
+            f"{source.name} (distances up to {distance.max():.3g}): the two meshes must have the same "
+            "shape and position"
         )
     vectors = field.vectors[face]
     length = np.sqrt(dot(vectors, vectors))[:, None]

@@ -95,7 +95,7 @@ def validated_field(
     domain = infer_domain(surface, len(vectors)) if domain is None else domain
     if len(vectors) != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
-            f"{source}: holds {len(vectors)} vectors, "
+            f"{source}: contains {len(vectors)} vectors, "
             f"but the mesh {surface.name} has {faces} faces and {vertices} vertices"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
@@ -277,9 +277,9 @@ def project_to_tangent(
     if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(length):
         worst = int(np.argmax(angle))
         raise RosyError(
-            f"{source}: {outlier.sum()} of {len(vectors)} vectors are more than {tolerance_deg:g} degrees "
-            f"off the surface, worst on {domain} {worst} by {angle[worst]:.1f} degrees; "
-            "is it the field of another mesh, or in another space?"
+            f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
+            f"are more than {tolerance_deg:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
+            "degrees. Does the field belong to another mesh, or was a transform applied?"
         )
     # The projection of a vector parallel to the normal is only rounding error.
     tangent = np.where(
@@ -314,7 +314,7 @@ def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfini
         kind = "vectors" if values.ndim > 1 else "angles"
         raise RosyError(
             f"{source}: {unusable.sum()} of {len(values)} {kind} are not finite, the first on "
-            f"{domain} {int(np.argmax(unusable))}; ask for them to be undefined, or mend them"
+            f"{domain} {int(np.argmax(unusable))}: correct them, or choose to treat them as undefined"
         )
     values[unusable] = 0.0
 

@@ -104,8 +104,8 @@ class BlenderDevice:
 
         if not _is_usable(gpu):
             raise DeviceError(
-                "Blender has no graphics context here: it has one with a window, and from 5.1 on "
-                "without"
+                "Blender has no graphics context here: start it with a window, or use Blender 5.2 or "
+                "later"
             )
         self._gpu = gpu
         self._shaders: dict[str, Any] = {}
@@ -251,7 +251,7 @@ class BlenderDevice:
                 )
             except Exception as error:
                 raise DeviceError(
-                    f"the graphics driver does not take the shader '{shader.name}': {error}"
+                    f"the graphics driver cannot compile the shader '{shader.name}': {error}"
                 ) from error
         return self._shaders[shader.name]
 

@@ -1,4 +1,4 @@
-"""What fields of one degree have in common in shaders: `FieldKind`."""
+"""`FieldKind`: the shader constants that all fields of one degree share."""
 
 from __future__ import annotations
 

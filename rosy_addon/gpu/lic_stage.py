@@ -57,7 +57,7 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
         frame.run(passes.LIC, band, textures, {"picture": picture}, uniforms)
-        yield Progress((start + band_rows - bottom) / (top - bottom), "following streamlines")
+        yield Progress((start + band_rows - bottom) / (top - bottom), "tracing streamlines")
 
 
 def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -> dict[str, Any]:

@@ -135,8 +135,8 @@ def build_mesh_buffers(
     """
     if field is not None and len(surface.triangles) > MAX_TRIANGLES:
         raise RosyError(
-            f"{surface.name}: {len(surface.triangles)} triangles are more than the "
-            f"{MAX_TRIANGLES} that are drawn on a graphics card"
+            f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
+            f"most {MAX_TRIANGLES}: choose the processor"
         )
     points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     used = np.zeros(points.shape[1], dtype=bool)

@@ -1,4 +1,4 @@
-"""The shaders, with what each of them reads and writes.
+"""The shader passes, with the inputs, outputs and uniforms of each.
 
 The sources are GLSL files in the folder `glsl`, without declarations. Each device generates the
 declarations in its own form from the lists here.

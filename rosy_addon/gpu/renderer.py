@@ -100,10 +100,11 @@ class GpuRenderer:
         camera = view.sample_camera
         if max(camera.width, camera.height) > self.device.max_texture_size:
             raise RosyError(
-                f"a picture of {camera.width} x {camera.height} pixels, subpixels counted, is too "
-                f"large for this graphics card, which draws up to {self.device.max_texture_size}"
+                f"a frame of {camera.width} x {camera.height} pixels, including supersampling, is "
+                f"too large for this graphics card (at most {self.device.max_texture_size}): choose "
+                "a smaller size, or the processor"
             )
-        yield Progress(0.0, "finding what is seen")
+        yield Progress(0.0, "finding visible pixels")
         look = look_in_pixels(view.look, camera, [item.instance for item in items])
         clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
         frame = Frame(self.resources, items, camera, look, view.lights, view.reference, clip_planes)

@@ -262,7 +262,7 @@ class GpuResources:
             if len(buffers.triangle_records) > self.device.max_texture_size:
                 raise RosyError(
                     f"{surface.name}: {len(surface.triangles)} triangles are too many for this "
-                    "graphics card"
+                    "graphics card: choose the processor"
                 )
             records_texture = self._texture_of(buffers.triangle_records)
         tone_atlas = None

@@ -1,4 +1,4 @@
-"""Boxes of pixels: where on screen a mesh can be visible."""
+"""Bounding boxes of meshes on the screen, in pixels."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ from .renderer import GpuRenderer
 
 #: What draws pictures: the names, and what a user reads of them.
 RENDER_DEVICES = {
-    "cpu": ("Processor", "The same pixels on every machine"),
-    "gpu": ("Graphics Card", "Faster; single pixels differ from card to card"),
-    "auto": ("Automatic", "The graphics card where there is one, or else the processor"),
+    "cpu": ("Processor", "Identical pixels on every machine"),
+    "gpu": ("Graphics Card", "Faster. Single pixels can differ between cards"),
+    "auto": ("Automatic", "The graphics card if there is one, otherwise the processor"),
 }
 
 
@@ -45,8 +45,8 @@ def select_renderer(
     try:
         if look.method == "members":
             raise DeviceError(
-                "the graphics card follows each streamline from member to member; it does not draw "
-                "the method 'members'"
+                "the graphics card cannot draw the method 'members': choose another method, or the "
+                "processor"
             )
         return GpuRenderer(blender_device())
     except DeviceError:

@@ -104,8 +104,8 @@ def lzw_compress(data: bytes) -> bytes:
 def _palette() -> np.ndarray:
     """(256, 3) display values: all combinations of the levels, then black for unused entries."""
     red, green, blue = (np.linspace(0, 255, count) for count in PALETTE_LEVELS)
-    colours = np.stack(np.meshgrid(red, green, blue, indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.rint(np.concatenate([colours, np.zeros((256 - len(colours), 3))]))
+    colors = np.stack(np.meshgrid(red, green, blue, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.rint(np.concatenate([colors, np.zeros((256 - len(colors), 3))]))
 
 
 def _dither(frame: np.ndarray) -> np.ndarray:

@@ -87,7 +87,7 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         per channel.
     """
     chunks = _read_chunks(path, read_bytes(path))
-    invalid_file = RosyError(f"{path}: is broken, or no .png file as it should be")
+    invalid_file = RosyError(f"{path}: is damaged, or not a valid .png file")
     try:
         width, height, bits, color_type, _, _, interlaced = struct.unpack(
             ">IIBBBBB", chunks[b"IHDR"]
@@ -96,7 +96,7 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         raise invalid_file from None
     if bits not in (8, 16) or color_type not in _CHANNELS_BY_COLOR_TYPE or interlaced:
         raise RosyError(
-            f"{path}: only pictures of 8 or 16 bits a channel that are not interlaced are read"
+            f"{path}: only .png files with 8 or 16 bits per channel, not interlaced, are supported"
         )
     bytes_per_sample = bits // 8
     bytes_per_pixel = _CHANNELS_BY_COLOR_TYPE[color_type] * bytes_per_sample
@@ -174,9 +174,9 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
 
 def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray:
     """(H, W, 4) uint8 colors of (H, W, 1) palette indices."""
-    colours = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
-    palette = np.full((len(colours), 4), 255, dtype=np.uint8)
-    palette[:, :3] = colours
+    colors = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
+    palette = np.full((len(colors), 4), 255, dtype=np.uint8)
+    palette[:, :3] = colors
     alpha = np.frombuffer(chunks.get(b"tRNS", b""), dtype=np.uint8)
     palette[: len(alpha), 3] = alpha
     return palette[values[..., 0]]

@@ -128,7 +128,7 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
         with suppress(RosyError):
             if preset_key(read_preset(path).name) == preset_key(str(preset)):
                 return path
-    raise RosyError(f"no preset is named '{preset}'; there are {', '.join(files)}")
+    raise RosyError(f"there is no preset '{preset}': choose {', '.join(files)}")
 
 
 def load_preset(preset: str | Path, user_folder: Path | None = None) -> Preset:
@@ -155,15 +155,15 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     try:
         name, description, look = (data.pop(key) for key in ("name", "description", "look"))
     except KeyError as missing:
-        raise RosyError(f"{path}: a preset needs a {missing}") from None
+        raise RosyError(f"{path}: the preset has no {missing}") from None
     if data:
-        raise RosyError(f"{path}: a preset has no {_short_repr(next(iter(data)))}")
+        raise RosyError(f"{path}: unknown entry {_short_repr(next(iter(data)))}")
     if not isinstance(look, dict):
-        raise RosyError(f"{path}: 'look' is not an object of settings")
+        raise RosyError(f"{path}: 'look' must be a JSON object of settings")
     unknown = sorted(set(look) - set(settings_of(Look)))
     if unknown:
         raise RosyError(
-            f"{path}: a look has no setting {_short_repr(unknown[0])}: it is misspelt, or of a newer RoSy"
+            f"{path}: unknown setting {_short_repr(unknown[0])}: check its spelling, or update RoSy"
         )
     try:
         return _validated(Preset(name, description, Look().with_settings(look)))
@@ -210,7 +210,7 @@ def preset_key(name: str) -> str:
     normalized = unicodedata.normalize("NFC", name).lower()
     words = "".join(sign if sign.isalnum() else " " for sign in normalized).split()
     if not words:
-        raise RosyError(f"preset {_short_repr(name)}: a name needs a letter or a digit")
+        raise RosyError(f"preset {_short_repr(name)}: the name needs a letter or a digit")
     key = "-".join(words)
     return f"{key}-preset" if key in WINDOWS_DEVICE_NAMES else key
 
@@ -299,14 +299,14 @@ def _validated(preset: Preset) -> Preset:
     for attribute, max_length in limits:
         text = getattr(preset, attribute)
         if not isinstance(text, str):
-            raise RosyError(f"the {attribute} of a preset is {_short_repr(text)}, not a text")
+            raise RosyError(f"the {attribute} of the preset must be text, not {_short_repr(text)}")
         if len(text) > max_length:
             raise RosyError(
-                f"the {attribute} of a preset has {len(text):,} characters, {max_length} at most"
+                f"the {attribute} of the preset has {len(text):,} characters, more than {max_length}"
             )
         if not text.isprintable():
             raise RosyError(
-                f"the {attribute} of a preset, {_short_repr(text)}, is not a line of text"
+                f"the {attribute} of the preset must be one line of text, not {_short_repr(text)}"
             )
     preset_key(preset.name)
     return preset
@@ -316,17 +316,17 @@ def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
     """Return the path to save a user's preset at. Raise RosyError if its name is taken."""
     key = preset_key(preset.name)
     if key in {*preset_keys(), *(preset_key(load_preset(name).name) for name in preset_keys())}:
-        raise RosyError(f"preset '{preset.name}' comes with RoSy: choose another name")
+        raise RosyError(f"'{preset.name}' is the name of a preset of RoSy: choose another name")
     path = user_folder / f"{key}.json"
     if path.exists() and not replace:
-        raise RosyError(f"there is a preset '{key}' already: replace it, or choose another name")
+        raise RosyError(f"preset '{key}' already exists: replace it, or choose another name")
     return path
 
 
 def _user_file(key: str, user_folder: Path) -> Path:
     path = preset_files(user_folder).get(key)
     if path is None or path.parent != user_folder:
-        raise RosyError(f"'{key}' is not a preset of your own")
+        raise RosyError(f"'{key}' is not one of your presets")
     return path
 
 
@@ -334,7 +334,7 @@ def _create_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
-        raise RosyError(f"{folder}: cannot be made: {str(reason.strerror).lower()}") from None
+        raise RosyError(f"{folder}: cannot be created: {str(reason.strerror).lower()}") from None
 
 
 def _delete_file(path: Path) -> None:
@@ -357,9 +357,9 @@ def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
     except RecursionError:
         raise RosyError(f"{path}: is nested too deeply") from None
     except ValueError:  # An integer has more digits than Python converts.
-        raise RosyError(f"{path}: holds a number that is too long") from None
+        raise RosyError(f"{path}: contains a number that is too long") from None
     if not isinstance(parsed, dict):
-        raise RosyError(f"{path}: a preset is an object, with braces")
+        raise RosyError(f"{path}: a preset must be a JSON object in braces")
     return parsed
 
 
@@ -368,7 +368,7 @@ def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(result) < len(pairs):
         names = [name for name, _ in pairs]
         duplicate = next(name for name in names if names.count(name) > 1)
-        raise RosyError(f"{_short_repr(duplicate)} is there twice")
+        raise RosyError(f"{_short_repr(duplicate)} appears twice")
     return result
 
 

@@ -64,7 +64,7 @@ def occlusion_task(
         If `direction_count` is less than 1.
     """
     if direction_count < 1:
-        raise RosyError(f"{direction_count} directions: light comes from 1 at least")
+        raise RosyError(f"{direction_count} directions of light: choose 1 or more")
     instance = instances[instance_id]
     receiver_points = world_bounds(instance)
     caster_points = np.concatenate([world_bounds(other) for other in instances])
@@ -72,7 +72,7 @@ def occlusion_task(
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
     for index, direction in enumerate(fibonacci_sphere(direction_count)):
-        yield Progress(index / direction_count, "looking from all sides")
+        yield Progress(index / direction_count, "sampling directions of light")
         cosine = normals @ direction
         facing_light = np.flatnonzero(cosine > 0)
         camera = sun_camera(direction, caster_points, receiver_points, resolution)

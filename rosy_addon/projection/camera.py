@@ -134,7 +134,9 @@ def _validated_matrix(matrix: np.ndarray, matrix_kind: str, name: str) -> np.nda
     """Return a float64 copy of a matrix, or raise `RosyError` if it is not 4 x 4 and finite."""
     matrix = np.array(matrix, dtype=np.float64)
     if matrix.shape != (4, 4):
-        raise RosyError(f"camera '{name}': its {matrix_kind} matrix is {matrix.shape}, not (4, 4)")
+        raise RosyError(
+            f"camera '{name}': its {matrix_kind} matrix must have the shape (4, 4), not {matrix.shape}"
+        )
     if not np.isfinite(matrix).all():
         raise RosyError(f"camera '{name}': its {matrix_kind} matrix is not finite")
     return matrix
@@ -145,10 +147,10 @@ def _validated_view(view: np.ndarray, name: str) -> np.ndarray:
     view = _validated_matrix(view, "view", name)
     rotation = view[:3, :3]
     if np.cross(rotation[0], rotation[1]) @ rotation[2] < 0:
-        raise RosyError(f"camera '{name}' is mirrored: one of its scales is negative")
+        raise RosyError(f"camera '{name}' is mirrored: make its scale positive")
     is_rigid = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3)
     if not is_rigid or not np.allclose(view[3], (0, 0, 0, 1), atol=1e-6):
-        raise RosyError(f"camera '{name}': its view matrix is not a rotation and a shift")
+        raise RosyError(f"camera '{name}': its view matrix must be a rotation and a translation")
     return view
 
 
@@ -163,7 +165,7 @@ def _validated_projection(projection: np.ndarray, name: str) -> np.ndarray:
     else:
         raise RosyError(f"camera '{name}' is neither perspective nor orthographic")
     if _xy_determinant(projection) <= 0:
-        raise RosyError(f"camera '{name}' is mirrored or flat: its projection turns pictures over")
+        raise RosyError(f"camera '{name}': its projection is mirrored or flat")
     return projection
 
 
@@ -236,7 +238,9 @@ def perspective_camera(
     width, height = check_size(width, height)
     if fov is not None:
         if not 0 < fov < np.pi:
-            raise RosyError(f"camera '{name}': an angle of view of {fov} is not between 0 and pi")
+            raise RosyError(
+                f"camera '{name}': the field of view must be between 0 and pi, not {fov}"
+            )
         tan_half_fov = np.tan(fov / 2)
     else:
         if not (focal > 0 and sensor > 0):
@@ -244,7 +248,7 @@ def perspective_camera(
         tan_half_fov = sensor / (2 * focal)
     near, far = clip
     if not 0 < near < far:
-        raise RosyError(f"camera '{name}': clip range {near} to {far} is not 0 < start < end")
+        raise RosyError(f"camera '{name}': the clip range {near} to {far} must be 0 < start < end")
     longer_side = max(width, height)
     projection = np.zeros((4, 4))
     projection[0, 0], projection[1, 1] = (
@@ -294,9 +298,9 @@ def orthographic_camera(
     width, height = check_size(width, height)
     near, far = clip
     if not scale > 0:
-        raise RosyError(f"camera '{name}': an orthographic scale of {scale} is not above 0")
+        raise RosyError(f"camera '{name}': the orthographic scale must be above 0, not {scale}")
     if not near < far:
-        raise RosyError(f"camera '{name}': clip range {near} to {far} is not start < end")
+        raise RosyError(f"camera '{name}': the clip range {near} to {far} must be start < end")
     longer_side = max(width, height)
     projection = np.eye(4)
     projection[0, 0], projection[1, 1] = (
@@ -332,9 +336,7 @@ def look_at(
     back = eye - target
     right = np.cross(up, back)
     if not np.linalg.norm(back) > 0 or not np.linalg.norm(right) > 1e-9 * np.linalg.norm(back):
-        raise RosyError(
-            "a camera cannot look at the point it stands on, nor along its up direction"
-        )
+        raise RosyError("a camera cannot look at its own position, or along its up direction")
     back, right = back / np.linalg.norm(back), right / np.linalg.norm(right)
     return _view_from_axes(right, np.cross(back, right), back, eye)
 
@@ -405,7 +407,9 @@ def orbit_camera(
     """
     width, height = check_size(width, height)
     if not np.isfinite([azimuth, elevation]).all():
-        raise RosyError(f"view {azimuth},{elevation}: azimuth and elevation must be finite degrees")
+        raise RosyError(
+            f"view {azimuth},{elevation}: azimuth and elevation must be finite numbers of degrees"
+        )
     basis = orbit_basis(azimuth, elevation)
     u, v, w = (_framed_points(targets) @ basis.T).T
     longer_side = max(width, height)
@@ -457,5 +461,5 @@ def _framed_points(targets: Surface | np.ndarray | Sequence[Surface | np.ndarray
         for target in targets
     ]
     if not sum(map(len, points)):
-        raise RosyError("there is nothing to look at")
+        raise RosyError("there are no vertices to frame")
     return np.concatenate(points)

@@ -107,11 +107,11 @@ def corner_field_task(
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     deformed = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
-    yield Progress(0.0, "carrying the field")
+    yield Progress(0.0, "averaging the field at corners")
     faces = face_values(surface, linear, deformed, field, with_angles=display == "smooth")
-    yield Progress(0.4, "carrying the field")
+    yield Progress(0.4, "averaging the field at corners")
     fans = fan_values(surface, linear, faces, field.degree) if display == "smooth" else None
-    yield Progress(0.7, "carrying the field")
+    yield Progress(0.7, "averaging the field at corners")
     count = len(surface.triangles)
     corner_field = CornerField(
         corner_normals=np.empty((3, 3, count), dtype=np.float32),

@@ -94,9 +94,9 @@ def project_task(
     """
     check_instances(instances, camera, display)
     raise_mmap_threshold()
-    yield Progress(0.0, "finding what is seen")
+    yield Progress(0.0, "finding visible pixels")
     visible = _visible_pixels(instances, camera)
-    yield Progress(0.3, "finding what is seen")
+    yield Progress(0.3, "finding visible pixels")
     gbuffer = _allocate_gbuffer(instances, camera, visible)
     count = len(gbuffer.pixel)
     pixels_done = 0
@@ -128,7 +128,7 @@ def project_task(
         for block_start in range(0, len(triangle), BLOCK_PIXELS):
             yield Progress(
                 middle + (stop - middle) * block_start / len(triangle),
-                "turning the field into the view",
+                "rotating the field into the view plane",
             )
             block = slice(block_start, block_start + BLOCK_PIXELS)
             target_pixels = block if visible.is_single_instance else pixels[block]
@@ -169,18 +169,20 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
         finite, or a matrix is not finite.
     """
     if display not in DISPLAYS:
-        raise RosyError(f"display is {display!r}, not one of {', '.join(DISPLAYS)}")
+        raise RosyError(f"unknown display {display!r}: choose {', '.join(DISPLAYS)}")
     if all(instance.field is None for instance in instances):
-        raise RosyError(f"there is no RoSy object for camera '{camera.name}' to see")
+        raise RosyError(f"camera '{camera.name}': no object has a RoSy field")
     for instance in instances:
         name = instance.surface.name
         if np.shape(instance.matrix) != (4, 4) or not np.isfinite(instance.matrix).all():
-            raise RosyError(f"{name}: its matrix is not 4 x 4 finite numbers")
+            raise RosyError(f"{name}: its matrix must be 4 x 4 finite numbers")
         if instance.field is None:
             continue
         vector_count, face_count = len(instance.field.vectors), instance.surface.face_count
         if vector_count != face_count:
-            raise RosyError(f"{name}: its field has {vector_count} vectors for {face_count} faces")
+            raise RosyError(
+                f"{name}: its field has {vector_count} vectors, but the mesh has {face_count} faces"
+            )
         if not np.isfinite(instance.field.vectors).all():
             face = int(np.argmin(np.isfinite(instance.field.vectors).all(axis=1)))
             raise RosyError(f"{name}: its field is not finite on face {face}")

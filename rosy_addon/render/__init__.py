@@ -1,1 +1,1 @@
-"""Rendering: what a renderer is given, what a renderer is, and the renderer that uses numpy."""
+"""Rendering: the input of renderers, their protocols, and the numpy renderer."""

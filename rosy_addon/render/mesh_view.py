@@ -94,4 +94,6 @@ def check_light(light: str, name: str) -> None:
     RosyError
     """
     if light == "scene":
-        raise RosyError(f"{name}: has no lights: choose the light headlight or lamp")
+        raise RosyError(
+            f"{name}: has no lights, because it is a mesh file: choose the light 'headlight' or 'lamp'"
+        )

@@ -35,7 +35,9 @@ def save_blend() -> str:
     """
     path = bpy.data.filepath
     if not path:
-        raise RosyError("--save: what is open was never saved, so it has no name to be saved under")
+        raise RosyError(
+            "--save: the open file was never saved and has no name: save it in Blender first"
+        )
     try:
         bpy.ops.wm.save_mainfile()
     except RuntimeError as reason:

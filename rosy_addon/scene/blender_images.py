@@ -118,7 +118,7 @@ def check_folder(folder: Path) -> None:
     if not folder.exists():
         parent = next((ancestor for ancestor in folder.parents if ancestor.exists()), folder)
         if not parent.is_dir() or not os.access(parent, os.W_OK):
-            raise RosyError(f"{folder}: cannot be made: {parent} may not be written")
+            raise RosyError(f"{folder}: cannot be created: no permission to write to {parent}")
         return
     if not folder.is_dir():
         raise RosyError(f"{folder}: is not a folder")
@@ -187,7 +187,7 @@ def _save_image(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
-        raise RosyError(f"{path.parent}: cannot be made: {reason.strerror.lower()}") from reason
+        raise RosyError(f"{path.parent}: cannot be created: {reason.strerror.lower()}") from reason
     check_writable(path)
     if image.is_float:
         image.file_format = "OPEN_EXR"

@@ -28,7 +28,7 @@ def scene_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
         key=lambda obj: (obj == scene.camera, obj.name),
     )
     if not cameras:
-        raise RosyError(f"scene '{scene.name}' has no camera")
+        raise RosyError(f"scene '{scene.name}' has no camera: add one")
     return cameras
 
 
@@ -115,7 +115,7 @@ def camera_of_object(
     if kind not in ("PERSP", "ORTHO"):
         description = {"PANO": "panoramic", "CUSTOM": "custom"}.get(kind, kind.lower())
         raise RosyError(
-            f"camera '{name}' is {description}: only perspective and orthographic ones can be drawn from"
+            f"camera '{name}' is {description}: choose a perspective or orthographic camera"
         )
     if width is None or height is None:
         width, height = render_size(scene)

@@ -48,7 +48,7 @@ def new_curves(
     register(data, name)
     strokes = geometry.strokes
     data.add_curves(np.diff(strokes.start).tolist())
-    colours = np.array([[*to_linear(from_hex(colour)), 1.0] for colour in geometry.colors])
+    colors = np.array([[*to_linear(from_hex(color)), 1.0] for color in geometry.colors])
     _set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
     _set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
     _set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
@@ -57,7 +57,7 @@ def new_curves(
     data.add_curves([])
     _set_attribute(data, "family", "INT", "CURVE", strokes.family)
     _set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
-    _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colours[strokes.family])
+    _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
     values = {
         "opacity": strokes.opacity,
         "spacing": strokes.spacing,

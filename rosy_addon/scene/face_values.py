@@ -31,7 +31,7 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     attribute = mesh.attributes[name]
     values = field_values(attribute, source, mesh).astype(np.float64)
     if values.ndim == 1:
-        raise RosyError(f"{source}: found {describe_type(attribute)}; a vector is wanted")
+        raise RosyError(f"{source}: expected a vector, found {describe_type(attribute)}")
     apply_nonfinite_policy(values, source, attribute.domain.lower(), "error")
     if attribute.domain == "FACE":
         return values
@@ -72,7 +72,7 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
             None,
         )
         if obj is None:
-            raise RosyError(f"{source}: is neither an attribute nor a vertex group")
+            raise RosyError(f"{source}: no attribute or vertex group has this name")
         group = obj.vertex_groups[name].index
         domain, values = "POINT", np.zeros(len(mesh.vertices))
         for vertex in mesh.vertices:
@@ -110,7 +110,7 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     count, data_type = len(attribute.data), attribute.data_type
     if attribute.domain not in ("FACE", "POINT", "CORNER"):
         raise RosyError(
-            f"{source}: found {describe_type(attribute)}; wanted on FACE, POINT or CORNER"
+            f"{source}: expected values on FACE, POINT or CORNER, found {describe_type(attribute)}"
         )
     if data_type in ("FLOAT_COLOR", "BYTE_COLOR"):
         values = np.empty(4 * count, dtype=np.float32)
@@ -118,9 +118,7 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
         return values.reshape(-1, 4)[:, :3] @ REC709_LUMINANCE
     dtypes = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
     if data_type not in dtypes:
-        raise RosyError(
-            f"{source}: found {describe_type(attribute)}; a number or a colour is wanted"
-        )
+        raise RosyError(f"{source}: expected a number or a color, found {describe_type(attribute)}")
     values = np.empty(count, dtype=dtypes[data_type])
     attribute.data.foreach_get("value", values)
     return values.astype(np.float64)

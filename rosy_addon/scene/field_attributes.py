@@ -72,13 +72,13 @@ def field_values(attribute: bpy.types.Attribute, source: str, mesh: bpy.types.Me
     vectors = [(domain, VECTOR_TYPE) for domain in ("FACE", "POINT", "CORNER")]
     if attribute_type not in [*vectors, ("FACE", ANGLE_TYPE)]:
         raise RosyError(
-            f"{source}: found {describe_type(attribute)}; wanted FLOAT_VECTOR on FACE (or POINT or "
-            "CORNER), or angles as FLOAT on FACE"
+            f"{source}: expected FLOAT_VECTOR on FACE, POINT or CORNER, or angles as FLOAT on FACE, "
+            f"found {describe_type(attribute)}"
         )
     columns = 3 if attribute.data_type == VECTOR_TYPE else 1
     elements = {"FACE": mesh.polygons, "POINT": mesh.vertices, "CORNER": mesh.loops}
     if len(attribute.data) != len(elements[attribute.domain]):
-        raise RosyError(f"{source}: cannot be read in edit mode: leave it (Tab) first")
+        raise RosyError(f"{source}: cannot be read in edit mode: leave edit mode (Tab) first")
     values = np.empty(len(attribute.data) * columns, dtype=np.float32)
     attribute.data.foreach_get("vector" if columns == 3 else "value", values)
     return values.reshape(-1, 3) if columns == 3 else values

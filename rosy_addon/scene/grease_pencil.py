@@ -125,9 +125,9 @@ def _add_to_frame(
         stroke.line_width, stroke.material_index = line_width, material_index
 
 
-def _new_material(name: str, colour: str) -> bpy.types.Material:
+def _new_material(name: str, color: str) -> bpy.types.Material:
     """Create a Grease Pencil material with a hex color."""
     material = bpy.data.materials.new(name)
     bpy.data.materials.create_gpencil_data(material)
-    material.grease_pencil.color = (*to_linear(from_hex(colour)).tolist(), 1.0)
+    material.grease_pencil.color = (*to_linear(from_hex(color)).tolist(), 1.0)
     return material

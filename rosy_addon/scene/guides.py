@@ -65,7 +65,9 @@ def guide_strokes_and_empties(
             continue
         polylines = [stroke for stroke in _object_strokes(obj) if len(stroke) > 1]
         if not polylines:
-            raise RosyError(f"object '{obj.name}': there is no stroke on it to follow")
+            raise RosyError(
+                f"object '{obj.name}' has no stroke to follow: draw one, or choose another object"
+            )
         strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in polylines]
     return strokes, empties
 
@@ -84,11 +86,16 @@ def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
     """
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     if layer is None:
-        available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers) or "none"
-        raise RosyError(f"{mesh.name}: has no UV map '{name}' to follow; there is {available}")
+        if not mesh.uv_layers:
+            raise RosyError(f"mesh '{mesh.name}' has no UV map: add one")
+        available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
+        raise RosyError(f"mesh '{mesh.name}' has no UV map '{name}', only {available}")
     values = read_attribute(mesh, layer.name, np.float32, 2)
     if values is None:
-        raise RosyError(f"{mesh.name}: UV map '{layer.name}' cannot be read in edit mode")
+        raise RosyError(
+            f"mesh '{mesh.name}': UV map '{layer.name}' cannot be read in edit mode: leave edit mode "
+            "(Tab) first"
+        )
     return values
 
 
@@ -105,7 +112,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         If there is no attribute of this name, it is of another type, or a value is not finite.
     """
     if not name or name not in mesh.attributes:
-        raise RosyError(f"{mesh.name}: has no attribute '{name}' to follow")
+        raise RosyError(f"mesh '{mesh.name}' has no attribute '{name}' to follow")
     return read_face_vectors(mesh, name)
 
 

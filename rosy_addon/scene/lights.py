@@ -37,13 +37,13 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
     """Convert a Blender light with a local-to-camera matrix."""
-    colour = np.array(data.color) * _temperature_color(data)
+    color = np.array(data.color) * _temperature_color(data)
     energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
     if data.type == "SUN":
         direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        return Light("sun", direction, colour, energy / np.pi)
+        return Light("sun", direction, color, energy / np.pi)
     axial_gain = 4.0 if data.type == "AREA" else 1.0
-    return Light("point", matrix[:3, 3].copy(), colour, axial_gain * energy / (4 * np.pi**2))
+    return Light("point", matrix[:3, 3].copy(), color, axial_gain * energy / (4 * np.pi**2))
 
 
 def _temperature_color(data: bpy.types.Light) -> np.ndarray:

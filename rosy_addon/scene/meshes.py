@@ -14,9 +14,9 @@ from ..field.surface import Surface, build_surface, smooth_fans
 
 #: Marks of edges: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
-    "SELECTED": ("select", "Selected", "Those that are selected in edit mode"),
-    "SHARP": ("use_edge_sharp", "Marked Sharp", "Those that are marked sharp"),
-    "SEAM": ("use_seam", "Seams", "Those that are marked as seams of a UV map"),
+    "SELECTED": ("select", "Selected", "Edges that are selected in edit mode"),
+    "SHARP": ("use_edge_sharp", "Marked Sharp", "Edges that are marked sharp"),
+    "SEAM": ("use_seam", "Seams", "Edges that are marked as seams"),
 }
 
 #: Attribute in which Blender stores the selection of edges.
@@ -59,8 +59,8 @@ def mesh_surface(
     flush_edit_mode(mesh)
     face_count = len(mesh.polygons)
     if not face_count:
-        content = "only points and loose edges" if len(mesh.vertices) else "nothing in it"
-        raise RosyError(f"{name}: the mesh has no faces to draw on, {content}")
+        content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
+        raise RosyError(f"{name}: the mesh has no faces, {content}")
     arguments = {
         "vertices": _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3),
         "corner_vertex": _attribute_or_collection(
@@ -126,7 +126,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
     property_name, label, _ = EDGE_MARKS[mark]
     is_marked = _edge_flags(mesh, property_name)
     if not is_marked.any():
-        raise RosyError(f"{mesh.name}: no edge is marked: {label}")
+        raise RosyError(f"mesh '{mesh.name}' has no such edges: {label}")
     return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[
         is_marked
     ]

@@ -93,10 +93,12 @@ def _check_writable(obj: bpy.types.Object, name: str) -> None:
     """Raise an error if the attribute cannot be written to the mesh of an object."""
     mesh, label = obj.data, f"object '{obj.name}'"
     if not is_editable(mesh) or mesh.is_editmode:
-        raise RosyError(f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}")
+        raise RosyError(
+            f"{label}: {'leave edit mode (Tab)' if mesh.is_editmode else 'make its linked mesh local'} first"
+        )
     attribute = mesh.attributes.get(name)
     if attribute is not None and (attribute.domain, attribute.data_type) != _ATTRIBUTE_TYPE:
         raise RosyError(
-            f"{label}: has an attribute '{name}' already, {attribute.data_type} on "
-            f"{attribute.domain}; wanted is {_ATTRIBUTE_TYPE[1]} on {_ATTRIBUTE_TYPE[0]}"
+            f"{label} already has an attribute '{name}' of another type ({attribute.data_type} on "
+            f"{attribute.domain}): rename or remove it"
         )

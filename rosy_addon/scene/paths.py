@@ -1,4 +1,4 @@
-"""The folder of the user's presets in Blender."""
+"""Path of the folder of the user's presets in Blender."""
 
 from __future__ import annotations
 

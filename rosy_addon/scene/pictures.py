@@ -154,7 +154,7 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     """
     directory = scene.rosy.directory
     if directory.startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{directory}: save the .blend file first, or choose a folder")
+        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
     return Path(bpy.path.abspath(directory))
 
 
@@ -309,7 +309,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
     record = scene.rosy.bakes.get(camera)
     if record is None:
         names = ", ".join(f"'{other.name}'" for other in scene.rosy.bakes) or "none"
-        raise RosyError(f"nothing is baked from camera '{camera}'; there are {names}")
+        raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
     for entry in record.objects:
         obj = scene.objects.get(entry.name) or bpy.data.objects.get(entry.name)
         if obj is None or not is_editable(obj):
@@ -338,4 +338,4 @@ def _display_warnings(scene: bpy.types.Scene) -> list[str]:
     transform = scene.view_settings.view_transform
     if transform in NEUTRAL_VIEW_TRANSFORMS:
         return []
-    return [f"the view transform {transform} greys the lines; Standard shows them as drawn"]
+    return [f"the view transform {transform} changes the colors of pictures: choose Standard"]

@@ -82,7 +82,7 @@ def read_mesh_field(
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
-            f"{label} has no attribute '{field_name}'; a vector on faces is wanted{_attribute_hint(mesh)}"
+            f"{label} has no attribute '{field_name}' with a vector on faces{_attribute_hint(mesh)}"
         )
     source = f"{label}, attribute '{field_name}'"
     values = field_values(attribute, source, mesh)
@@ -109,7 +109,9 @@ def _field_from_directions(
     while f"dir{degree}" in mesh.attributes:
         degree += 1
     if degree > MAX_DEGREE:
-        raise RosyError(f"{label}: has {degree} attributes dir0 ..., at most {MAX_DEGREE} are read")
+        raise RosyError(
+            f"{label}: has {degree} attributes dir0, dir1 ..., but at most {MAX_DEGREE} are supported"
+        )
     first_attribute = mesh.attributes["dir0"]
     directions = []
     for index in range(degree):
@@ -121,8 +123,8 @@ def _field_from_directions(
             or attribute.domain != first_attribute.domain
         ):
             raise RosyError(
-                f"{source}: found {describe_type(attribute)}; wanted FLOAT_VECTOR on FACE or POINT, the "
-                "same for all members"
+                f"{source}: expected FLOAT_VECTOR on FACE or POINT, the same for all directions, "
+                f"found {describe_type(attribute)}"
             )
         directions.append(field_values(attribute, source, mesh))
     source = f"{label}, attributes dir0 to dir{degree - 1}"
@@ -174,4 +176,4 @@ def _attribute_hint(mesh: bpy.types.Mesh) -> str:
         for other in mesh.attributes
         if other.data_type == VECTOR_TYPE and other.name not in ("position", "rest_position")
     ]
-    return f"; there are {', '.join(names)}" if names else ""
+    return f": choose {' or '.join(names)}" if names else ": make or import a field"

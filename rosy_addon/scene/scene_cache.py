@@ -288,7 +288,9 @@ class SceneCache:
         """Return the field of a mesh in edit mode. Only its evaluated mesh can be read."""
         name = attribute_name(original)
         if name not in mesh.attributes or not is_face_vector_field(mesh, name):
-            raise RosyError(f"{label}: in edit mode its field can be read only as vectors on faces")
+            raise RosyError(
+                f"{label}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
+            )
         layout = FieldLayout(name, field_degree(original))
         return read_evaluated_field(mesh, layout, surface, nonfinite, label)
 
@@ -304,7 +306,7 @@ class SceneCache:
         label = f"object '{owner.name}'"
         with evaluated_mesh(evaluated) as mesh:
             if mesh is None or any(name not in mesh.attributes for name in layout.attribute_names):
-                raise RosyError(f"{label}: after its modifiers the mesh has lost its field")
+                raise RosyError(f"{label}: a modifier removes the attribute of its field")
             surface = mesh_surface(mesh, label, read_rest=True, cache=self._cache)
             field = read_evaluated_field(mesh, layout, surface, nonfinite, label, self._cache)
         return _TopologyEntry(_topology_hash(surface), surface.rest_vertices, field)

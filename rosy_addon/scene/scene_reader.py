@@ -223,11 +223,11 @@ class _SceneReader:
             if obj in drawn_objects:
                 continue
             if obj not in read_objects:
-                raise RosyError(f"object '{obj.name}' has a field, but is hidden in the viewport")
+                raise RosyError(
+                    f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or switch off its drawing"
+                )
             faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
-            problem = (
-                "has no faces" if faceless else f"has lost attribute '{self.layouts[obj].name}'"
-            )
+            problem = "has no faces" if faceless else f"has no attribute '{self.layouts[obj].name}'"
             raise RosyError(
                 f"object '{obj.name}': after its modifiers "
                 f"({', '.join(modifier.name for modifier in user_modifiers(obj)) or 'none'}) "
@@ -307,8 +307,8 @@ def _prepare_field(
         return FieldLayout(name, field.degree)
     if not _can_modify(mesh):
         raise RosyError(
-            f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}; there its "
-            "field can be read only as vectors on faces"
+            f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
+            "stored as vectors on faces can be read there: use Store Field first"
         )
     if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
         temp_meshes.append(mesh)
@@ -384,7 +384,8 @@ def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bp
     if not has_field(obj):
         field_name = attribute_name(obj.data)
         raise RosyError(
-            f"object '{name}' has no attribute '{field_name}'; degree {field_degree(obj.data)} and "
-            "a vector on faces are wanted: make or import a field first"
+            f"object '{name}' has no attribute '{field_name}' with a field: make or import a field first"
         )
-    raise RosyError(f"object '{name}' is hidden in renders of this view layer, or switched off")
+    raise RosyError(
+        f"object '{name}' is hidden in renders of this view layer, or its drawing is switched off"
+    )

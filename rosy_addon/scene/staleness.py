@@ -48,13 +48,13 @@ def find_stale_reason(scene: bpy.types.Scene, record: bpy.types.PropertyGroup) -
     if record.camera_state:
         camera = scene.objects.get(record.name)
         if camera is None or camera.type != "CAMERA":
-            return f"camera '{record.name}' is gone"
+            return f"camera '{record.name}' was deleted"
         if record.camera_state != camera_state(scene, camera):
             return f"camera '{record.name}' was changed"
     for entry in record.objects:
         obj = bpy.data.objects.get(entry.name)
         if obj is None:
-            return f"object '{entry.name}' is gone"
+            return f"object '{entry.name}' was deleted"
         transform_hash, mesh_state = entry.state.split(" ")
         current_transform_hash, current_mesh_state = object_state(obj).split(" ")
         if transform_hash != current_transform_hash:

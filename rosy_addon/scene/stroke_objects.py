@@ -42,7 +42,7 @@ def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
     ink = to_hex(settings.ink_colour)
     return Pen(
         width=float(f"{settings.width:.7g}"),
-        colours=[to_hex(colour) for colour in PALETTE] if settings.inks == "FAMILIES" else [ink],
+        colours=[to_hex(color) for color in PALETTE] if settings.inks == "FAMILIES" else [ink],
         paper=None if settings.plotter or not settings.paper else "#ffffff",
         millimetres=settings.page or None,
         plotter=settings.plotter,
@@ -65,7 +65,9 @@ def target_objects(
         return objects
     selected = [obj for obj in objects if obj.select_get(view_layer=view_layer)]
     if not selected:
-        raise RosyError("none of the selected objects has a field: select one that has")
+        raise RosyError(
+            "no selected object has a field: select one with a field, or switch off Selected Only"
+        )
     return selected
 
 

@@ -121,9 +121,9 @@ def check_tones(
         return
     names = ", ".join(f"'{obj.name}'" for obj in dict.fromkeys(owner for _, owner in tones))
     if tone_request.kind == "image":
-        raise RosyError(f"no image is chosen for the tone of {names}")
+        raise RosyError(f"{names}: choose an image for the tone, in the properties of the object")
     if not tone_request.attribute:
-        raise RosyError(f"there are no vertex colours on {names}: choose an attribute for the tone")
+        raise RosyError(f"{names}: there is no color attribute: choose an attribute for the tone")
     available = dict.fromkeys(
         attribute.name
         for _, owner in tones
@@ -131,9 +131,9 @@ def check_tones(
         if attribute.data_type in ("FLOAT", "FLOAT_COLOR", "BYTE_COLOR")
         and not attribute.name.startswith(".")
     )
-    listing = ", ".join(f"'{name}'" for name in available) or "none that would do"
+    listing = ", ".join(f"'{name}'" for name in available) or "no suitable one"
     raise RosyError(
-        f"there is no attribute '{tone_request.attribute}' for the tone on {names}; there is {listing}"
+        f"{names}: there is no attribute '{tone_request.attribute}' for the tone, only {listing}"
     )
 
 
@@ -161,7 +161,7 @@ def _tone_uvs(mesh: bpy.types.Mesh, name: str, label: str) -> np.ndarray:
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     if layer is None:
         missing = f"no UV map '{name}'" if name else "no UV map"
-        raise RosyError(f"{label}: its mesh has {missing} for the image of its tone")
+        raise RosyError(f"{label}: its mesh has {missing}, which the image of the tone needs")
     values = np.empty(2 * len(mesh.loops), dtype=np.float32)
     layer.uv.foreach_get("vector", values)
     return values.reshape(-1, 2)
@@ -177,7 +177,7 @@ def image_luminance(image: bpy.types.Image) -> np.ndarray:
     """
     width, height = image.size
     if not (width and height and len(image.pixels)):
-        raise RosyError(f"image '{image.name}': has no pixels; is its file there?")
+        raise RosyError(f"image '{image.name}' has no pixels: check the path of its file")
     rgba = np.empty(4 * width * height, dtype=np.float32)
     image.pixels.foreach_get(rgba)
     rgba = rgba.reshape(height, width, 4)
@@ -202,7 +202,7 @@ def reference_path(scene: bpy.types.Scene) -> Path:
     """
     pattern = scene.rosy.tone_picture
     if not pattern:
-        raise RosyError("the tone is to come from a picture: choose its file under Look > Tone")
+        raise RosyError("tone 'picture' needs a picture: choose a file under Look > Tone")
     filename = re.sub("#+", lambda match: f"{scene.frame_current:0{len(match[0])}d}", pattern)
     return Path(bpy.path.abspath(filename))
 
@@ -259,6 +259,6 @@ def load_luminance(path: Path) -> np.ndarray:
     try:
         return image_luminance(image)
     except RosyError:
-        raise RosyError(f"{path}: is no picture that Blender can read") from None
+        raise RosyError(f"{path}: is not a picture that Blender can read") from None
     finally:
         bpy.data.images.remove(image)

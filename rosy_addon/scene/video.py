@@ -29,11 +29,11 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
     RosyError
         If this build of Blender cannot encode the video.
     """
-    scene = bpy.data.scenes.new("RoSy film")
+    scene = bpy.data.scenes.new("RoSy video")
     try:
         editor = scene.sequence_editor_create()
         strips = editor.strips if hasattr(editor, "strips") else editor.sequences
-        strip = strips.new_image("film", str(folder / "00000.png"), channel=1, frame_start=1)
+        strip = strips.new_image("video", str(folder / "00000.png"), channel=1, frame_start=1)
         for index in range(1, count):
             strip.elements.append(f"{index:05d}.png")
         strip.frame_final_duration = count
@@ -55,8 +55,8 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
         render.filepath = str(path)
         bpy.ops.render.render(animation=True, scene=scene.name)
     except (RuntimeError, TypeError, AttributeError) as reason:
-        raise RosyError(f"{path}: this Blender makes no film: {reason}") from reason
+        raise RosyError(f"{path}: this Blender cannot encode a video: {reason}") from reason
     finally:
         bpy.data.scenes.remove(scene)
     if not path.is_file():
-        raise RosyError(f"{path}: this Blender has made no film")
+        raise RosyError(f"{path}: Blender did not write the video")

@@ -23,7 +23,7 @@ from .meshes import mesh_surface
 
 #: Forms in which a field can be stored: label and description in the user interface.
 STORAGE_FORMS = {
-    "VECTOR": ("One Vector", "One direction on each face, the others follow from it"),
+    "VECTOR": ("One Vector", "One direction on each face, from which the others follow"),
     "DIRECTIONS": ("Directions", "All directions, as dir0, dir1 ... on faces"),
     "ANGLE": ("Angle", "The angle from each face's first edge, in radians"),
 }
@@ -105,7 +105,10 @@ def write_mesh_field(
             f"mesh '{mesh.name}' has {face_count} faces, but the field has {len(field.vectors)}"
         )
     if form == "ANGLE" and field.direction_ratios is not None:
-        raise RosyError(f"mesh '{mesh.name}': the directions of its field are no RoSy of one angle")
+        raise RosyError(
+            f"mesh '{mesh.name}': the directions of its field are not a RoSy, so one angle cannot "
+            "store them"
+        )
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -154,8 +157,8 @@ def _check_attribute_type(mesh: bpy.types.Mesh, name: str, data_type: str) -> No
     attribute = mesh.attributes.get(name)
     if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", data_type):
         raise RosyError(
-            f"mesh '{mesh.name}' has an attribute '{name}' of another kind, {describe_type(attribute)}; "
-            "remove it, or give the field another name"
+            f"mesh '{mesh.name}' already has an attribute '{name}' of another type "
+            f"({describe_type(attribute)}): remove it, or choose another name for the field"
         )
 
 
@@ -170,7 +173,9 @@ def _get_or_create_attribute(
         if attribute is None or attribute.name != name:
             if attribute is not None:
                 mesh.attributes.remove(attribute)
-            raise RosyError(f"mesh '{mesh.name}': an attribute cannot be named '{name}'")
+            raise RosyError(
+                f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose another one"
+            )
     return attribute
 
 
@@ -178,8 +183,6 @@ def _check_writable(mesh: bpy.types.Mesh) -> None:
     """Raise an error if a mesh is linked from a library or in edit mode."""
     if not is_editable(mesh):
         library = mesh.library.filepath if mesh.library else "its library"
-        raise RosyError(
-            f"mesh '{mesh.name}' is linked from {library}: make it local to give it a field"
-        )
+        raise RosyError(f"mesh '{mesh.name}' is linked from {library}: make it local first")
     if mesh.is_editmode:
-        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave it (Tab) to give it a field")
+        raise RosyError(f"mesh '{mesh.name}' is in edit mode: leave edit mode (Tab) first")

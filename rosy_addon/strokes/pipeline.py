@@ -127,7 +127,7 @@ def draw_instances_task(
     cache = Cache() if cache is None else cache
     drawn = [index for index, instance in enumerate(instances) if instance.field is not None]
     if not drawn:
-        raise RosyError("there is no field to draw strokes along")
+        raise RosyError("no object has a field: strokes need one")
     if clip_to_frame or not style.hidden:
         drawn = [index for index in drawn if _is_in_view(instances[index], camera)]
     strokes_of_instances = []
@@ -136,17 +136,21 @@ def draw_instances_task(
         task = _trace_instance(instances[index], camera, style, lights, cache)
         strokes_of_instances.append((yield from subtask(task, start, stop)))
     if not strokes_of_instances:
-        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+        raise RosyError(
+            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
+        )
     strokes = reduce(Strokes.concatenate, strokes_of_instances)
     if not len(strokes):
-        raise RosyError("there is no room for a stroke: ask for a narrower spacing")
+        raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clip_to_frame or not style.hidden:
-        yield Progress(0.85, "finding what is seen")
+        yield Progress(0.85, "finding visible strokes")
         strokes = clip_to_visible(strokes, instances, camera, remove_hidden=not style.hidden)
     if style.overshoot:
         strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
-        raise RosyError(f"camera '{camera.name}' sees none of the strokes")
+        raise RosyError(
+            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
+        )
     # Families of different instances are still separate. Each belongs to one instance.
     family_counts = [len(single.names) for single in strokes_of_instances]
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)

@@ -129,7 +129,7 @@ class StrokeSamples(ColumnTable):
             float((mesh.area / mean_spacing**2).sum()) * mesh.family_count / SAMPLE_STEP
         )
         if not self.expected_count < MAX_EXPECTED_SAMPLES:
-            raise RosyError("the strokes would be too many: ask for a wider spacing")
+            raise RosyError("there would be too many strokes: increase the spacing")
         self.grid = PointGrid(
             1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
         )

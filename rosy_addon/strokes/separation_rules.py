@@ -47,8 +47,8 @@ class SeparationRules:
     def __post_init__(self) -> None:
         if not 0.1 <= self.min_separation < 1 < self.max_gap:
             raise RosyError(
-                f"strokes are to end between {self.min_separation:g} and {self.max_gap:g} spacings: the "
-                "first is to be from 0.1 to below 1, the second above 1"
+                f"min_separation ({self.min_separation:g}) must be from 0.1 to below 1, and max_gap "
+                f"({self.max_gap:g}) above 1"
             )
         if not 0 <= self.min_length < self.max_length:
-            raise RosyError("the shortest stroke is to be shorter than the longest")
+            raise RosyError("min_length of strokes must be less than max_length")

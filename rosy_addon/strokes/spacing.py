@@ -60,7 +60,7 @@ def pixel_spacing(instance: MeshInstance, camera: Camera, pixels: float) -> np.n
         If `pixels` is not finite or not above 0.
     """
     if not (np.isfinite(pixels) and pixels > 0):
-        raise RosyError(f"a spacing of {pixels:g} pixels is not above 0")
+        raise RosyError(f"the spacing must be above 0 pixels, not {pixels:g}")
     return pixels * pixel_size(instance.world_points(), camera)
 
 
@@ -120,7 +120,7 @@ def spacing_by_tone(
     """
     tone = np.asarray(tone, dtype=np.float64)
     if not np.isfinite(tone).all():
-        raise RosyError("a tone is not a number")
+        raise RosyError("the tone contains NaN")
     ink = np.maximum(1 - np.clip(tone, 0, 1), 1 / max_ratio)
     return np.asarray(spacing) / ink
 

@@ -63,9 +63,9 @@ class Pen:
 
     def __post_init__(self) -> None:
         if not self.width > 0 or not self.colours:
-            raise RosyError("a pen has a width above 0, and a colour")
+            raise RosyError("the pen needs a width above 0, and at least one color")
         if self.millimetres is not None and not self.millimetres > 0:
-            raise RosyError("a page has a width above 0")
+            raise RosyError("the page needs a width above 0")
 
     def family_colors(self, names: Sequence[str]) -> list[str]:
         """Return the color of each family, given `Strokes.names`."""

@@ -223,10 +223,10 @@ def build_tangent_mesh(
     """
     surface, field = instance.surface, instance.field
     if field is None:
-        raise RosyError(f"{surface.name}: there is no field to draw strokes of")
+        raise RosyError(f"{surface.name}: has no field")
     if len(field.vectors) != surface.face_count:
         raise RosyError(
-            f"{surface.name}: its field has {len(field.vectors)} vectors for "
+            f"{surface.name}: the field has {len(field.vectors)} vectors, but the mesh has "
             f"{surface.face_count} faces"
         )
     carried = run_to_completion(
@@ -243,7 +243,7 @@ def build_tangent_mesh(
     z = carried.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
-        raise RosyError(f"{surface.name}: its field is zero all over")
+        raise RosyError(f"{surface.name}: the field is zero everywhere")
     harmonics, family_z = [], None
     for trait, values in carried.channels.items():
         values = values.T * signed_power(rotations, rotation_order(trait, field.degree))
@@ -301,8 +301,8 @@ def corner_values(mesh: TangentMesh, values: np.ndarray | float, surface_name: s
     if values.ndim == 1 and len(values) >= vertex_count:
         return values[mesh.triangle_vertex]
     raise RosyError(
-        f"{surface_name}: {values.shape} values are neither one for each of {vertex_count} vertices "
-        f"nor for each of {face_count} faces"
+        f"{surface_name}: expected one value per vertex ({vertex_count}) or per face ({face_count}), "
+        f"found values of shape {values.shape}"
     )
 
 

@@ -90,7 +90,7 @@ def trace_strokes_task(
     mesh = build_tangent_mesh(instance, display=display, cross_creases=cross_creases, cache=cache)
     corner_spacing = corner_values(mesh, spacing, instance.surface.name)
     if not (np.isfinite(corner_spacing).all() and (corner_spacing > 0).all()):
-        raise RosyError(f"{instance.surface.name}: the spacing of strokes is to be above 0")
+        raise RosyError(f"{instance.surface.name}: the spacing of strokes must be above 0")
     placer = StreamlinePlacer(mesh, corner_spacing, rules or SeparationRules())
     rules = placer.rules
     yield from place_streamlines_task(placer)
@@ -108,7 +108,7 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     4. Let strokes that yielded at wide gaps continue, with a smaller separation.
     5. Fill the remaining gaps, with the minimum length of the rules.
     """
-    label = "growing strokes"
+    label = "tracing strokes"
     rules = placer.rules
     placer.rules = replace(
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf

@@ -1,4 +1,4 @@
-"""The settings that each kind of generated field has."""
+"""Names of the settings that apply to each kind of generated field."""
 
 from __future__ import annotations
 

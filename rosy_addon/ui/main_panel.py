@@ -177,7 +177,7 @@ def _draw_view_hints(
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     if view.shading.type in {"WIREFRAME", "SOLID"}:
-        column.label(text="This view shows no materials", icon="INFO")
+        column.label(text="This view does not show materials", icon="INFO")
         button = column.operator("wm.context_set_enum", text="Show the Picture Here")
         button.data_path, button.value = "space_data.shading.type", "MATERIAL"
     in_camera_view = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"
@@ -194,7 +194,7 @@ def _draw_view_transform_warning(layout: bpy.types.UILayout, scene: bpy.types.Sc
     transform = scene.view_settings.view_transform
     if transform not in NEUTRAL_VIEW_TRANSFORMS:
         column = layout.column(align=True)
-        column.label(text=f"{transform} grays the lines", icon="ERROR")
+        column.label(text=f"{transform} changes the colors", icon="ERROR")
         button = column.operator("wm.context_set_enum", text="View Transform: Standard")
         button.data_path, button.value = "scene.view_settings.view_transform", "Standard"
 

@@ -30,7 +30,7 @@ PLACEMENT_ITEMS = [
     (
         "PROJECTION",
         "Baked",
-        "The picture is fixed to the surface, from whichever viewpoint it is seen",
+        "The picture is fixed to the surface and can be seen from any viewpoint",
     ),
     ("WINDOW", "Window", "The picture fills the frame of the camera that is used"),
 ]
@@ -106,7 +106,7 @@ class RosyBakedObject(bpy.types.PropertyGroup):
     """The state of an object when a picture of it was drawn. Its name is that of the object."""
 
     matrix: bpy.props.FloatVectorProperty(size=16, description="Object to clip space, by rows")
-    state: bpy.props.StringProperty(description="Digest of transform, mesh and field")
+    state: bpy.props.StringProperty(description="Hash of transform, mesh and field")
 
 
 class RosyBake(bpy.types.PropertyGroup):
@@ -122,7 +122,7 @@ class RosyBake(bpy.types.PropertyGroup):
     look: bpy.props.StringProperty(
         description="Look of the scene when the picture was drawn, as JSON"
     )
-    camera_state: bpy.props.StringProperty(description="Digest of the camera, empty for a 3D view")
+    camera_state: bpy.props.StringProperty(description="Hash of the camera, empty for a 3D view")
     objects: bpy.props.CollectionProperty(type=RosyBakedObject)
 
 

@@ -1,4 +1,4 @@
-"""What the panels in the sidebar of the 3D view have in common."""
+"""Base class and helpers of the panels in the sidebar of the 3D view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The panel of strokes."""
+"""The panel of the settings of strokes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The meshes of view layers, as the live view read them last."""
+"""Cached meshes of each view layer, for the live view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text in a corner of a 3D view."""
+"""Drawing of messages in a corner of a 3D view."""
 
 from __future__ import annotations
 

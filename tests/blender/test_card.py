@@ -31,6 +31,8 @@ from bench.parity import (
 )
 
 PACKAGE = f"{EXTENSION}.rosy_addon"
+#: Meshes of others.
+DATA = Path(__file__).parents[3] / "shared" / "data"
 #: Half of the table's, and half of a streamline's usual length: the same part of the picture.
 SIZE, LENGTH = 256, 20
 
@@ -53,7 +55,7 @@ def card(rosy):
 @pytest.fixture(scope="module")
 def surface_of(rosy):
     bpy.ops.wm.read_homefile(use_empty=True)
-    return lru_cache(lambda name: surface_named(rosy, name))
+    return lru_cache(lambda name: surface_named(rosy, name, DATA))
 
 
 def test_it_is_drawn_with_what_was_asked_for(card):

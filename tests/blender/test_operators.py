@@ -264,7 +264,7 @@ def test_marked_edges_uv_and_vectors_together(suzanne):
 def test_guides_that_are_not_there(suzanne):
     before = contents()
     generate = bpy.ops.rosy.field_generate
-    assert "there is nothing to follow" in error_of(generate, kind="guided")
+    assert "there are no guides" in error_of(generate, kind="guided")
     assert "'Nobody'" in error_of(generate, kind="guided", guide="Nobody")
     assert "attribute 'wind'" in error_of(
         generate, kind="guided", guides={"ATTRIBUTE"}, vectors="wind"

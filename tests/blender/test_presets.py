@@ -69,7 +69,7 @@ def test_replaced_only_if_asked(scene):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("Plaid", "comes with RoSy"), ("..", "letter or a digit"), ("", "letter or a digit")],
+    [("Plaid", "a preset of RoSy"), ("..", "letter or a digit"), ("", "letter or a digit")],
 )
 def test_names_that_are_refused(scene, name, said):
     message = error_of(save, name)
@@ -84,14 +84,14 @@ def test_renamed_and_deleted(scene):
     assert scene.rosy.preset == "your-ink"
     names = sorted(path.name for path in folder().iterdir())
     assert names == ["your-ink.json", "your-ink.png"]
-    assert "your own" in error_of(bpy.ops.rosy.preset_remove, preset="plaid")
-    assert "your own" in error_of(bpy.ops.rosy.preset_rename, preset="plaid", name="Mine")
-    assert "comes with RoSy" in error_of(bpy.ops.rosy.preset_rename, name="Plaid")
+    assert "your presets" in error_of(bpy.ops.rosy.preset_remove, preset="plaid")
+    assert "your presets" in error_of(bpy.ops.rosy.preset_rename, preset="plaid", name="Mine")
+    assert "a preset of RoSy" in error_of(bpy.ops.rosy.preset_rename, name="Plaid")
     look().length = 77
     assert bpy.ops.rosy.preset_remove() == {"FINISHED"}
     assert not list(folder().iterdir())
     assert look().length == 77
-    assert "no presets of your own" in error_of(bpy.ops.rosy.preset_remove)
+    assert "You have no presets" in error_of(bpy.ops.rosy.preset_remove)
 
 
 def test_passed_on(scene, tmp_path):
@@ -115,7 +115,7 @@ def test_files_of_strangers_are_refused(scene, tmp_path):
     for text, said in (
         ("[" * 50_000, "a.json"),
         ('{"name": "../../a", "description": "", "look": {"length": "x"}}', "'length'"),
-        ('{"name": "a", "description": "", "look": {"sparkle": 1}}', "newer RoSy"),
+        ('{"name": "a", "description": "", "look": {"sparkle": 1}}', "update RoSy"),
     ):
         path.write_text(text)
         message = error_of(bpy.ops.rosy.preset_import, filepath=str(path))

@@ -143,7 +143,7 @@ def test_refusals(drawn, scene, tmp_path):
     assert "view" in error_of(bpy.ops.rosy.strokes, camera="VIEW")
     scene.rosy.strokes.selected = True
     drawn.select_set(False)
-    assert "none of the selected" in error_of(bpy.ops.rosy.strokes)
+    assert "no selected object" in error_of(bpy.ops.rosy.strokes)
     drawn.select_set(True)
     scene.camera = None
     assert "no active camera" in error_of(bpy.ops.rosy.strokes)

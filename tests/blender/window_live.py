@@ -577,7 +577,7 @@ def without_the_card():
         running = live()._session
         yield from until(lambda: running.fallback_reason)
         assert type(running.progressive.renderer).__name__ == "CpuViewportRenderer"
-        assert "does not take the shader" in running.fallback_reason
+        assert "cannot compile the shader" in running.fallback_reason
         yield from at_rest()
         seen, drawn = captured("live-processor", view()[2]), by_hand(method="sheets")
         # Of another size, its noise is another.

@@ -174,7 +174,7 @@ def test_several_cameras(scene, camera, monkey):
     assert material_of(monkey).name == "RoSy Second"
     assert [entry.is_shown for entry in list_bakes(scene)] == [False, True]
     assert len(bpy.data.node_groups) == groups
-    with pytest.raises(RosyError, match="camera 'Third'; there are 'Second', 'Camera'"):
+    with pytest.raises(RosyError, match="camera 'Third', only from 'Second', 'Camera'"):
         show_bake(scene, "Third")
     assert second.name == "Second"
 
@@ -218,12 +218,12 @@ def change_degree(scene, camera, monkey):
 
 def delete_object(scene, camera, monkey):
     bpy.data.objects.remove(monkey)
-    return "'Suzanne' is gone"
+    return "'Suzanne' was deleted"
 
 
 def delete_camera(scene, camera, monkey):
     bpy.data.objects.remove(camera)
-    return "'Camera' is gone"
+    return "'Camera' was deleted"
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def test_bake_from_all_cameras_and_save(saved):
         (["--camera", "Suzanne"], "object 'Suzanne' is a mesh, not a camera"),
         (["--object", "Nobody"], "there is no object 'Nobody'"),
         (["--size", "0x64"], "size 0x64: a side must be"),
-        (["--preset", "none"], "no preset is named 'none'"),
+        (["--preset", "none"], "there is no preset 'none'"),
         (["--out", "{saved}"], "suzanne.blend: is not a folder"),
     ],
 )
@@ -132,7 +132,7 @@ def test_only_what_is_selected_is_drawn_on_if_the_scene_says_so(drawable, tmp_pa
     bpy.ops.object.select_all(action="DESELECT")
     bpy.ops.wm.save_mainfile()
     done = rosy(drawable, "-o", tmp_path / "out.svg", verb="strokes")
-    assert done.returncode == 2 and "none of the selected objects has a field" in done.stderr
+    assert done.returncode == 2 and "no selected object has a field" in done.stderr
     done = rosy(drawable, "-o", tmp_path / "out.svg", "--object", "Suzanne", verb="strokes")
     assert done.returncode == 0, done.stderr
 
@@ -161,16 +161,16 @@ def test_strokes_of_frames(drawable, tmp_path):
     [
         (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
         (["--object", "Nobody"], "there is no object 'Nobody'"),
-        (["field.rosy"], "suzanne.blend: FIELD is for mesh files"),
-        (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh is for mesh files"),
-        (["--view", "0,90"], "suzanne.blend: --view is for mesh files"),
+        (["field.rosy"], "suzanne.blend: FIELD applies only to mesh files"),
+        (["--field-mesh", "a.obj"], "suzanne.blend: --field-mesh applies only to mesh files"),
+        (["--view", "0,90"], "suzanne.blend: --view applies only to mesh files"),
         (["--frames", "1-3"], "out.svg: several frames need #"),
         (
             ["--frames", "9", "--spacing", "9999", "--no-outline"],
-            "frame 9: there is no room for a stroke",
+            "frame 9: no stroke fits on the surface",
         ),
-        (["-o", "a.png"], "a.png: strokes are written to .svg files"),
-        (["-o", "/nowhere/a.svg"], "there is no folder /nowhere"),
+        (["-o", "a.png"], "a.png: the name of the file must end in .svg"),
+        (["-o", "/nowhere/a.svg"], "the folder /nowhere does not exist"),
     ],
 )
 def test_bad_input_for_strokes_is_one_line(words, wanted, drawable, tmp_path):

@@ -371,7 +371,7 @@ def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
         if step.fraction > 0.9:
             work.close()
             break
-    assert "growing strokes" in labels and contents() == before
+    assert "tracing strokes" in labels and contents() == before
 
 
 @pytest.mark.parametrize(
@@ -379,11 +379,15 @@ def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
     [
         ("camera", {}, "scene 'Scene' has no active camera"),
         ("field", {}, "no visible object has a RoSy field"),
-        ("away", {}, "camera 'Camera' sees none of the strokes"),
+        ("away", {}, "camera 'Camera': no stroke is visible"),
         ("", {"kind": "SVG", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
-        ("", {"kind": "SVG", "path": "/tmp/a.png"}, "/tmp/a.png: strokes are written to .svg"),
-        ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "there is no folder /nowhere"),
-        ("", {"style": StrokeStyle(spacing=1e4)}, "no room for a stroke"),
+        (
+            "",
+            {"kind": "SVG", "path": "/tmp/a.png"},
+            "/tmp/a.png: the name of the file must end in .svg",
+        ),
+        ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
+        ("", {"style": StrokeStyle(spacing=1e4)}, "no stroke fits"),
         ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "too many"),
     ],
 )

@@ -94,7 +94,7 @@ def test_a_film_is_written_whole(tmp_path):
     film, found = frames_of(path.read_bytes())
     assert len(found) == 3 and film.size == (32, 32)
     assert (found[0][0, 0] == 255).all(), "on white paper"
-    with pytest.raises(RosyError, match=r"films are written to .mp4 and .gif"):
+    with pytest.raises(RosyError, match=r"must end in .mp4 or .gif"):
         check_video_path(tmp_path / "film.avi")
 
 

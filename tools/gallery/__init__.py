@@ -1,4 +1,4 @@
-"""The figures of Palacios and Zhang 2011 redrawn, measured and written as pages of docs/gallery.
+"""Redraw the figures of Palacios and Zhang 2011, measure them, and write docs/gallery.
 
-`python -m tools.gallery` draws all of them, `python -m tools.gallery figure-05` one.
+`python -m tools.gallery` draws all figures, `python -m tools.gallery figure-05` one of them.
 """

@@ -1,4 +1,4 @@
-"""Draw the gallery: every figure, or those named."""
+"""Draw the gallery: all figures, or the named ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 from .page import FOLDER, SOURCE
 
-#: Pages, by the names of their modules, and what they are about.
+#: Pages by the names of their modules: figure, title and topic.
 PAGES = {
     "figure-02": ("Figure 2", "One direction is not enough", "one of six directions, and all six"),
     "figure-05": ("Figure 5", "From a field to a picture", "a 3-RoSy field, step by step"),
@@ -18,13 +18,12 @@ PAGES = {
     "figure-10": ("Figure 10", "Many directions", "N = 5 and 7, and how legible each N is"),
     "figure-11": ("Figure 11", "Surfaces", "Suzanne, a triple torus, a knot, a sphere, a torus"),
 }
-#: Drawn beside the figures: the README's picture, the page of looks, and sheets beside brute force.
+#: Modules of other pages and pictures.
 OTHERS = (
     "preset-pictures",
     "hero",
     "looks-page",
     "hatching-page",
-    "presets-page",
     "peers",
     "strokes-page",
     "fields-page",
@@ -34,7 +33,7 @@ OTHERS = (
 
 
 def main() -> int:
-    """Draw what the arguments name."""
+    """Draw the pages that the arguments name."""
     parser = argparse.ArgumentParser(prog="python -m tools.gallery", description=__doc__)
     parser.add_argument("figure", nargs="*", help=", ".join([*PAGES, *OTHERS]))
     known = [*PAGES, *OTHERS]

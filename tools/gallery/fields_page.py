@@ -1,4 +1,4 @@
-"""The pictures of docs/fields.md: what the generators make."""
+"""The pictures of docs/fields.md: fields of each generator."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ IMAGES = ROOT / "docs" / "images"
 LOOK = Look(length=50, gain=2.8, supersampling=2)
 SIDE, WIDE = 256, 394
 
-#: Strokes on Suzanne, as places in her picture: start, middle and end of each.
+#: Strokes on Suzanne: start, middle and end of each, in picture coordinates.
 STROKES = (
     ((0.33, 0.22), (0.50, 0.14), (0.66, 0.22)),
     ((0.30, 0.44), (0.42, 0.33), (0.52, 0.42)),
@@ -33,12 +33,12 @@ STROKES = (
 )
 INK = (214, 84, 20)
 
-#: Of singularities, by the sign of their index.
+#: Colors of singularities, by the sign of their index.
 DOTS = {1: (235, 90, 20), -1: (40, 100, 235)}
 
 
 def write() -> None:
-    """Draw and save all of them."""
+    """Draw and save all pictures."""
     monkey, box = suzanne(), _box()
     smooth = [
         _panel(monkey, "smoothest", degree, (-26, 8), f"Smoothest, N = {degree}")
@@ -68,7 +68,7 @@ def write() -> None:
 
 
 def _strokes(monkey: Surface) -> list[Panel]:
-    """The smoothest field of Suzanne, and that which follows strokes drawn on her."""
+    """Draw the smoothest field of Suzanne, and a field that follows strokes."""
     camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
     buffer = project([MeshInstance(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
     place = np.full((camera.height * camera.width, 3), np.nan)
@@ -101,14 +101,14 @@ def _strokes(monkey: Surface) -> list[Panel]:
 
 
 def _curve(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
-    """(n, 2) points of a parabola through three places, as shares of the picture from the top left."""
+    """(n, 2) points of a parabola through three points, as fractions of the picture from the top left."""
     t = np.linspace(0, 1, 60)[:, None]
     a, b, c = (np.array(point) for point in (start, middle, stop))
     return (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
 
 
 def _free() -> list[Panel]:
-    """Two pairs of directions on a sphere, whose angle goes from 90 degrees to 25."""
+    """Draw two pairs of directions on a sphere, at angles from 90 to 25 degrees."""
     ball = sphere()
     up = 1 - np.abs(ball.face_center[:, 2])
     half = np.radians(12.5 + (45 - 12.5) * np.clip(up, 0, 1))
@@ -130,7 +130,7 @@ def _free() -> list[Panel]:
 
 
 def _tensor() -> list[Panel]:
-    """The directions in which a ring is pulled and pressed by a force at its side."""
+    """Draw the directions of tension and compression in a ring with a force at its side."""
     ring = torus()
     offset = ring.face_center - (1.2, -1.4, 0.6)
     distance = np.sqrt(dot(offset, offset))[:, None, None]
@@ -148,7 +148,7 @@ def _tensor() -> list[Panel]:
 
 
 def _singular(monkey: Surface) -> list[Panel]:
-    """Where the smoothest fields are singular."""
+    """Draw the singularities of the smoothest fields."""
     panels = []
     for degree in (2, 4):
         field = generate(monkey, "smoothest", degree)
@@ -172,7 +172,7 @@ def _singular(monkey: Surface) -> list[Panel]:
 
 
 def _box() -> Surface:
-    """A leaning box with as many faces as the sphere it is made from."""
+    """Return a leaning box, made by projecting a sphere to a cube."""
     ball = sphere()
     points = ball.vertices / np.abs(ball.vertices).max(axis=1)[:, None]
     points[:, 0] += 0.6 * points[:, 2]

@@ -14,7 +14,7 @@ DEGREE, SIZE = 6, 400
 
 
 def one_direction(index: int) -> PlanarField:
-    """A member of the field of `singularity(index)`, followed once around from the right."""
+    """Return one member of `singularity(index)` as a field, continuous around the center."""
     return lambda p: np.exp(1j * index * (np.angle(p) % (2 * np.pi)) / DEGREE)
 
 

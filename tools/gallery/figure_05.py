@@ -1,4 +1,4 @@
-"""Figure 5: the whole way from a 3-RoSy field to a picture."""
+"""Figure 5: the steps from a 3-RoSy field to a picture."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .looks import MEASURED, RED
 from .measure import correlation
 from .page import Page
 from .plane import averaged, enlarged, points, singularity
-from .sheet import Panel, grey, inset, magnified, outlined
+from .sheet import Panel, gray, inset, magnified, outlined
 
 DEGREE, FINER = 3, 2
-#: Drawn larger than shown, so that no streamline ends at a border that is seen.
+#: Size of the drawn field, larger than the picture so that streamlines do not end at its border.
 WHOLE, LARGE, SMALL = 480, 400, 256
 LOOK = enlarged(MEASURED, FINER)
-#: Contrast of everything but the uncorrected blend, so that streaks can be seen.
+#: Contrast of all pictures except the uncorrected blend.
 GAIN = 2.2
 CLOSEUP, TIMES = 52, 3
 
@@ -65,9 +65,9 @@ def write() -> None:
     page.picture(
         [
             [
-                Panel(grey(_shown(weight, SMALL)), "cos²(3θ/2), the share of I"),
-                Panel(grey(_shown(1 - weight, SMALL)), "sin²(3θ/2), the share of I′"),
-                Panel(grey(_shown(blend.images.blend, SMALL)), "the blend, not corrected"),
+                Panel(gray(_shown(weight, SMALL)), "cos²(3θ/2), the share of I"),
+                Panel(gray(_shown(1 - weight, SMALL)), "sin²(3θ/2), the share of I′"),
+                Panel(gray(_shown(blend.images.blend, SMALL)), "the blend, not corrected"),
             ]
         ],
         "The weights, and the blend before its contrast is corrected",
@@ -120,19 +120,19 @@ def _measure(
 
 
 def _set(angles: np.ndarray, guiding_angle: float) -> DegreeLayer:
-    """One set of member images alone."""
+    """Return one set of member images."""
     look = LOOK.with_settings({"weights": "none", "guiding_angle": guiding_angle})
     return compose_planar(angles, DEGREE, look).layers[0]
 
 
 def _shown(values: np.ndarray, size: int) -> np.ndarray:
-    """(size, size) middle of the (P, 1) values of a picture."""
+    """(size, size) center of the (P, 1) values of a picture."""
     margin = (WHOLE - size) // 2
     return averaged(values, WHOLE, FINER)[margin : margin + size, margin : margin + size]
 
 
 def _contrasted(values: np.ndarray, size: int) -> np.ndarray:
-    return grey(0.5 + GAIN * (_shown(values, size) - 0.5))
+    return gray(0.5 + GAIN * (_shown(values, size) - 0.5))
 
 
 def _members(layers: DegreeLayer, name: str, guide: int) -> list[Panel]:
@@ -146,7 +146,7 @@ def _members(layers: DegreeLayer, name: str, guide: int) -> list[Panel]:
 
 
 def _with_closeup(layers: DegreeLayer, side: int) -> np.ndarray:
-    """A set's mean, with a part of its breaking points, on its left or right, enlarged."""
+    """Return the mean of a set with an enlarged closeup of its breaking points, on the left or right."""
     picture = _contrasted(layers.tone, LARGE)
     left, top = LARGE // 2 + side * 110 - CLOSEUP // 2, LARGE // 2 - CLOSEUP // 2
     small = magnified(picture[top : top + CLOSEUP, left : left + CLOSEUP], TIMES)

@@ -1,4 +1,4 @@
-"""Figure 6: what blending does to contrast, and how it is set right."""
+"""Figure 6: how blending reduces contrast, and the correction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosy_addon.compositor.look import Look
 from .looks import MEASURED
 from .page import Page
 from .plane import PlanarField, channel, compose_field
-from .sheet import Panel, chart, grey
+from .sheet import Panel, chart, gray
 
 DEGREE, SIZE, WHOLE = 6, 256, 400
 LOOK = MEASURED.with_settings({"noise": "colour"})
@@ -22,7 +22,7 @@ RANGE = (0.0, 1.0)
 
 
 def constant(angle: float, degree: int) -> PlanarField:
-    """One direction everywhere; radians."""
+    """Return a constant field; the angle is in radians."""
     return lambda p: np.full(p.shape, np.exp(1j * degree * angle))
 
 
@@ -31,7 +31,7 @@ def write() -> None:
     page = Page("figure-06", "Contrast")
     layers = compose_field(constant(MEMBER, DEGREE), DEGREE, WHOLE, LOOK).layers[0]
     expected = expected_std(LOOK)
-    # Streamlines are whole in the part that is shown.
+    # In the visible part, streamlines have their full length.
     gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
     blend = layers.images.blend
     shown = [
@@ -53,7 +53,7 @@ def write() -> None:
     )
     images = [_cut(channel_wise) for _, channel_wise, _ in shown]
     panels = [
-        [Panel(grey(image), f"({letter}) {name}"), _histogram(image[..., 0], deviation)]
+        [Panel(gray(image), f"({letter}) {name}"), _histogram(image[..., 0], deviation)]
         for image, (name, _, deviation), letter in zip(images, shown, "abcdef", strict=True)
     ]
     for part, chosen in (("members", panels[:3]), ("blended", panels[3:])):
@@ -112,7 +112,7 @@ def write() -> None:
 
 
 def _corrected(degree: int, look: Look) -> list[float]:
-    """The factor of the correction, and the deviation after it over that of one member image."""
+    """Return the correction factor, and the corrected deviation relative to one member image."""
     found = []
     for seed in range(SEEDS):
         seeded = look.with_settings({"seed": seed})
@@ -127,7 +127,7 @@ def _corrected(degree: int, look: Look) -> list[float]:
 
 
 def _cut(image: np.ndarray) -> np.ndarray:
-    """(SIZE, SIZE, K) middle of a picture."""
+    """(SIZE, SIZE, K) center of a picture."""
     margin = (WHOLE - SIZE) // 2
     whole = np.stack([channel(image, WHOLE, k) for k in range(image.shape[1])], axis=-1)
     return whole[margin : margin + SIZE, margin : margin + SIZE]

@@ -20,10 +20,10 @@ SIZE = 402
 TILTS, TILTED_SIZE = (0, 60, 78), 262
 MEMBER = np.radians(30)
 
-#: From where a corner of the cube is in the middle.
+#: View angles at which a corner of the cube is in the center.
 VIEW = (45, 35)
 _FIXED = SOLID.with_settings({"gain": 3.0})
-#: Side of the closeup, how many times it is magnified, and how far it stays from the silhouette.
+#: Side of the closeup, its magnification, and its distance from the silhouette.
 CLOSEUP, TIMES, MARGIN = 52, 5, 28
 WAYS = {
     "off": _FIXED.with_settings({"view_plane": False}),
@@ -63,7 +63,7 @@ def _write_plane(page: Page) -> None:
         down, across = np.rint(half).astype(int)
         middle = side // 2
         patch = tone[middle - down : middle + down, middle - across : middle + across]
-        # Drawn at twice the size: two by two pixels are one of the picture.
+        # Drawn at twice the size: each pixel is the mean of 2 x 2.
         found = peaks(orientation_spectrum(_halved(patch), 720))
         angles = MEMBER + np.array([0, np.pi / 2])
         there = np.degrees(np.arctan2(np.sin(angles) * np.cos(np.radians(tilt)), np.cos(angles)))
@@ -131,18 +131,18 @@ def _write_sphere(page: Page) -> None:
 
 
 def _frame(layers: DegreeLayer, channel: int | None) -> np.ndarray:
-    """(H, W) one channel of the uncorrected blend, or 1 where there is any."""
+    """(H, W) one channel of the uncorrected blend, or a mask of the covered pixels."""
     values = 1.0 if channel is None else layers.images.blend[:, channel]
     return frame_of(values, layers.pixel, (SIZE * SOLID.supersampling,) * 2)
 
 
 def _fine(start: int, stop: int) -> slice:
-    """Pixels of the finished picture as pixels of the supersampled one."""
+    """Convert pixels of the finished picture to pixels of the supersampled one."""
     return slice(start * SOLID.supersampling, stop * SOLID.supersampling)
 
 
 def _worst(lost: np.ndarray, seen: np.ndarray, side: int = CLOSEUP) -> tuple[int, int, int, int]:
-    """The box (left, top, right, bottom), in the finished picture, where most is lost."""
+    """Return the box (left, top, right, bottom) of the finished picture with the lowest correlation."""
     finer = SOLID.supersampling
     inside = ndimage.binary_erosion(seen > 0, iterations=finer * MARGIN)
     spread = ndimage.uniform_filter(np.where(inside, np.nan_to_num(lost), 0), finer * side)

@@ -1,4 +1,4 @@
-"""Figure 9: the magnitude of a field as colour, as length of its streaks, and as both."""
+"""Figure 9: the magnitude of a field as color, as the length of streaks, and as both."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .plane import compose_field, draw_field, points
 from .sheet import Panel
 
 DEGREE, SIZE = 4, 400
-#: With few bright cells, the shortest streaks would be single dots.
+#: With few bright cells, the shortest streaks would be dots, so half of the cells are bright.
 LOOK = PLANE.with_settings({"density": 0.5, "gain": 2.5})
-#: Where the field is zero, in pixels from the middle, and the sense in which it turns there.
+#: Zeros of the field: positions in pixels from the center, and signs of their indices.
 ZEROS = ((-95 + 70j, 1), (80 + 95j, -1), (20 - 20j, 1), (-70 - 110j, -1), (120 - 90j, 1))
-#: How far from a zero, in pixels, the field has most of its magnitude.
+#: Distance from a zero in pixels at which the field reaches most of its magnitude.
 REACH = 90.0
 
 
 def field(p: np.ndarray) -> np.ndarray:
-    """A 4-RoSy field with three singularities of index +1/4 and two of −1/4."""
+    """Return a 4-RoSy field with three singularities of index +1/4 and two of −1/4."""
     z = np.ones(p.shape, dtype=complex)
     for place, index in ZEROS:
         away = p - place
@@ -95,12 +95,12 @@ def _measure(page: Page) -> None:
 
 
 def _half_lengths(way: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]) -> list[str]:
-    """For each range of magnitudes, the distance at which streaks have lost half of themselves."""
+    """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
     look = MEASURED.with_settings({"magnitude": way, "weights": "none"})
     image = compose_field(field, DEGREE, SIZE, look).layers[0].images.members[0, :, 0]
     image = image.reshape(SIZE, SIZE)
     angle = np.angle(z) / DEGREE
-    # Away from the borders and from the breaking points of the one image that is measured.
+    # Leave out the borders, and the breaking points of the image that is measured.
     chosen = np.abs(DEGREE * angle) < 2.0
     margin = 45
     chosen[:margin] = chosen[-margin:] = chosen[:, :margin] = chosen[:, -margin:] = False

@@ -1,4 +1,4 @@
-"""Figure 10: with many directions at a point, each gets harder to see."""
+"""Figure 10: legibility of fields with many directions."""
 
 from __future__ import annotations
 

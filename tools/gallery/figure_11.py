@@ -106,14 +106,14 @@ def write() -> None:
 
 
 def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
-    """A curvature field with the jitter of small faces taken out."""
+    """Return a slightly smoothed curvature field, without the noise of small faces."""
     return smoothed(surface, field, 6)
 
 
 def _marked(
     shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, finer: int
 ) -> np.ndarray:
-    """A picture of the unit sphere with dots at the singularities."""
+    """Return a picture of the unit sphere with dots at the singularities."""
     at = surface.vertices[find_singularities(surface, field)[0]]
     for x, y in seen_points(at, at, camera, finer):
         shown = dotted(shown, x, y, RED)

@@ -1,4 +1,4 @@
-"""The pictures of docs/hatching.md; its text is written by hand."""
+"""The pictures of docs/hatching.md, whose text is written by hand."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from .shapes import plane, sphere, suzanne
 from .sheet import Panel, display, save, sheet
 from .solid import compose_view, view
 
-#: Of a picture, pixels: two and three in a row.
+#: Sizes of pictures in pixels, for two and three in a row.
 SIDE, THIRD = 384, 256
 
-#: Of pictures that a part is shown of, and where that begins.
+#: Side of a picture of which a part is shown, and the upper left corner of that part.
 LARGE, CORNER = 720, (290, 150)
 
-#: What a hand and paper do to lines, and inks: labels, presets and what is changed in them.
+#: Pictures of hand-drawn lines and inks: labels, presets and changed settings.
 EVEN = {"breaks": 0.0, "wobble": 0.0}
 HAND = {
     "pen and ink, even": ("pen-and-ink", EVEN),
@@ -59,12 +59,12 @@ INKS = {
     ),
 }
 
-#: From how far away lines are seen that are counted in pixels and in Blender units.
+#: Camera distances for lines in pixels and in Blender units.
 AWAY = (3.6, 7.2, 14.4)
 
 
 def write() -> None:
-    """Draw them."""
+    """Draw and save the pictures."""
     monkey = suzanne()
     field = smoothed_a_little(monkey, curvature_field(monkey, 4))
     look = load_preset("cross-hatch").look
@@ -96,7 +96,7 @@ def write() -> None:
 
 
 def _on_a_table(monkey: Surface, field: RosyField) -> list[MeshInstance]:
-    """Suzanne and a ball."""
+    """Return Suzanne and a ball on a table."""
     ball, table = sphere(), plane(24)
     fields = field, smoothest_field(ball, 4), axis_field(table, 4, (1.0, 0.25, 0.0))
     surfaces, places = (
@@ -107,7 +107,7 @@ def _on_a_table(monkey: Surface, field: RosyField) -> list[MeshInstance]:
 
 
 def _ends(instances: list[MeshInstance]) -> list[Panel]:
-    """Lines that end with a shadow, and those that run on."""
+    """Draw lines that end at a shadow, and lines that overshoot it."""
     look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
     return [
         _tone_panel(instances, replace(look, overshoot=length), f"overshoot {length:g}")
@@ -118,7 +118,7 @@ def _ends(instances: list[MeshInstance]) -> list[Panel]:
 def _outlines(
     instances: list[MeshInstance], monkey: Surface, field: RosyField
 ) -> list[list[Panel]]:
-    """Without and with lines along silhouettes, and in other inks."""
+    """Draw Suzanne without and with an outline, and outlines in other inks."""
     look = replace(load_preset("cross-hatch").look, light="scene", shadows=True, shading=0.9)
     others = {
         "white-on-black": {"outline": 2.0, "hue": "families"},
@@ -140,7 +140,7 @@ def _outlines(
 
 
 def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
-    """Lines counted in pixels and in Blender units, from near and from afar."""
+    """Draw lines in pixels and in Blender units from several distances."""
     rows = []
     for unit in ("pixels", "world"):
         look = replace(load_preset("engraving").look, unit=unit, unit_size=0.008)
@@ -156,7 +156,7 @@ def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
 
 
 def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
-    """One thing after another that tones come from."""
+    """Draw the sources of tone one after the other."""
     hidden = [
         replace(instance, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]))
         for number, instance in enumerate(bare)
@@ -191,7 +191,7 @@ def _tone_panel(instances: list[MeshInstance], look: Look, label: str) -> Panel:
 
 
 def _banded(surface: Surface) -> SurfaceTone:
-    """An image of dark and light bands, laid over a surface from below to above."""
+    """Return a tone of dark and light bands, mapped to a surface from bottom to top."""
     rows = np.arange(512)[:, None] / 512
     image = np.where(rows * 6 % 1 < 0.5, 0.45, 0.95) + np.zeros(512)
     x, _, z = surface.vertices[surface.corner_vertex].T
@@ -206,7 +206,7 @@ def _at(x: float, y: float, z: float, scale: float = 1.0) -> np.ndarray:
 
 
 def _closer(surface: Surface, field: RosyField, look: Look) -> np.ndarray:
-    """The middle of a picture: large enough to see single lines."""
+    """Return a part of a large picture, which shows single lines."""
     camera = view(surface, (-26, 8), (LARGE, LARGE), look.supersampling)
     shown = display(compose_view(surface, field, look, camera).rgba)
     left, top = CORNER

@@ -1,4 +1,4 @@
-"""The picture at the head of the README."""
+"""The picture at the top of the README."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 1200, 600
 
 
 def write() -> None:
-    """Draw and save it."""
+    """Draw and save the picture."""
     monkey, rings, ring = suzanne(), triple_torus(), torus()
     looks = {"grey": SOLID.with_settings({"gain": 2.8}), "plaid": PLAID}
     shots = (

@@ -1,4 +1,4 @@
-"""The page of looks: a table of all settings, and pictures of the main ones."""
+"""Write docs/looks.md: a table of all settings, and pictures of the main ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .solid import compose_view, view
 PAGE = ROOT / "docs" / "looks.md"
 IMAGES = ROOT / "docs" / "images"
 
-#: Settings shown at several values, and what is to be seen there.
+#: Settings that are shown at several values, and the text about them.
 SHOWN = {
     "length": (
         (10, 40, 160),
@@ -42,7 +42,7 @@ SHOWN = {
 }
 SIDE = 256
 
-#: What is said of a user's own presets, a paragraph each.
+#: Paragraphs about the user's own presets.
 OWN = (
     "![The presets in the panel, each with its picture and its description](images/presets.png)",
     "To choose a preset, click the picture in the panel's *Look* section. You can undo the choice. "
@@ -104,7 +104,7 @@ def write() -> None:
 
 
 def _presets() -> str:
-    """A sheet of Suzanne in every preset, and their descriptions."""
+    """Draw Suzanne in every preset, and list their descriptions."""
     monkey = suzanne()
     curved = curvature_field(monkey, 4)
     even = smoothed_a_little(monkey, curved)
@@ -124,13 +124,13 @@ def _presets() -> str:
 
 
 def _pair(p: np.ndarray) -> np.ndarray:
-    """Singularities of index 1 / N and -1 / N, a third of the picture apart."""
+    """Return a field with singularities of index 1 / N and -1 / N, a third of the picture apart."""
     left, right = p + SIDE / 6, p - SIDE / 6
     return left / np.abs(left) * (right / np.abs(right)).conj() * np.exp(0.6j)
 
 
 def _setting(name: str, values: tuple[Any, ...], text: str) -> str:
-    """One setting at several values."""
+    """Draw one setting at several values."""
     panels = []
     for value in values:
         look = Look().with_settings({name: value})

@@ -1,11 +1,11 @@
-"""What is measured in the pictures."""
+"""Measurements of pictures: correlation, orientation spectra and persistence of streaks."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
 
-#: Cycles per pixel between which streaks of the usual grains lie.
+#: Frequency band of streaks with common grains, in cycles per pixel.
 BAND = (0.05, 0.35)
 
 
@@ -49,7 +49,7 @@ def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
     power = np.abs(np.fft.fft2((tone - tone.mean()) * window)) ** 2
     ky, kx = np.fft.fftfreq(height)[:, None], np.fft.fftfreq(width)
     radius = np.hypot(kx, ky)
-    # A streak is spread along itself and so narrow across: its spectrum stands across it.
+    # A streak is long and narrow, so its spectrum is perpendicular to it.
     angle = np.degrees(np.arctan2(ky, kx) + np.pi / 2) % 180
     used = (radius > BAND[0]) & (radius < BAND[1])
     place = (angle[used] * bins / 180).astype(int) % bins
@@ -71,10 +71,10 @@ def mean_spectrum(tone: np.ndarray, side: int, bins: int = 180) -> np.ndarray:
 
 
 def peaks(spectrum: np.ndarray, least: float = 1.5) -> list[float]:
-    """Orientations, in degrees, of the maxima that stand out of a spectrum.
+    """Return the orientations of the distinct maxima of a spectrum in degrees.
 
     The spectrum is smoothed over 5 degrees; a maximum counts if it is `least` times the mean. Its
-    place is the centre of the power within 6 degrees of it.
+    place is the center of the power within 6 degrees of it.
     """
     bins = len(spectrum)
     degree = 180 / bins
@@ -91,7 +91,7 @@ def peaks(spectrum: np.ndarray, least: float = 1.5) -> list[float]:
 
 
 def peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
-    """Power along the directions of a field over that midway between them.
+    """Return the power along the directions of a field relative to that midway between them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A page of the gallery: its words, its pictures, and the figures measured for it."""
+"""`Page`: a page of the gallery with its text, pictures and measurements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .sheet import Panel, save, sheet
 
-#: Of the repository.
+#: Root of the repository.
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "gallery"
 
@@ -18,7 +18,7 @@ SOURCE = (
 
 
 class Page:
-    """Markdown, written piece by piece."""
+    """A page in Markdown, written piece by piece."""
 
     def __init__(self, name: str, title: str) -> None:
         self.name, self.title = name, title
@@ -41,7 +41,7 @@ class Page:
         self._pieces.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
 
     def write(self, figure: str) -> None:
-        """Write the page, with its source below: which `figure` of the paper it redraws."""
+        """Write the page, with the `figure` of the paper as its source at the end."""
         self._pieces += ["---", f"Redrawn after {figure} of {SOURCE}. [All figures](README.md)"]
         (FOLDER / f"{self.name}.md").write_text("\n\n".join(self._pieces) + "\n", encoding="utf-8")
 
@@ -51,10 +51,10 @@ def _shown(value: object) -> str:
 
 
 def listed(angles: Sequence[float]) -> str:
-    """Angles in degrees, with one decimal."""
+    """Format angles in degrees with one decimal."""
     return ", ".join(f"{angle:.1f}" for angle in angles)
 
 
 def signed(index: int) -> str:
-    """An index with its sign."""
+    """Format an index with its sign."""
     return f"{index:+d}".replace("-", "−")

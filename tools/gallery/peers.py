@@ -1,4 +1,4 @@
-"""Suzanne beside what Blender's own line renderers make of her, for docs/hatching.md."""
+"""Compose the comparison of RoSy with Blender's own line renderers for docs/hatching.md."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .looks_page import IMAGES
 from .page import ROOT
 from .sheet import Panel, save, sheet
 
-#: Where `peers_blender` was told to draw.
+#: Folder into which `peers_blender` has drawn.
 DRAWN = ROOT / "dist" / "peers"
 
-#: By the names of the pictures.
+#: Labels by the names of the pictures.
 LABELS = {
     "line_art": "Line Art: contours and creases",
     "freestyle": "Freestyle: sketched contours, marked edges",
@@ -22,18 +22,18 @@ LABELS = {
     "rosy": "RoSy: the preset Cross-hatch",
 }
 
-#: Their time is the card's, and says nothing where a processor does its work.
+#: Pictures without a time, because they use the graphics card, here emulated by the processor.
 UNTIMED = ("shader",)
 
-#: Of what is shown pixel by pixel: left, top, width and height.
+#: Box of the detail that is shown pixel by pixel: left, top, width and height.
 DETAIL = (300, 70, 402, 250)
 
 
 def write() -> None:
-    """Lay out the pictures that Blender drew; without them the old sheet stays."""
+    """Compose the pictures that Blender drew. Without them, keep the old sheet."""
     if not (DRAWN / "seconds.json").exists():
         print(
-            "peers: left as it is; first: blender -b --factory-startup "
+            "peers: unchanged; run first: blender -b --factory-startup "
             "-P tools/gallery/peers_blender.py -- dist/peers"
         )
         return

@@ -1,10 +1,10 @@
-"""Suzanne as Blender's own line renderers draw her, and as RoSy does. Run by Blender 5:
+"""Draw Suzanne with Blender's own line renderers and with RoSy, in Blender 5.
 
     blender -b --factory-startup -P tools/gallery/peers_blender.py -- FOLDER [NAME ...]
 
-One mesh, one camera and one sun for all. Writes a .png for each into FOLDER, and `seconds.json`:
-the processor's time that each took, the render included. `python -m tools.gallery peers FOLDER`
-puts the pictures side by side.
+All use the same mesh, camera and sun. Writes a .png for each into FOLDER, and `seconds.json` with the
+processor time of each, including the render. `python -m tools.gallery peers FOLDER` puts the pictures
+side by side.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: Pixels, twice the size at which the pictures are shown.
+#: Size in pixels, twice that of the finished pictures.
 WIDTH, HEIGHT = 804, 660
 INK = (0.006, 0.006, 0.008)
 
-#: Toward the light, as the camera sees it: over the left shoulder, RoSy's own lamp.
+#: Direction to the light in the space of the camera: the same as RoSy's lamp.
 LAMP = Vector((-0.50, 0.60, 0.62)).normalized()
 
 #: Kinds of edges that a line set of Freestyle may draw.
@@ -45,7 +45,7 @@ Prepare = Callable[[bpy.types.Object], None]
 
 
 def main() -> None:
-    """Draw those that are named, or all."""
+    """Draw the named pictures, by default all."""
     folder, *names = sys.argv[sys.argv.index("--") + 1 :]
     load_rosy()
     kept = Path(folder).resolve() / "seconds.json"
@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def drawn(prepare: Prepare, path: Path) -> float:
-    """Processor seconds of preparing and rendering, the second time: shaders are compiled then."""
+    """Return the processor time of a second run, when shaders are already compiled, in seconds."""
     for _ in range(2):
         monkey = new_scene()
         start = time.process_time()
@@ -69,7 +69,7 @@ def drawn(prepare: Prepare, path: Path) -> float:
 
 
 def load_rosy() -> None:
-    """The repository's root as the package `rosy`, switched on."""
+    """Import the root of the repository as the package `rosy`, and register it."""
     spec = importlib.util.spec_from_file_location(
         "rosy", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
     )
@@ -80,14 +80,14 @@ def load_rosy() -> None:
 
 
 def new_scene() -> bpy.types.Object:
-    """Suzanne, white and subdivided, before a camera, under a sun, on white."""
+    """Open a scene with a white, subdivided Suzanne, a camera, a sun and a white background."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     scene = bpy.context.scene
     scene.rosy.bakes.clear()
     bpy.ops.mesh.primitive_monkey_add()
     monkey = bpy.context.object
-    # Two levels are the mesh, as its edges can be marked, and one is on top.
+    # Two levels are applied, so that edges can be marked; a modifier adds one more.
     subdivide(monkey, 2)
     bpy.ops.object.modifier_apply(modifier=monkey.modifiers[0].name)
     subdivide(monkey, 1)
@@ -127,7 +127,7 @@ def subdivide(thing: bpy.types.Object, levels: int) -> None:
 
 
 def use_cycles() -> None:
-    """Enough for flat colours: they have no noise."""
+    """Choose Cycles with few samples, enough for flat colors, which have no noise."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.samples = "CPU", 16
@@ -136,20 +136,20 @@ def use_cycles() -> None:
     scene.cycles.max_bounces = 0
 
 
-def plain(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
-    """A material that is of one colour, lit or not."""
+def plain(name: str, color: tuple[float, float, float]) -> bpy.types.Material:
+    """Return a material of one color, which light does not change."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     glow = nodes.new("ShaderNodeEmission")
-    glow.inputs["Color"].default_value = (*colour, 1)
+    glow.inputs["Color"].default_value = (*color, 1)
     links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
 
 
 def line_art(monkey: bpy.types.Object) -> None:
-    """Contours and creases, thinner toward their ends."""
+    """Draw contours and creases with Line Art, thinner toward their ends."""
     bpy.ops.object.select_all(action="DESELECT")
     monkey.select_set(True)
     bpy.context.view_layer.objects.active = monkey
@@ -170,7 +170,7 @@ def line_art(monkey: bpy.types.Object) -> None:
 
 
 def freestyle(monkey: bpy.types.Object) -> None:
-    """Sketched contours, and as hatching the edges of the mesh that lie in the shade, marked."""
+    """Draw with Freestyle: sketched contours, and marked edges in the shade as hatching."""
     mark_shaded_edges(monkey)
     scene, layer = bpy.context.scene, bpy.context.view_layer
     scene.render.use_freestyle = layer.use_freestyle = True
@@ -188,7 +188,7 @@ def freestyle(monkey: bpy.types.Object) -> None:
 
 
 def mark_shaded_edges(monkey: bpy.types.Object) -> None:
-    """Mark level edges that face away from the sun: Freestyle has no light of its own."""
+    """Mark horizontal edges that face away from the sun, because Freestyle does not use light."""
     toward = bpy.data.objects["Sun"].matrix_world.to_3x3() @ Vector((0, 0, 1))
     mesh = monkey.data
     marks = mesh.attributes.get("freestyle_edge") or mesh.attributes.new(
@@ -202,7 +202,7 @@ def mark_shaded_edges(monkey: bpy.types.Object) -> None:
 
 
 def chosen(lines: bpy.types.FreestyleLineSet, *kinds: str) -> None:
-    """Which edges a line set draws."""
+    """Select the edges that a line set draws."""
     for name in EDGES:
         setattr(lines, f"select_{name}", name in kinds)
 
@@ -210,7 +210,7 @@ def chosen(lines: bpy.types.FreestyleLineSet, *kinds: str) -> None:
 def sketched(
     lines: bpy.types.FreestyleLineSet, thickness: float, rounds: int, shake: float
 ) -> None:
-    """Lines drawn several times over by an unsteady hand, thinner toward their ends."""
+    """Make lines look sketched: drawn several times, shaky, thinner toward their ends."""
     style = lines.linestyle or bpy.data.linestyles.new(lines.name)
     lines.linestyle = style
     style.color, style.thickness = INK, thickness
@@ -227,7 +227,7 @@ def sketched(
 
 
 def shader(monkey: bpy.types.Object) -> None:
-    """EEVEE: light turned into colour, and bands of the window that get wider where it is darker."""
+    """Draw with EEVEE: light as color, and bands across the window that get wider in the dark."""
     scene = bpy.context.scene
     scene.render.engine = "BLENDER_EEVEE"
     scene.eevee.taa_render_samples = 16
@@ -252,7 +252,7 @@ def shader(monkey: bpy.types.Object) -> None:
     links.new(light.outputs[0], tone.inputs[0])
     places = nodes.new("ShaderNodeTexCoord").outputs["Window"]
     paper = None
-    # Bands at three angles, each from darker tones on.
+    # Bands at three angles, each starting at a darker tone.
     for degrees, darker in ((40, 0.72), (-50, 0.45), (-5, 0.22)):
         turned = nodes.new("ShaderNodeVectorRotate")
         turned.rotation_type = "Z_AXIS"
@@ -274,14 +274,14 @@ def shader(monkey: bpy.types.Object) -> None:
     links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     monkey.data.materials.clear()
     monkey.data.materials.append(material)
-    # The world would light the shadows.
+    # Light of the world would brighten the shadows.
     world = bpy.context.scene.world.node_tree
     rays, switch = world.nodes.new("ShaderNodeLightPath"), world.nodes["Background"]
     world.links.new(rays.outputs["Is Camera Ray"], switch.inputs["Strength"])
 
 
 def rosy(monkey: bpy.types.Object) -> None:
-    """A field, a preset, a bake."""
+    """Draw with RoSy: make a field, apply a preset, bake."""
     bpy.context.view_layer.objects.active = monkey
     monkey.select_set(True)
     bpy.ops.rosy.field_generate(kind="curvature", reach=0.03)

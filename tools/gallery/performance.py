@@ -1,7 +1,7 @@
-"""The pictures of docs/performance.md: sheets beside the other two ways, pixel by pixel.
+"""The pictures of docs/performance.md: sheets next to brute force and members.
 
-`python -m tools.gallery.performance FOLDER` also draws those of meshes and fields of others, from
-a folder with `meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
+`python -m tools.gallery.performance FOLDER` also draws the bunny and the vase, from a folder with
+`meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from .solid import around_field, compose_view, smoothed, view
 
 IMAGES = ROOT / "docs" / "images"
 
-#: One sample a pixel, so that nothing is hidden.
+#: Look with one sample per pixel, which hides no artifacts.
 LOOK = Look(length=40, gain=2.5)
-#: The paper's noise and contrast, in which grain and breaking points show most.
+#: Look with the noise and contrast of the paper, which show grain and breaking points best.
 PLAIN = Look(length=40, gain=1.5, density=0.5, high_pass=0.0)
 
 METHODS = ("brute", "members", "sheets")
@@ -37,7 +37,7 @@ SIDE, CLOSE = 400, 128
 
 
 def write() -> None:
-    """Draw and save what needs no files."""
+    """Draw and save the pictures that need no files."""
     _singularities()
     ball, ring = sphere(), torus()
     rows = [_planar_row(_pair, 4, "Singularities of index 1/4 and -1/4 in the plane, N = 4")]
@@ -66,14 +66,14 @@ def write_others(folder: Path) -> None:
 
 
 def _upright(surface: Surface) -> Surface:
-    """A surface whose y axis points up, standing."""
+    """Rotate a surface whose y axis points up so that z points up."""
     x, y, z = surface.vertices.T
     points = np.stack([x, -z, y], axis=1)
     return build_surface(points, surface.corner_vertex, surface.face_start, name=surface.name)
 
 
 def _singularities() -> None:
-    """Close to singularities, where the ways differ, twice as large."""
+    """Draw closeups of singularities, where the methods differ, enlarged twice."""
     rows = []
     for degree, index in ((3, 1), (4, 1), (4, -1), (6, -1)):
         z = singularity(index)(points(SIDE))

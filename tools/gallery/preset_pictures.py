@@ -1,4 +1,4 @@
-"""The pictures of the presets that come with RoSy, which lie beside them and are in the zip."""
+"""The preview pictures of the shipped presets, which are part of the zip."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from rosy_addon.presets.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
-#: Of a picture of few hues; and between tones of a channel, where many hues blend. Neither is to
-#: be seen, and both make the files a third as large.
-COLOURS, TONE = 64, 8
+#: Size of the palette of pictures with few hues, and step of the tones of others. Neither is
+#: visible, and both reduce the files to a third.
+COLORS, TONE = 64, 8
 
 
 def write() -> None:
-    """Draw them all."""
+    """Draw all pictures."""
     for path in preset_files().values():
         _small(read_preset(path).look).save(preview_path(path), optimize=True)
 
@@ -27,4 +27,4 @@ def _small(look: Look) -> Image.Image:
     if look.noise == "colour":
         return Image.fromarray(np.minimum(np.rint(shown / TONE) * TONE, 255).astype(np.uint8))
     few = Image.Quantize.MEDIANCUT
-    return Image.fromarray(shown).quantize(COLOURS, few, kmeans=2, dither=Image.Dither.NONE)
+    return Image.fromarray(shown).quantize(COLORS, few, kmeans=2, dither=Image.Dither.NONE)

@@ -1,8 +1,14 @@
-"""The page of presets: each one large on one model and small on two others."""
+"""Write docs/presets.md: each preset large on one model and small on two others.
+
+`python -m tools.gallery.presets_page FOLDER` draws and writes it. The folder contains
+`meshes/spot.obj` and `meshes/stanford-bunny.obj`, which are not part of this repository.
+"""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -26,33 +32,30 @@ from .sheet import display
 
 PAGE = ROOT / "docs" / "presets.md"
 
-#: Where the meshes of others are, which are not passed on with this program.
-MESHES = ROOT.parent / "shared" / "data" / "meshes"
-
-#: Of the large picture and of the two small ones, pixels.
+#: Sizes of the large picture and of the two small ones in pixels.
 LARGE, SMALL = (820, 640), (410, 320)
 
-#: Of the frame, free at each border.
+#: Empty margin at each border, as a fraction of the frame.
 MARGIN = 0.04
 
-#: How far curvature reaches into what is hardly curved.
+#: Smoothing length of the curvature field.
 REACH = 0.1
 
-#: Of a file: hatching is ink, paper and the edges between.
-INKS, COLOURS = 32, 192
+#: Palette sizes of the .png files: of hatching (ink, paper and the edges between) and of others.
+HATCHING_COLORS, COLORS = 32, 192
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is drawn, and from where.
+    """A mesh with its fields, and the view of it.
 
     Attributes
     ----------
     name : str
     instance : MeshInstance
-        With the field that presets of ink show.
+        With a smoothed curvature field, for presets that do not show the magnitude.
     raw : MeshInstance
-        With the magnitudes that curvature gives.
+        With an unsmoothed curvature field and its magnitude.
     view : (float, float)
         Azimuth and elevation in degrees.
     """
@@ -63,10 +66,10 @@ class Model:
     view: tuple[float, float]
 
 
-#: Files of `MESHES`, by what they show, and from where.
+#: Mesh files in the folder, with their views, by the name of the model.
 FILES = {"Spot": ("spot.obj", (-128.0, 12.0)), "Bunny": ("stanford-bunny.obj", (-18.0, 10.0))}
 
-#: Presets that are shown large on something else than Suzanne.
+#: Models of the large pictures, for presets with another model than Suzanne.
 LARGE_ON = {
     "charcoal": "Bunny",
     "engraving": "Bunny",
@@ -76,13 +79,9 @@ LARGE_ON = {
 }
 
 
-def write() -> None:
-    """Draw and write the page; without the meshes of others there is none."""
-    missing = [MESHES / file for file, _ in FILES.values() if not (MESHES / file).exists()]
-    if missing:
-        print(f"presets-page: left as it is, since there is no {missing[0]}")
-        return
-    models = _models()
+def write(folder: Path) -> None:
+    """Draw and write the page, with the meshes of a folder."""
+    models = _load_models(folder / "meshes")
     pieces = [
         "# Presets",
         "Here you can compare all presets that come with RoSy, on Suzanne (subdivided three "
@@ -96,17 +95,18 @@ def write() -> None:
         "    python -m rosy_addon render bunny.obj -o bunny.png --generate curvature --reach "
         f"{REACH:g} --preset engraving --size 1600x1200",
         "Lengths are in pixels of the finished picture. A picture of twice the size shows twice as "
-        "many lines, not broader ones. `python -m tools.gallery presets-page` draws this page.",
+        "many lines, not broader ones. `python -m tools.gallery.presets_page FOLDER` draws this "
+        "page, given a folder with `meshes/spot.obj` and `meshes/stanford-bunny.obj`.",
     ]
     for name in preset_keys():
         pieces.append(_section(name, load_preset(name), models))
     PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
 
 
-def _models() -> dict[str, Model]:
+def _load_models(meshes: Path) -> dict[str, Model]:
     models = {"Suzanne": _model("Suzanne", suzanne(), np.eye(4), (-26.0, 8.0))}
     for name, (file, view) in FILES.items():
-        path = MESHES / file
+        path = meshes / file
         models[name] = _model(
             name, read_mesh(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]], view
         )
@@ -129,11 +129,11 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
     first = models[LARGE_ON.get(name, "Suzanne")]
     others = [model for model in models.values() if model is not first]
     look = preset.look
-    small = np.concatenate([_drawn(model, look, SMALL) for model in others], axis=1)
-    sheet = Image.fromarray(np.concatenate([_drawn(first, look, LARGE), small]))
+    small = np.concatenate([_draw(model, look, SMALL) for model in others], axis=1)
+    sheet = Image.fromarray(np.concatenate([_draw(first, look, LARGE), small]))
     path = IMAGES / f"preset-{name}.png"
-    colours = INKS if look.ink == "hatch" else COLOURS
-    sheet.quantize(colours, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
+    colors = HATCHING_COLORS if look.ink == "hatch" else COLORS
+    sheet.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
         path, optimize=True
     )
     reach = 0.0 if look.magnitude != "none" else REACH
@@ -149,8 +149,8 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
     )
 
 
-def _drawn(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) uint8 of a model on the paper of a look."""
+def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
+    """(H, W, 3) uint8 picture of a model, on the paper of a look."""
     instance = model.instance if look.magnitude == "none" else model.raw
     points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
@@ -164,5 +164,9 @@ def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
     if look.ink != "hatch":
         return rgba
     alpha = rgba[..., 3:]
-    colour = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_colour)) * (1 - alpha)
-    return np.concatenate([colour, np.ones_like(alpha)], axis=-1)
+    color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_colour)) * (1 - alpha)
+    return np.concatenate([color, np.ones_like(alpha)], axis=-1)
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]))

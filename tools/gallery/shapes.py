@@ -1,4 +1,4 @@
-"""Meshes that anyone may pass on: made here, or Blender's own."""
+"""Meshes without license restrictions: made in code, or Blender's own."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from rosy_addon.field.surface import Surface, build_surface
 
 
 def plane(cells: int = 8) -> Surface:
-    """The square from -1 to 1 in x and y, facing up."""
+    """Return the square from -1 to 1 in x and y, facing up."""
     along = np.linspace(-1, 1, cells + 1)
     x, y = np.meshgrid(along, along, indexing="ij")
     return _grid("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
 
 
 def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: int = 72) -> Surface:
-    """A torus about the z axis."""
+    """Return a torus around the z axis."""
     u = np.arange(around)[:, None] * (2 * np.pi / around)
     v = np.arange(across) * (2 * np.pi / across)
     out = radius + tube * np.cos(v)
@@ -25,11 +25,11 @@ def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: in
 
 
 def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
-    """A tube about a trefoil knot."""
+    """Return a tube around a trefoil knot."""
     t = np.arange(around) * (2 * np.pi / around)
     curve, ahead = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
-    # The knot winds about a torus: the way out of that torus is never along the knot.
+    # The knot winds around a torus, so the normal of that torus is never parallel to the knot.
     middle = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
     out = curve - middle
     out -= np.sum(out * ahead, axis=1)[:, None] * ahead
@@ -46,7 +46,7 @@ def _trefoil(t: np.ndarray) -> np.ndarray:
 
 
 def sphere(cells: int = 48) -> Surface:
-    """The unit sphere, as a cube whose faces have been cut into even angles."""
+    """Return the unit sphere, as a cube whose faces are divided at equal angles."""
     along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     u, v = np.meshgrid(along, along, indexing="ij")
     sides = []
@@ -58,7 +58,7 @@ def sphere(cells: int = 48) -> Surface:
     vertices = np.concatenate([side.reshape(-1, 3) for side in sides])
     cell = _cells(cells + 1, cells + 1, (False, False))
     faces = np.concatenate([cell + number * (cells + 1) ** 2 for number in range(6)])
-    # Sides share the vertices of their common edges.
+    # Adjacent sides share the vertices of their common edge.
     _, first, same = np.unique(
         np.rint(vertices * 1e6), axis=0, return_index=True, return_inverse=True
     )
@@ -67,7 +67,7 @@ def sphere(cells: int = 48) -> Surface:
 
 
 def triple_torus(cells: int = 110) -> Surface:
-    """Three rings that have grown together, a level set of a smooth function."""
+    """Return three merged rings, a level set of a smooth function."""
     low, high = np.array([-2.8, -2.8, -0.8]), np.array([2.8, 2.8, 0.8])
     spacing = (high[0] - low[0]) / cells
     counts = np.rint((high - low) / spacing).astype(int) + 1
@@ -77,7 +77,7 @@ def triple_torus(cells: int = 110) -> Surface:
     vertices = vertices.astype(np.float64) + low
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = np.bincount(ends[:, 0], minlength=len(vertices))[:, None]
-    # Marching cubes leave slivers: vertices drift to the middle of their neighbours, and back.
+    # Marching cubes leave slivers: smooth the vertices, then project them back.
     for _ in range(12):
         middle = np.zeros_like(vertices)
         np.add.at(middle, ends[:, 0], vertices[ends[:, 1]])
@@ -88,11 +88,11 @@ def triple_torus(cells: int = 110) -> Surface:
 
 
 def _rings(points: np.ndarray, tube: float = 0.43, blend: float = 0.16) -> np.ndarray:
-    """(P,) how far points are from three rings of radius 1, smoothly joined; 0 on the surface."""
+    """(P,) signed distance of points from three smoothly merged rings of radius 1."""
     total = np.zeros(len(points))
     for turn in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
-        centre = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
-        away = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1]) - 1
+        center = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
+        away = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1]) - 1
         total += np.exp(-np.hypot(away, points[:, 2]) / blend)
     return -blend * np.log(total) - tube
 
@@ -116,7 +116,7 @@ def _onto_level(points: np.ndarray) -> np.ndarray:
 
 
 def suzanne(subdivisions: int = 3) -> Surface:
-    """Blender's monkey, subdivided."""
+    """Return Blender's monkey, subdivided."""
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -135,13 +135,13 @@ def suzanne(subdivisions: int = 3) -> Surface:
 
 
 def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray) -> Surface:
-    """A surface whose faces all have as many corners."""
+    """Return a surface whose faces all have the same number of corners."""
     start = np.arange(len(faces) + 1) * faces.shape[1]
     return build_surface(vertices, faces.ravel(), start, name=name)
 
 
 def _grid(name: str, point: np.ndarray, closed: tuple[bool, bool]) -> Surface:
-    """Quads over an (A, B, 3) grid of points."""
+    """Return quads over an (A, B, 3) grid of points."""
     return _polygons(name, point.reshape(-1, 3), _cells(*point.shape[:2], closed))
 
 

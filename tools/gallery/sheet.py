@@ -1,4 +1,4 @@
-"""Pictures side by side with a label under each, never scaled but by whole factors."""
+"""Sheets of labeled pictures, scaled only by whole factors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from rosy_addon.color import to_display
 
-#: The widest sheet that is shown unscaled beside the text of a page.
+#: Largest width of a sheet that a page shows unscaled, in pixels.
 WIDEST = 820
 
 GAP, LABEL_SIZE, LINE = 16, 13, 18
@@ -22,59 +22,59 @@ INK, PAPER = (40, 40, 40), (255, 255, 255)
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A picture (H, W, 3) uint8, rows from the top, and what is written under it."""
+    """A picture, (H, W, 3) uint8 with rows from the top, and its label."""
 
     picture: np.ndarray
     label: str = ""
 
 
 def font(size: int = LABEL_SIZE) -> ImageFont.FreeTypeFont:
-    """The labels' font, which comes with matplotlib."""
+    """Return the font of the labels, which comes with matplotlib."""
     return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)
 
 
 def display(rgba: np.ndarray) -> np.ndarray:
-    """(H, W, 3) uint8 from the top, on white paper, of a (H, W, 4) `Picture.rgba`."""
+    """Convert a (H, W, 4) `Picture.rgba` to (H, W, 3) uint8 from the top, on white paper."""
     alpha = rgba[..., 3:]
     shown = to_display(rgba[..., :3] * alpha + (1 - alpha))
     return np.rint(shown[::-1] * 255).astype(np.uint8)
 
 
-def grey(tone: np.ndarray) -> np.ndarray:
-    """(H, W, 3) uint8 from the top, of (H, W) or (H, W, K) display values from the bottom."""
+def gray(tone: np.ndarray) -> np.ndarray:
+    """Convert (H, W) or (H, W, K) display values from the bottom to (H, W, 3) uint8 from the top."""
     tone = tone[..., None] if tone.ndim == 2 else tone
     shown = np.rint(np.clip(tone[::-1], 0, 1) * 255).astype(np.uint8)
     return np.repeat(shown, 3 // shown.shape[2], axis=2)
 
 
 def magnified(picture: np.ndarray, factor: int) -> np.ndarray:
-    """A picture a whole number of times as large."""
+    """Enlarge a picture by a whole factor."""
     height, width = picture.shape[:2]
     large = (width * factor, height * factor)
     return np.asarray(Image.fromarray(picture).resize(large, Image.Resampling.BICUBIC))
 
 
 def outlined(
-    picture: np.ndarray, box: tuple[int, int, int, int], colour: tuple[int, int, int]
+    picture: np.ndarray, box: tuple[int, int, int, int], color: tuple[int, int, int]
 ) -> np.ndarray:
-    """A picture with a rectangle (left, top, right, bottom) drawn around some pixels."""
+    """Draw a rectangle (left, top, right, bottom) on a picture."""
     image = Image.fromarray(picture)
     left, top, right, bottom = box
     outline = (left - 2, top - 2, right + 1, bottom + 1)
-    ImageDraw.Draw(image).rectangle(outline, outline=colour, width=2)
+    ImageDraw.Draw(image).rectangle(outline, outline=color, width=2)
     return np.array(image)
 
 
-def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, colour) -> np.ndarray:
-    """A picture with a small framed one in it."""
+def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, color) -> np.ndarray:
+    """Put a small framed picture into a picture."""
     picture = picture.copy()
     height, width = small.shape[:2]
     picture[top : top + height, left : left + width] = small
-    return outlined(picture, (left, top, left + width, top + height), colour)
+    return outlined(picture, (left, top, left + width, top + height), color)
 
 
-def dotted(picture: np.ndarray, x: float, y: float, colour: tuple[int, int, int]) -> np.ndarray:
-    """A picture with a dot at some pixels from the upper left."""
+def dotted(picture: np.ndarray, x: float, y: float, color: tuple[int, int, int]) -> np.ndarray:
+    """Draw a dot at a position in pixels from the upper left."""
     size = 4
     disc = Image.new("L", (2 * size + 3,) * 2)
     disc = disc.resize((disc.width * 8,) * 2)
@@ -82,12 +82,12 @@ def dotted(picture: np.ndarray, x: float, y: float, colour: tuple[int, int, int]
     disc = disc.resize((2 * size + 3,) * 2, Image.Resampling.BOX)
     image = Image.fromarray(picture)
     place = (round(x) - size - 1, round(y) - size - 1)
-    image.paste(Image.new("RGB", disc.size, colour), place, disc)
+    image.paste(Image.new("RGB", disc.size, color), place, disc)
     return np.array(image)
 
 
 def sheet(rows: Sequence[Sequence[Panel]]) -> Image.Image:
-    """Rows of panels with their labels, as one image.
+    """Compose rows of panels with their labels as one image.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def sheet(rows: Sequence[Sequence[Panel]]) -> Image.Image:
 
 
 def _wrapped(text: str, width: int) -> list[str]:
-    """Lines of text no wider than a picture."""
+    """Wrap text into lines no wider than a picture."""
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word
@@ -132,7 +132,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def save(image: Image.Image, path: Path) -> None:
-    """Write a .png, in grey where it has no colour and with 256 colours where it has."""
+    """Write a .png, gray if it has no color, otherwise with a palette of 256 colors."""
     pixels = np.asarray(image)
     if (pixels == pixels[..., :1]).all():
         image = image.convert("L")
@@ -142,7 +142,7 @@ def save(image: Image.Image, path: Path) -> None:
 
 
 def chart(figure, width: int, height: int) -> np.ndarray:
-    """A matplotlib figure as (height, width, 3) uint8, drawn at that size."""
+    """Render a matplotlib figure as (height, width, 3) uint8."""
     figure.set_size_inches(width / 100, height / 100)
     buffer = io.BytesIO()
     figure.savefig(buffer, dpi=100, format="png", metadata={"Software": None})

@@ -25,7 +25,7 @@ from rosy_addon.projection.project import project
 
 
 def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField:
-    """The RoSy of degree N in which axes through the origin project to z = sum of (a.x + i a.y)^N.
+    """Return the RoSy of degree N with z = sum of (a.x + i a.y)^N over projected axes a.
 
     On the sphere, the three axes of a cube and N = 4 give the pattern of a cube, singular at its
     eight corners; the six axes of an icosahedron and N = 6 one that is singular at twelve points.
@@ -43,16 +43,16 @@ def icosahedron_axes() -> np.ndarray:
 
 
 def around_field(surface: Surface, degree: int) -> RosyField:
-    """One member around the z axis."""
+    """Return the field with one member around the z axis."""
     ahead = np.cross([0.0, 0.0, 1.0], surface.face_center)
     ahead -= np.sum(ahead * surface.face_normal, axis=1)[:, None] * surface.face_normal
     return RosyField(degree, normalize(ahead))
 
 
 def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
-    """A field of magnitude 1 averaged with its surroundings many times over.
+    """Smooth a field by repeated averaging, with magnitude 1.
 
-    Singularities of opposite signs meet and vanish.
+    Singularities of opposite signs cancel.
     """
     x, y = face_frames(surface)
     turn = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
@@ -70,22 +70,22 @@ def view(
     finer: int,
     perspective: bool = True,
 ) -> Camera:
-    """A camera at an azimuth and elevation with a surface in its frame, `finer` times `size`."""
+    """Return a camera that frames a surface, with `finer` times `size` pixels."""
     width, height = (finer * side for side in size)
     return orbit_camera(surface, *angles, width, height, perspective=perspective, margin=0.006)
 
 
 def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:
-    """What a camera sees of a field; the camera is as fine as the look's supersampling."""
+    """Draw a field; the resolution of the camera includes the supersampling of the look."""
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
 def seen_points(
     points: np.ndarray, normals: np.ndarray, camera: Camera, finer: int
 ) -> list[tuple[float, float]]:
-    """(x, y) in pixels from the upper left of those points of a convex surface that face the eye.
+    """(x, y) of the visible points of a convex surface, in pixels from the upper left.
 
-    `finer` is how many pixels of the camera one of the picture has.
+    `finer` is the number of camera pixels per picture pixel.
     """
     place = points @ camera.view[:3, :3].T + camera.view[:3, 3]
     facing = np.sum(place * (normals @ camera.view[:3, :3].T), axis=1) < 0

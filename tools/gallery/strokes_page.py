@@ -1,4 +1,4 @@
-"""The pictures of docs/strokes.md; its text is written by hand."""
+"""The pictures of docs/strokes.md, whose text is written by hand."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .looks_page import IMAGES
 from .shapes import suzanne
 from .sheet import Panel, save, sheet
 
-#: Of a picture, and how many subpixels a pixel of it has, each way.
+#: Size of a picture, and subpixels per pixel in each direction.
 SIDE, FINE = 402, 4
 
-#: Pixels.
+#: Width of the strokes in pixels.
 WIDTH = 1.3
 
-#: What is shown, by labels: how Suzanne is drawn.
+#: Styles of the strokes on Suzanne, by label.
 DRAWN = {
     "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
     "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, tone=True, light="lamp"),
@@ -32,7 +32,7 @@ DRAWN = {
 
 
 def write() -> None:
-    """Draw them."""
+    """Draw and save the pictures."""
     surface = suzanne()
     instance = MeshInstance(
         surface,
@@ -48,7 +48,7 @@ def write() -> None:
 
 
 def rastered(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """(H, W, 3) uint8 from the top: black strokes on white paper, as round pens draw them."""
+    """Rasterize strokes: (H, W, 3) uint8 from the top, black on white, drawn with a round pen."""
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     pixels *= FINE

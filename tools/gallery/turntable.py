@@ -1,4 +1,4 @@
-"""The film of docs/animation.md."""
+"""The turntable of docs/animation.md."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOOK = Look(length=40, gain=2.8, supersampling=2)
 
 
 def write() -> None:
-    """Suzanne from all around."""
+    """Draw the turntable of Suzanne."""
     monkey = suzanne()
     instance = MeshInstance(monkey, np.eye(4), generate(monkey, "smoothest", 4))
     views = turntable_views(instance, LOOK, 24, (240, 240), (-26.0, 10.0))

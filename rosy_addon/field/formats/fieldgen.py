@@ -66,7 +66,7 @@ def read_fieldgen(path: Path) -> RawField:
         elif kind == b"field" and len(words) == 5 and words[1].isdigit():
             vertex_lines.append((row, words[1:]))
     if degree is None or not vertex_lines:
-        raise RosyError(f"{path}: is a mesh without a field: there are no lines '# field i x y z'")
+        raise RosyError(f"{path}: has no field: there are no lines '# field i x y z'")
     vertex_rows = TextRows(
         path,
         [words for _, words in vertex_lines],
@@ -77,8 +77,8 @@ def read_fieldgen(path: Path) -> RawField:
     count = len(polygons.vertices)
     if vertex.min() < 0 or vertex.max() >= count or len(np.unique(vertex)) != count:
         raise RosyError(
-            f"{path}: has {len(vertex)} lines '# field', for vertices {vertex.min() + 1} to "
-            f"{vertex.max() + 1}; there are {count}, and one of each is wanted"
+            f"{path}: expected one '# field' line for each of {count} vertices, found {len(vertex)} "
+            f"lines for vertices {vertex.min() + 1} to {vertex.max() + 1}"
         )
     values = np.zeros((count, 1, 3))
     values[vertex, 0] = numbers[:, 1:]

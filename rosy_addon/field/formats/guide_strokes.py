@@ -31,5 +31,7 @@ def read_guide_strokes(path: Path) -> list[np.ndarray]:
     ends = np.flatnonzero(np.diff(rows.line_numbers) > 1) + 1
     strokes = [stroke for stroke in np.split(points, ends) if len(stroke) > 1]
     if not strokes:
-        raise RosyError(f"{path}: holds no stroke: two rows x y z below each other are one")
+        raise RosyError(
+            f"{path}: contains no stroke: a stroke is two or more consecutive rows x y z"
+        )
     return strokes

@@ -33,7 +33,7 @@ def read_obj(path: Path) -> Polygons:
     corners = _select_rows(rows, is_face)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
-            raise corners.error(row, f"a face has {len(words)} corners, at least 3 are wanted")
+            raise corners.error(row, f"a face has {len(words)} corners, expected 3 or more")
     sizes = [len(words) for words in corners.words]
     index = _position_indices(corners).ints("vertex of a face")
     # A negative index is relative to the number of vertices above its line.
@@ -44,7 +44,7 @@ def read_obj(path: Path) -> Polygons:
         corner = int(np.argmax(out_of_range))
         raise corners.error(
             corners.row_of_word(corner),
-            f"a face refers to vertex {index[corner]}, there are {len(vertices)}, counted from 1",
+            f"a face refers to vertex {index[corner]}, but the vertices are numbered 1 to {len(vertices)}",
         )
     return Polygons(vertices, corner_vertex, offsets_from_sizes(sizes))
 
@@ -106,6 +106,6 @@ def read_uv(path: Path) -> np.ndarray | None:
         corner = int(np.argmax(out_of_range))
         raise uv_rows.error(
             uv_rows.row_of_word(corner),
-            f"a corner refers to texture coordinate {index[corner]}, there are {len(uv)}",
+            f"a corner refers to texture coordinate {index[corner]}, but they are numbered 1 to {len(uv)}",
         )
     return uv[uv_index]

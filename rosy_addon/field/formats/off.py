@@ -29,16 +29,16 @@ def read_off(path: Path) -> Polygons:
     """
     rows = _after_keyword(read_rows(path))
     if not len(rows):
-        raise RosyError(f"{path}: ends before the counts of vertices and faces")
-    counts = rows[:1].ints("count of vertices, faces or edges")
+        raise RosyError(f"{path}: ends before the numbers of vertices and faces")
+    counts = rows[:1].ints("number of vertices, faces or edges")
     if len(counts) < 2 or counts.min() < 0:
-        raise rows.error(0, "the counts of vertices, faces and edges are wanted")
+        raise rows.error(0, "expected the numbers of vertices, faces and edges")
     vertex_count, face_count = counts[:2].tolist()
     body = rows[1:]
     if len(body) < vertex_count + face_count:
         raise RosyError(
-            f"{path}: says {vertex_count} vertices and {face_count} faces, but ends after "
-            f"{len(body)} rows of them"
+            f"{path}: declares {vertex_count} vertices and {face_count} faces, but ends after "
+            f"{len(body)} rows"
         )
     vertices = body[:vertex_count].points("vertex")
     return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))
@@ -50,21 +50,25 @@ def _after_keyword(rows: TextRows) -> TextRows:
         return rows
     keyword, *rest = rows.words[0]
     if not _KEYWORD.match(keyword):
-        raise rows.error(0, f"found {abbreviate(keyword)}, wanted OFF")
+        raise rows.error(0, f"expected OFF, found {abbreviate(keyword)}")
     if rest and rest[0].upper() == b"BINARY":
-        raise rows.error(0, "binary .off files are not read")
+        raise rows.error(0, "binary .off files are not supported")
     return TextRows(rows.path, [rest, *rows.words[1:]], rows.line_numbers) if rest else rows[1:]
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
     sizes = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers).ints(
-        "corners of a face"
+        "number of corners of a face"
     )
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if not 3 <= size < len(words):
-            message = f"{size} corners" if size < 3 else f"{len(words) - 1} of its {size} corners"
-            raise rows.error(row, f"face {row} has {message}, at least 3 and all are wanted")
+            message = (
+                f"has {size} corners, expected 3 or more"
+                if size < 3
+                else f"declares {size} corners, but lists {len(words) - 1}"
+            )
+            raise rows.error(row, f"face {row} {message}")
     corners = TextRows(
         rows.path,
         [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
@@ -76,7 +80,7 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         corner = int(np.argmax(out_of_range))
         raise rows.error(
             corners.row_of_word(corner),
-            f"a face refers to vertex {corner_vertex[corner]}, there are {vertex_count}, "
-            "counted from 0",
+            f"a face refers to vertex {corner_vertex[corner]}, but the vertices are numbered 0 "
+            f"to {vertex_count - 1}",
         )
     return corner_vertex, offsets_from_sizes(sizes)

@@ -33,12 +33,14 @@ def read_text(path: Path) -> RawField:
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
     rows = read_rows(path, data=data)
     if not len(rows):
-        raise RosyError(f"{path}: holds no numbers")
+        raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
     _check_columns(str(path), columns)
     for row, words in enumerate(rows.words):
         if len(words) != columns:
-            raise rows.error(row, f"has {len(words)} numbers, the rows above have {columns}")
+            raise rows.error(
+                row, f"the row has {len(words)} numbers, the rows above have {columns}"
+            )
     return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
 
 
@@ -55,11 +57,13 @@ def read_npy(path: Path) -> RawField:
         values = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         what = str(reason).splitlines() or [type(reason).__name__]
-        raise RosyError(f"{path}: is no .npy file of numbers: {what[0]}") from None
+        raise RosyError(f"{path}: is not a valid .npy file of numbers: {what[0]}") from None
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
-        raise RosyError(f"{path}: holds no array of real numbers")
+        raise RosyError(f"{path}: does not contain an array of real numbers")
     if values.ndim not in (2, 3) or not len(values) or (values.ndim == 3 and values.shape[2] != 3):
-        raise RosyError(f"{path}: holds an array {values.shape}; (n, 3 N) or (n, N, 3) is wanted")
+        raise RosyError(
+            f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
+        )
     values = values.reshape(len(values), -1).astype(np.float64)
     _check_columns(str(path), values.shape[1])
     return _raw_field(values)
@@ -81,7 +85,7 @@ def _check_columns(source: str, columns: int) -> None:
     """Raise an error unless a row has 3 numbers for each of 1 to `MAX_DEGREE` directions."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
-            f"{source}: has {columns} numbers a row; wanted 3 for each of up to {MAX_DEGREE} "
+            f"{source}: has {columns} numbers per row, expected 3 for each of up to {MAX_DEGREE} "
             "directions"
         )
 

@@ -67,7 +67,7 @@ def read_ply(path: Path) -> Polygons:
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
-        raise RosyError(f"{path}: has no {missing} of vertices") from None
+        raise RosyError(f"{path}: the vertices have no property {missing}") from None
     face = columns.get("face", {})
     corner_list = next((face[name] for name in _CORNER_PROPERTIES if name in face), None)
     if not isinstance(corner_list, tuple):
@@ -81,7 +81,7 @@ def read_ply(path: Path) -> Polygons:
         face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
         raise RosyError(
             f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
-            f"there are {len(vertices)}, counted from 0"
+            f"but the vertices are numbered 0 to {len(vertices) - 1}"
         )
     with np.errstate(invalid="ignore"):  # a signalling NaN; `build_surface` rejects all NaN
         vertices = vertices.astype(np.float64)
@@ -124,10 +124,10 @@ def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     """The byte order ("" for text), the elements, and the offset of the data in bytes."""
     if data[:3] != b"ply":
-        raise RosyError(f"{path}:1: found {abbreviate(data[:3])}, wanted 'ply'")
+        raise RosyError(f"{path}:1: expected 'ply', found {abbreviate(data[:3])}")
     end = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE).search(data)
     if end is None:
-        raise RosyError(f"{path}: the header has no end")
+        raise RosyError(f"{path}: the header has no line 'end_header'")
     byte_order, elements = None, []
     for line_number, line in enumerate(
         data[: end.start()].decode("ascii", "replace").split("\n"), 1
@@ -150,10 +150,10 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
         except (KeyError, IndexError, ValueError):
             found = abbreviate(line.strip().encode())
             raise RosyError(
-                f"{path}:{line_number}: found {found}, wanted a line of a header"
+                f"{path}:{line_number}: expected a line of the header, found {found}"
             ) from None
     if byte_order is None:
-        raise RosyError(f"{path}: the header names no format")
+        raise RosyError(f"{path}: the header has no line 'format'")
     return byte_order, elements, end.end()
 
 
@@ -212,7 +212,7 @@ def _check_row_lengths(
     if short.any():
         row = int(np.argmax(short))
         available, required = starts[row + 1] - starts[row], end[row] - starts[row]
-        raise rows.error(row, f"{element.name} {row} has {available} values, {required} are wanted")
+        raise rows.error(row, f"{element.name} {row} has {available} values, expected {required}")
 
 
 def _binary_elements(
@@ -336,5 +336,5 @@ def _list_length(path: Path, element: _Element, row: int, length) -> int:
 def _truncated(path: Path, element: _Element, found: int) -> RosyError:
     """The error for a file that ends after `found` rows of an element."""
     return RosyError(
-        f"{path}: says {element.count} rows of element '{element.name}', but ends after {found}"
+        f"{path}: declares {element.count} rows of element '{element.name}', but ends after {found}"
     )

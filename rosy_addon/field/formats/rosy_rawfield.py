@@ -69,7 +69,7 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
         except ValueError:
             row = rows.row_of_word(number)
             found = abbreviate(words[number])
-            raise rows.error(row, f"found {found}, wanted the {name}, a whole number") from None
+            raise rows.error(row, f"expected the {name}, a whole number, found {found}") from None
     return values[0], values[1]
 
 
@@ -89,7 +89,7 @@ def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
     row_count, remainder = divmod(sum(map(len, rows.words)) - 2, columns)
     if remainder:
         raise RosyError(
-            f"{rows.path}: says {count} rows of {columns} numbers, but holds {row_count} and a part of "
-            "one"
+            f"{rows.path}: declares {count} rows of {columns} numbers, but contains {row_count} and "
+            "part of another"
         )
     return rows.floats("part of a vector")[2:].reshape(row_count, columns)

@@ -35,10 +35,9 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     rows = read_rows(Path(path), comment=None)
     numbers = rows.ints("degree, count, elements and indices")
     if len(numbers) < 2 or len(numbers) != 2 + 2 * numbers[1]:
-        said = numbers[1] if len(numbers) > 1 else "no"
-        raise rows.error(
-            len(rows), f"says {said} singularities, but holds {max(len(numbers) - 2, 0) / 2:g}"
-        )
+        declared = numbers[1] if len(numbers) > 1 else "no"
+        found = max(len(numbers) - 2, 0) / 2
+        raise rows.error(len(rows), f"declares {declared} singularities, but contains {found:g}")
     return int(numbers[0]), numbers[2::2], numbers[3::2]
 
 

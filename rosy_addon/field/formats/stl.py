@@ -74,8 +74,9 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     """(3 T, 3) float32 corners of the triangles of a binary file."""
     available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
     if len(data) < _HEADER_BYTES or available < count:
-        said = f"says {count} triangles" if len(data) >= _HEADER_BYTES else "is no .stl file"
-        raise RosyError(f"{path}: {said}, but ends after {max(available, 0)}")
+        if len(data) < _HEADER_BYTES:
+            raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
+        raise RosyError(f"{path}: declares {count} triangles, but ends after {available}")
     return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
@@ -87,7 +88,7 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
     if len(corner_rows) != 3 * loops:
         raise rows.error(
             corner_rows[-1] if corner_rows else len(rows),
-            f"the file has {len(corner_rows)} corners in {loops} whole triangles; is it truncated?",
+            f"the file has {len(corner_rows)} corners in {loops} complete triangles; is it truncated?",
         )
     vertex_rows = TextRows(
         path,

@@ -64,7 +64,7 @@ class TextRows:
         """
         for row, words in enumerate(self.words):
             if len(words) < 3:
-                raise self.error(row, f"{label} has {len(words)} coordinates, 3 are wanted")
+                raise self.error(row, f"{label} has {len(words)} coordinates, expected 3")
         points = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers).floats(
             label
         )
@@ -95,7 +95,7 @@ class TextRows:
                     if abs(convert(word)) >= 2**63 and convert is int:
                         return self.error(row, f"{abbreviate(word)} is too large")
                 except ValueError:
-                    return self.error(row, f"found {abbreviate(word)}, wanted {expected}")
+                    return self.error(row, f"expected {expected}, found {abbreviate(word)}")
         raise AssertionError("every word is a number")
 
 

@@ -127,7 +127,7 @@ def test_what_is_not_a_rosy_is_drawn_but_not_written_as_one(shared_data, tmp_pat
     done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
     assert done.returncode == 0, done.stderr
     done = rosy("field", mesh, field, "-o", tmp_path / "a.rosy")
-    assert_refused(done, "a.rosy", "no RoSy")
+    assert_refused(done, "a.rosy", "do not form a RoSy")
     assert not (tmp_path / "a.rosy").exists()
 
 
@@ -169,7 +169,7 @@ def test_the_generator_follows_the_degree(degree, kind, ring, tmp_path):
 REFUSED = {
     "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
     "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
-    "kind of mesh": (["info", "a.vtk"], "not from '.vtk' files"),
+    "kind of mesh": (["info", "a.vtk"], "a.vtk: is not a mesh file"),
     "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
     "degree -1": (["field", "{mesh}", "-o", "{out}", "--degree", "-1"], "degree -1 is not"),
     "degree 1000": (["info", "{mesh}", "--degree", "1000"], "degree 1000 is not"),
@@ -183,9 +183,12 @@ REFUSED = {
     "size 100000": (["render", "{mesh}", "-o", "{out}", "--size", "100000x100000"], "size 100000x"),
     "preset": (
         ["render", "{mesh}", "-o", "{out}", "--preset", "none"],
-        "no preset is named 'none'",
+        "there is no preset 'none'",
     ),
-    "setting": (["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"], "no setting 'lenght'"),
+    "setting": (
+        ["render", "{mesh}", "-o", "{out}", "--set", "lenght=3"],
+        "unknown setting 'lenght'",
+    ),
     "lights": (["render", "{mesh}", "-o", "{out}", "--set", "light=scene"], "has no lights"),
     "lights of a turntable": (
         ["turntable", "{mesh}", "-o", "{out}.gif", "--set", "light=scene"],
@@ -196,11 +199,17 @@ REFUSED = {
         "--set length=long: expected a whole",
     ),
     "range": (["render", "{mesh}", "-o", "{out}", "--set", "gain=-1"], "setting 'gain' is -1"),
-    "switch": (["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"], "not true or false"),
+    "switch": (
+        ["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"],
+        "expected true or false",
+    ),
     "no value": (["render", "{mesh}", "-o", "{out}", "--set", "gain"], "expected NAME=VALUE"),
-    "no folder": (["render", "{mesh}", "-o", "no/folder/a.png"], "there is no folder no/folder"),
+    "no folder": (
+        ["render", "{mesh}", "-o", "no/folder/a.png"],
+        "the folder no/folder does not exist",
+    ),
     "a folder": (["render", "{mesh}", "-o", "tests"], "tests: cannot be written: it is a folder"),
-    "format": (["field", "{mesh}", "-o", "{out}"], "not to '.png' files"),
+    "format": (["field", "{mesh}", "-o", "{out}"], "cannot be written as a field"),
     "view": (["render", "{mesh}", "-o", "{out}", "--view", "nan,0"], "view nan,0"),
 }
 
@@ -223,13 +232,13 @@ def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
     done = rosy("render", sphere, "-o", tmp_path / "a.png", "--degree", 0)
     assert_refused(done, "degree 0 is not a whole number from 1 to 12")
     (tmp_path / "a.rosy").write_text("2 4\n1 0 0\n")
-    assert_refused(rosy("info", sphere, tmp_path / "a.rosy"), "a.rosy: says 2 rows")
+    assert_refused(rosy("info", sphere, tmp_path / "a.rosy"), "a.rosy: declares 2 rows")
 
 
 def test_conflicting_degrees(sphere, tmp_path):
     assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
     done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
-    assert_refused(done, "a.rosy: holds a field of degree 6, not 4")
+    assert_refused(done, "a.rosy: the field has degree 6, but degree 4 was requested")
 
 
 def test_undefined_vectors_on_request(sphere, tmp_path):
@@ -352,7 +361,7 @@ def test_strokes_and_guides(sphere, tmp_path):
     assert facts_of(sphere, again, "--against", out)["against"]["mean"] < 3
     (tmp_path / "none.txt").write_text("1 2 3\n\n4 5 6\n")
     assert_refused(
-        rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt"), "holds no stroke"
+        rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt"), "contains no stroke"
     )
     assert_refused(rosy("field", sphere, "-o", out, "--generate", "uv"), "has no UV map")
 
@@ -474,4 +483,4 @@ def test_a_field_that_follows_says_so(sphere, tmp_path):
     done = rosy("render", cut, made, "-o", tmp_path / "a.png", "--size", "64x64",
                 "--field-mesh", sphere)  # fmt: skip
     assert done.returncode == 0
-    assert "followed by position, from sphere.off" in done.stderr
+    assert "transferred by position from sphere.off" in done.stderr

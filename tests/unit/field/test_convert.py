@@ -131,7 +131,9 @@ def test_diffusion_takes_noise_away_and_leaves_what_is_constant():
 
 
 def test_a_time_must_be_positive(error_of):
-    assert "a diffusion time is above 0" in error_of(diffuse_field, BALL, axis_field(BALL, 4), 0.0)
+    assert "the diffusion time must be above 0" in error_of(
+        diffuse_field, BALL, axis_field(BALL, 4), 0.0
+    )
 
 
 # --- magnitudes ----------------------------------------------------------------------------------
@@ -153,5 +155,5 @@ def test_free_directions_are_not_converted(error_of):
     turn = np.exp(1j * np.array([0.0, 0.5, 3.0]))[None, :, None]
     x, y = (axis[:, None] for axis in face_frames(surface))
     free = field_from_directions(surface, turn.real * x + turn.imag * y)
-    assert "are no RoSy" in error_of(change_degree, surface, free, 6)
-    assert "are no RoSy" in error_of(diffuse_field, surface, free, 1.0)
+    assert "are not a RoSy" in error_of(change_degree, surface, free, 6)
+    assert "are not a RoSy" in error_of(diffuse_field, surface, free, 1.0)

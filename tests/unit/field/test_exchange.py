@@ -113,9 +113,9 @@ def test_what_fieldgen_explains_at_its_top_is_no_field(tmp_path, error_of):
     path.write_text(head + path.read_text() + "# singularity 3 0.5\n")
     assert read_field(path, BALL).degree == 2
     path.write_text("\n".join(x for x in path.read_text().splitlines() if " field 7 " not in x))
-    assert "one of each is wanted" in error_of(read_field, path, BALL)
+    assert "expected one '# field' line for each" in error_of(read_field, path, BALL)
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert "a mesh without a field" in error_of(read_field, path, BALL)
+    assert "has no field" in error_of(read_field, path, BALL)
 
 
 def test_singularities_come_back(tmp_path, error_of):
@@ -125,9 +125,9 @@ def test_singularities_come_back(tmp_path, error_of):
     degree, vertex, index = read_sings(tmp_path / "a.sings")
     wanted = find_singularities(BALL, field)
     assert degree == 4 and np.array_equal(vertex, wanted[0]) and np.array_equal(index, wanted[1])
-    assert "holds singularities" in error_of(read_field, tmp_path / "a.sings", surface)
+    assert "contains singularities" in error_of(read_field, tmp_path / "a.sings", surface)
     (tmp_path / "b.sings").write_text("4 3\n1 1\n2 1\n")
-    assert "says 3 singularities, but holds 2" in error_of(read_sings, tmp_path / "b.sings")
+    assert "declares 3 singularities, but contains 2" in error_of(read_sings, tmp_path / "b.sings")
 
 
 def test_tensors_are_told_from_three_directions(tmp_path):
@@ -144,12 +144,12 @@ def test_tensors_are_told_from_three_directions(tmp_path):
 
 
 WRONG = {
-    "a.txt": ("1 2 3\n1 2\n", "a.txt:2: has 2 numbers, the rows above have 3"),
-    "b.txt": ("1 2\n3 4\n", "has 2 numbers a row"),
-    "c.txt": ("", "holds no numbers"),
-    "d.txt": ("1 2 x\n", "d.txt:1: found 'x', wanted a number"),
-    "e.txt": ("1 2 3\n", "holds 1 rows, but the mesh"),
-    "f.npy": ("hello", "is no .npy file"),
+    "a.txt": ("1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
+    "b.txt": ("1 2\n3 4\n", "has 2 numbers per row"),
+    "c.txt": ("", "contains no numbers"),
+    "d.txt": ("1 2 x\n", "d.txt:1: expected a number (part of a vector), found 'x'"),
+    "e.txt": ("1 2 3\n", "contains 1 rows, but the mesh"),
+    "f.npy": ("hello", "is not a valid .npy file"),
 }
 
 
@@ -195,7 +195,7 @@ def test_a_field_follows_by_position_and_says_so(degree, tmp_path):
     write_off(tmp_path / "a.off", quads)
     write_field(tmp_path / "a.rosy", field, quads)
     again, note = load_field(tmp_path / "a.rosy", triangles)
-    assert "followed by position, from a.off" in note and "1,152" in note and "2,304" in note
+    assert "transferred by position from a.off" in note and "1,152" in note and "2,304" in note
     wanted = axis_field(triangles, degree, (0.0, 0.0, 1.0))
     z, right = (face_representation(triangles, one) for one in (again, wanted))
     certain = wanted.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
@@ -230,7 +230,7 @@ def test_another_shape_is_refused(tmp_path, error_of):
     write_field(tmp_path / "a.rosy", axis_field(BALL, 4), BALL)
     far = build_surface(plane(5, 5).vertices + 3, plane(5, 5).corner_vertex, plane(5, 5).face_start)
     message = error_of(read_field, tmp_path / "a.rosy", far)
-    assert "it is another shape, or in another place" in message
+    assert "must have the same shape and position" in message
 
 
 def test_vectors_that_follow_lie_in_their_planes(tmp_path):

@@ -55,7 +55,7 @@ def test_rows_tell_when_the_vertex_count_stands_over_face_rows(tmp_path, error_o
     (tmp_path / "a.rosy").write_text(rosy_text(WEST, count=12))
     assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
     (tmp_path / "b.rosy").write_text(rosy_text(np.tile(WEST, (2, 1)), count=6))
-    assert "says 6 rows of 3 numbers, but holds 12" in error_of(
+    assert "declares 6 rows of 3 numbers, but contains 12" in error_of(
         read_field, tmp_path / "b.rosy", SQUARES
     )
 
@@ -134,7 +134,7 @@ def test_directions_that_are_no_rosy_keep_their_angles_and_lengths(shared_data, 
     stored = np.array(path.read_text().split()[2:], dtype=float).reshape(-1, 4, 3)
     assert np.allclose(field_directions(surface, field), stored, atol=1e-5)
     message = error_of(write_field, tmp_path / "a.rosy", field, surface)
-    assert "the directions of this field are no RoSy" in message
+    assert "the directions of this field do not form a RoSy" in message
 
 
 @pytest.mark.parametrize(
@@ -154,27 +154,27 @@ def test_a_degree_and_a_hundredth_are_allowed(angle, longer, rosy, tmp_path):
 DAMAGED = {
     "empty.rosy": (b"", "ends before the count"),
     "count.rosy": (b"6\n", "ends before the degree"),
-    "truncated.rosy": (rosy_text(WEST)[:32].encode(), "says 6 rows of 3 numbers, but holds 2"),
-    "torn.rosy": (rosy_text(WEST)[:-5].encode(), "but holds 5 and a part of one"),
-    "claims.rosy": (b"178956970 4\n1 0 0\n", "says 178956970 rows of 3 numbers, but holds 1"),
-    "claims.rawfield": (b"12 59652323\n1 0 0\n", "says 59652323 rows of 36 numbers, but holds 0"),
-    "binary.rosy": (bytes(range(200)), "holds binary data, text is wanted"),
-    "binary.rawfield": (b"\x89PNG\r\n\x1a\n\xff\xfe", "binary.rawfield:1: found"),
+    "truncated.rosy": (rosy_text(WEST)[:32].encode(), "declares 6 rows of 3 numbers, but contains 2"),
+    "torn.rosy": (rosy_text(WEST)[:-5].encode(), "but contains 5 and part of another"),
+    "claims.rosy": (b"178956970 4\n1 0 0\n", "declares 178956970 rows of 3 numbers, but contains 1"),
+    "claims.rawfield": (b"12 59652323\n1 0 0\n", "declares 59652323 rows of 36 numbers, but contains 0"),
+    "binary.rosy": (bytes(range(200)), "expected text, found binary data"),
+    "binary.rawfield": (b"\x89PNG\r\n\x1a\n\xff\xfe", "binary.rawfield:1: expected"),
     "word.rosy": (rosy_text(WEST).replace("-2.0", "two", 2).replace("two", "-2.0", 1).encode(),
-                  "word.rosy:4: found 'two', wanted a number"),
+                  "word.rosy:4: expected a number (part of a vector), found 'two'"),
     "zero.rosy": (rosy_text(WEST, degree=0).encode(), "zero.rosy:2: degree 0 is not"),
     "minus.rosy": (rosy_text(WEST, degree=-1).encode(), "minus.rosy:2: degree -1 is not"),
     "thousand.rosy": (rosy_text(WEST, degree=1000).encode(), "thousand.rosy:2: degree 1000 is not"),
-    "half.rosy": (rosy_text(WEST, degree=2.5).encode(), "half.rosy:2: found '2.5', wanted the degree"),
+    "half.rosy": (rosy_text(WEST, degree=2.5).encode(), "half.rosy:2: expected the degree, a whole number, found '2.5'"),
     "zero.rawfield": (b"0 6\n", "zero.rawfield:1: degree 0 is not a whole number from 1 to 12"),
-    "negative.rosy": (b"-6 4\n", "says -6 rows"),
-    "many.rosy": (rosy_text(np.ones((7, 3))).encode(), "holds 7 rows, but the mesh plane has 6 faces and 12 v"),
+    "negative.rosy": (b"-6 4\n", "declares -6 rows"),
+    "many.rosy": (rosy_text(np.ones((7, 3))).encode(), "contains 7 rows, but the mesh plane has 6 faces and 12 v"),
     "nan.rosy": (rosy_text(np.where(np.arange(6)[:, None] == 4, np.nan, WEST)).encode(),
                  "1 of 6 vectors are not finite, the first on face 4"),
     "inf.rawfield": (rosy_text(np.tile((np.inf, 0, 0), (6, 1)), degree=1, form="{degree} {count}\n").encode(),
                      "6 of 6 vectors are not finite, the first on face 0"),
-    "upright.rosy": (rosy_text(np.tile((0, 0, 1), (6, 1))).encode(), "worst on face 0 by 90.0 degrees"),
-    "a.vtk": (b"", "'.vtk' files"),
+    "upright.rosy": (rosy_text(np.tile((0, 0, 1), (6, 1))).encode(), "face 0 by 90.0 degrees"),
+    "a.vtk": (b"", "is not a field file"),
 }  # fmt: skip
 
 
@@ -205,7 +205,7 @@ def test_missing_file_and_conflicting_degree(tmp_path, error_of):
     assert "no such file" in error_of(read_field, tmp_path / "none.rosy", SQUARES)
     (tmp_path / "a.rosy").write_text(rosy_text(WEST))
     message = error_of(read_field, tmp_path / "a.rosy", SQUARES, 6)
-    assert "holds a field of degree 4, not 6" in message
+    assert "the field has degree 4, but degree 6 was requested" in message
 
 
 @given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
@@ -222,10 +222,12 @@ def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, pla
 
 def test_unwritable_output_is_an_error_and_leaves_what_was_there(tmp_path, error_of, monkeypatch):
     field = RosyField(4, WEST)
-    assert "there is no folder" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
+    assert "does not exist" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
     (tmp_path / "b.rosy").mkdir()
     assert "is a folder" in error_of(write_field, tmp_path / "b.rosy", field, SQUARES)
-    assert "'.vtk' files" in error_of(write_field, tmp_path / "a.vtk", field, SQUARES)
+    assert "cannot be written as a field" in error_of(
+        write_field, tmp_path / "a.vtk", field, SQUARES
+    )
 
     (tmp_path / "c.rosy").write_text("old")
 
@@ -263,7 +265,7 @@ def test_vectors_clearly_off_the_surface_are_refused_naming_the_worst(error_of):
     vectors[500] += 2 * surface.face_normal[500] * field.magnitude[500, None]
     message = error_of(validated_field, surface, vectors, 4, "there")
     assert message.startswith("there: ")
-    assert "worst on face 500" in message
+    assert "face 500 by" in message
     assert f"{np.degrees(np.arctan(2.35)):.1f} degrees" in message
 
 
@@ -284,7 +286,7 @@ def test_on_faces_without_area_the_field_is_undefined():
 def test_wrong_count_and_wrong_degree(error_of):
     message = error_of(validated_field, SQUARES, np.ones((5, 3)), 4, "mesh 'A', attribute 'rosy'")
     assert (
-        "mesh 'A', attribute 'rosy': holds 5 vectors, but the mesh plane has 6 faces and 12"
+        "mesh 'A', attribute 'rosy': contains 5 vectors, but the mesh plane has 6 faces and 12"
         in message
     )
     for degree in (0, -1, 1000, 2.5):
@@ -301,7 +303,7 @@ def test_where_counts_agree_the_domain_decides(error_of):
     field = validated_field(surface, around, 4, "here", domain="vertex")
     z, wanted = (face_representation(surface, some) for some in (field, RosyField(4, exact)))
     assert np.abs(np.angle(z / wanted)).max() < 1e-9
-    assert "off the surface" in error_of(validated_field, surface, around, 4, "here")
+    assert "not tangent to the surface" in error_of(validated_field, surface, around, 4, "here")
 
 
 def test_vertex_members_do_not_matter_to_the_mean():

@@ -97,10 +97,12 @@ def test_pieces_without_a_guide_are_smooth():
 
 
 def test_strokes_elsewhere_are_refused(error_of):
-    assert "no stroke comes near it" in error_of(
+    assert "no stroke is near the surface" in error_of(
         guides_from_strokes, BALL, [np.ones((4, 3)) * 9], 4
     )
-    assert "no stroke comes near it" in error_of(guides_from_strokes, BALL, [np.ones((4, 3))], 4)
+    assert "no stroke is near the surface" in error_of(
+        guides_from_strokes, BALL, [np.ones((4, 3))], 4
+    )
 
 
 def test_handles_guide_around_them():
@@ -162,7 +164,7 @@ def test_guides_of_several_kinds_go_together(error_of):
     field = generate(surface, recipe, 4)
     assert np.isclose(abs(dot(normalize(vectors[5]), field.vectors[5])), 1)
     assert (field.magnitude > 0.99).all()
-    assert "there is nothing to follow" in error_of(generate, surface, "guided", 4)
+    assert "no guides are given" in error_of(generate, surface, "guided", 4)
     assert "no UV map" in error_of(generate, surface, "uv", 4)
 
 
@@ -186,7 +188,7 @@ def moebius(columns=60, rows=6):
 def test_a_moebius_strip_is_named():
     strip = moebius()
     assert count_inconsistent_edges(strip) == 6
-    assert "Möbius strip" in orientation_warning(strip) and "along 6 edges" in orientation_warning(
+    assert "Möbius strip" in orientation_warning(strip) and "at 6 edges" in orientation_warning(
         strip
     )
     field = generate(strip, "smoothest", 4)

@@ -52,7 +52,7 @@ def test_middle_grey_on_screen_is_128(tmp_path):
 
 def test_unwritable_picture(tmp_path, error_of):
     rgba = np.zeros((2, 2, 4), dtype=np.float32)
-    assert "there is no folder" in error_of(write_png, tmp_path / "no" / "a.png", rgba)
+    assert "does not exist" in error_of(write_png, tmp_path / "no" / "a.png", rgba)
     assert "is a folder" in error_of(write_png, tmp_path, rgba)
 
 
@@ -144,12 +144,12 @@ def test_what_is_wrong_with_a_picture_is_said(tmp_path, error_of):
     whole = write_filtered(path, values, 2).read_bytes()
     for wrong in (whole[:40], whole[:-30], whole.replace(b"IHDR", b"IHDX"), whole[:8]):
         path.write_bytes(wrong)
-        assert "is broken" in error_of(read_png, path)
+        assert "is damaged" in error_of(read_png, path)
     # A filter that is not known.
     header = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
     instance = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes([7, 0])))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + instance)
-    assert "is broken" in error_of(read_png, path)
+    assert "is damaged" in error_of(read_png, path)
 
 
 def test_luminance_on_white():

@@ -23,12 +23,12 @@ def test_presets_that_come_with_rosy_load():
 BAD = {
     "{": ":1: expecting",
     '{\n "name": "a",\n "look" {}\n}': ":3: expecting",
-    "[1]": "a preset is an object",
+    "[1]": "a preset must be a JSON object",
     "\0\1": "binary data",
-    '{"name": "a", "description": "b"}': "a preset needs a 'look'",
-    '{"name": "a", "description": "b", "look": 3}': "'look' is not an object",
-    '{"name": "a", "description": "b", "look": {}, "author": "c"}': "has no 'author'",
-    '{"name": "a", "description": "b", "look": {"lenght": 3}}': "no setting 'lenght'",
+    '{"name": "a", "description": "b"}': "the preset has no 'look'",
+    '{"name": "a", "description": "b", "look": 3}': "'look' must be a JSON object",
+    '{"name": "a", "description": "b", "look": {}, "author": "c"}': "unknown entry 'author'",
+    '{"name": "a", "description": "b", "look": {"lenght": 3}}': "unknown setting 'lenght'",
     '{"name": "a", "description": "b", "look": {"length": -3}}': "setting 'length' is -3",
     '{"name": "a", "description": "b", "look": {"length": "long"}}': "setting 'length' is 'long'",
     '{"name": "a", "description": "b", "look": {"gain": NaN}}': "setting 'gain' is nan",
@@ -47,5 +47,5 @@ def test_what_is_wrong_with_a_preset_is_said(text, tmp_path, error_of):
 
 def test_missing_presets(tmp_path, error_of):
     message = error_of(load_preset, "papier")
-    assert "no preset is named 'papier'" in message and "paper" in message
+    assert "there is no preset 'papier'" in message and "paper" in message
     assert "no such file" in error_of(load_preset, tmp_path / "none.json")

@@ -134,52 +134,76 @@ SHALLOW = sys.version_info < (3, 14)
 
 HEAD = '{"name": "a", "description": "b", "look": {'
 HOSTILE = {
-    "huge": (b" " * MAX_FILE_BYTES + b"{}", "too large: 65,536 bytes at most"),
+    "huge": (b" " * MAX_FILE_BYTES + b"{}", "larger than the limit of 65,536 bytes"),
     "deep list": (b"[" * 60_000, "nested too deeply" if SHALLOW else ""),
     "deep object": (b'{"a":' * 12_000, "nested too deeply" if SHALLOW else ""),
-    "deep value": ((HEAD + '"gain": ' + "[" * 900 + "]" * 900 + "}}").encode(), "not a number"),
+    "deep value": (
+        (HEAD + '"gain": ' + "[" * 900 + "]" * 900 + "}}").encode(),
+        "expected a number",
+    ),
     "long number": ((HEAD + '"seed": ' + "9" * 5000 + "}}").encode(), "number that is too long"),
     "large number": ((HEAD + '"seed": ' + "9" * 3000 + "}}").encode(), "setting 'seed' is 999"),
     "NaN": ((HEAD + '"gain": NaN}}').encode(), "setting 'gain' is nan"),
     "infinite": ((HEAD + '"gain": 1e999}}').encode(), "setting 'gain' is inf"),
     "minus infinite": ((HEAD + '"gain": -Infinity}}').encode(), "setting 'gain' is -inf"),
-    "list": ((HEAD + '"noise": ["grey"]}}').encode(), "setting 'noise' is ['grey'], not one of"),
-    "object": ((HEAD + '"noise": {}}}').encode(), "setting 'noise' is {}, not one of"),
-    "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, not a number"),
-    "bool": ((HEAD + '"length": true}}').encode(), "setting 'length' is True, not a whole number"),
-    "half": ((HEAD + '"length": 1.5}}').encode(), "setting 'length' is 1.5, not a whole number"),
-    "number": ((HEAD + '"view_plane": 1}}').encode(), "setting 'view_plane' is 1, not true or"),
-    "colour": ((HEAD + '"ink_colour": "#12345g"}}').encode(), "'#12345g', not a color"),
-    "colour, line": ((HEAD + '"ink_colour": "#123456\\n"}}').encode(), "not a color"),
-    "twice": ((HEAD + '"gain": 1, "gain": 2}}').encode(), "'gain' is there twice"),
-    "name twice": (b'{"name": "a", "name": "b"}', "'name' is there twice"),
-    "newer": ((HEAD + '"sparkle": 1}}').encode(), "no setting 'sparkle': it is misspelt, or of a"),
-    "newer, long": ((HEAD + f'"{"x" * 60_000}": 1' + "}}").encode(), "no setting 'xxx"),
+    "list": (
+        (HEAD + '"noise": ["grey"]}}').encode(),
+        "setting 'noise' is ['grey'], expected one of",
+    ),
+    "object": ((HEAD + '"noise": {}}}').encode(), "setting 'noise' is {}, expected one of"),
+    "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, expected a number"),
+    "bool": (
+        (HEAD + '"length": true}}').encode(),
+        "setting 'length' is True, expected a whole number",
+    ),
+    "half": (
+        (HEAD + '"length": 1.5}}').encode(),
+        "setting 'length' is 1.5, expected a whole number",
+    ),
+    "number": (
+        (HEAD + '"view_plane": 1}}').encode(),
+        "setting 'view_plane' is 1, expected true or",
+    ),
+    "colour": ((HEAD + '"ink_colour": "#12345g"}}').encode(), "'#12345g', expected a color"),
+    "colour, line": ((HEAD + '"ink_colour": "#123456\\n"}}').encode(), "expected a color"),
+    "twice": ((HEAD + '"gain": 1, "gain": 2}}').encode(), "'gain' appears twice"),
+    "name twice": (b'{"name": "a", "name": "b"}', "'name' appears twice"),
+    "newer": ((HEAD + '"sparkle": 1}}').encode(), "unknown setting 'sparkle': check its spelling"),
+    "newer, long": ((HEAD + f'"{"x" * 60_000}": 1' + "}}").encode(), "unknown setting 'xxx"),
     "long text": ((HEAD + f'"noise": "{"x" * 60_000}"' + "}}").encode(), "setting 'noise' is 'xxx"),
-    "lines in a key": ((HEAD + '"a\\nb": 1}}').encode(), "no setting 'a\\nb'"),
+    "lines in a key": ((HEAD + '"a\\nb": 1}}').encode(), "unknown setting 'a\\nb'"),
     "UTF-16": ('{"name": "a"}'.encode("utf-16"), "binary data"),
     "Latin-1": ('{"name": "Schräg"}'.encode("latin-1"), "not UTF-8"),
     "empty": (b"", ":1: expecting value"),
     "cut off": (b'{"name": "a", "descr', ":1: unterminated string"),
-    "name, number": (b'{"name": 3, "description": "b", "look": {}}', "the name of a preset is 3"),
-    "name, list": (b'{"name": [], "description": "", "look": {}}', "the name of a preset is []"),
+    "name, number": (
+        b'{"name": 3, "description": "b", "look": {}}',
+        "the name of the preset must be text, not 3",
+    ),
+    "name, list": (
+        b'{"name": [], "description": "", "look": {}}',
+        "the name of the preset must be text, not []",
+    ),
     "name, empty": (b'{"name": "", "description": "b", "look": {}}', "a letter or a digit"),
     "name, dots": (b'{"name": "../..", "description": "b", "look": {}}', "a letter or a digit"),
     "name, long": (
         b'{"name": "' + b"a" * 49 + b'", "description": "b", "look": {}}',
-        "has 49 characters, 48 at most",
+        "has 49 characters, more than 48",
     ),
-    "name, lines": (b'{"name": "a\\nb", "description": "", "look": {}}', "is not a line of text"),
+    "name, lines": (
+        b'{"name": "a\\nb", "description": "", "look": {}}',
+        "must be one line of text",
+    ),
     "name, escape": (b'{"name": "a\\u001b[31m", "description": "", "look": {}}', "'a\\x1b[31m'"),
     "name, backward": (b'{"name": "a\\u202eb", "description": "", "look": {}}', "'a\\u202eb'"),
     "name, half a sign": (b'{"name": "a\\ud800", "description": "", "look": {}}', "'a\\ud800'"),
     "sentence, long": (
         b'{"name": "a", "description": "' + b"a" * 201 + b'", "look": {}}',
-        "the description of a preset has 201 characters, 200 at most",
+        "the description of the preset has 201 characters, more than 200",
     ),
     "picture": (
         b'{"name": "a", "description": "b", "look": {}, "picture": "iVBORw0KGgo="}',
-        "a preset has no 'picture'",
+        "unknown entry 'picture'",
     ),
 }
 
@@ -288,7 +312,7 @@ def test_saved_and_found_again(own):
 def test_nothing_is_replaced_unless_asked(own, undrawn, error_of):
     save_preset(MINE, own)
     other = MINE._replace(name="my INK", look=Look(length=7))
-    assert "there is a preset 'my-ink' already" in error_of(save_preset, other, own)
+    assert "preset 'my-ink' already exists" in error_of(save_preset, other, own)
     assert load_preset("my-ink", own) == MINE
     assert save_preset(other, own, replace=True) == "my-ink"
     assert load_preset("my-ink", own) == other
@@ -298,7 +322,7 @@ def test_nothing_is_replaced_unless_asked(own, undrawn, error_of):
 @pytest.mark.parametrize("name", ["Plaid", "pLAID!", "Print at 300 dpi", "print 300 dpi"])
 def test_those_of_rosy_cannot_be_replaced(own, undrawn, error_of, replace, name):
     message = error_of(save_preset, MINE._replace(name=name), own, replace=replace)
-    assert f"'{name}' comes with RoSy" in message
+    assert f"'{name}' is the name of a preset of RoSy" in message
     assert not own.exists()
 
 
@@ -313,7 +337,7 @@ def test_nothing_is_written_outside_the_folder(own, undrawn, tmp_path, name):
     try:
         save_preset(MINE._replace(name=name), own)
     except RosyError as refused:
-        assert "not a line of text" in str(refused)
+        assert "must be one line of text" in str(refused)
     inside = {path for path in tmp_path.rglob("*") if path.is_file()}
     assert {path.parent for path in inside} <= {own}
 
@@ -329,15 +353,15 @@ def test_renamed(own, undrawn, error_of):
     assert load_preset("your-ink", own).name == "YOUR ink!"
     for refused in (("your-ink", "Other"), ("your-ink", "Plaid"), ("plaid", "My Plaid")):
         error_of(rename_preset, *refused, "", own)
-    assert "not a line" in error_of(rename_preset, "your-ink", "a\nb", "", own)
+    assert "must be one line" in error_of(rename_preset, "your-ink", "a\nb", "", own)
     assert {path.name for path in own.iterdir()} == names
 
 
 @pytest.mark.parametrize("name", ["plaid", "../my-ink", "/etc/passwd", "nobody", "my-ink.json", ""])
 def test_only_ones_own_are_deleted(own, undrawn, error_of, name):
     save_preset(MINE, own)
-    assert "not a preset of your own" in error_of(remove_preset, name, own / "..")
-    assert "not a preset of your own" in error_of(remove_preset, name, own)
+    assert "not one of your presets" in error_of(remove_preset, name, own / "..")
+    assert "not one of your presets" in error_of(remove_preset, name, own)
     assert (own / "my-ink.json").exists() and (SHIPPED_FOLDER / "plaid.json").exists()
 
 

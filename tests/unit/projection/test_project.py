@@ -464,17 +464,19 @@ def test_what_cannot_be_seen_is_said():
         project([MeshInstance(ball, matrix_of(np.eye(3), (0, 0, 9)), field)], camera)
     with pytest.raises(RosyError, match=r"in view of camera 'Camera\.001': sphere is hidden"):
         project([MeshInstance(wall, matrix_of(np.eye(3), (0, 0, 2))), shown], camera)
-    with pytest.raises(RosyError, match="there is no RoSy object"):
+    with pytest.raises(RosyError, match="no object has a RoSy field"):
         project([MeshInstance(wall, IDENTITY)], camera)
-    with pytest.raises(RosyError, match="display is 'round', not one of smooth, flat"):
+    with pytest.raises(RosyError, match="unknown display 'round': choose smooth, flat"):
         project([shown], camera, "round")
-    with pytest.raises(RosyError, match="sphere: its field has 79 vectors for 80 faces"):
+    with pytest.raises(
+        RosyError, match="sphere: its field has 79 vectors, but the mesh has 80 faces"
+    ):
         project([MeshInstance(ball, IDENTITY, RosyField(4, field.vectors[1:]))], camera)
     spoiled = field.vectors.copy()
     spoiled[7, 1] = np.nan
     with pytest.raises(RosyError, match="sphere: its field is not finite on face 7"):
         project([MeshInstance(ball, IDENTITY, RosyField(4, spoiled))], camera)
-    with pytest.raises(RosyError, match="sphere: its matrix is not"):
+    with pytest.raises(RosyError, match="sphere: its matrix must be"):
         project([MeshInstance(ball, np.full((4, 4), np.inf), field)], camera)
 
 

@@ -298,4 +298,6 @@ def test_ends_of_traced_strokes_are_not_free():
 
 
 def test_errors_are_one_line(error_of):
-    assert "setting 'overshoot' is -1, not from 0" in error_of(StrokeStyle, overshoot=-1)
+    assert "setting 'overshoot' is -1, expected a number from 0" in error_of(
+        StrokeStyle, overshoot=-1
+    )

@@ -169,19 +169,19 @@ def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
 
 @pytest.mark.slow
 def test_errors(error_of):
-    assert "there is no field" in error_of(
+    assert "no object has a field" in error_of(
         draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA
     )
     behind = MeshInstance(SPHERE.surface, moved(y=-50.0), SPHERE.field)
-    assert "sees none" in error_of(draw_instances, [behind], CAMERA)
+    assert "no stroke is visible" in error_of(draw_instances, [behind], CAMERA)
     unseen = draw_instances(
         [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
     )
     assert 20 < len(unseen.strokes) < 2000
-    assert "no room" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
+    assert "no stroke fits" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
     away = MeshInstance(SPHERE.surface, moved(x=9.0), SPHERE.field)
-    assert "sees none" in error_of(draw_instances, [away], CAMERA)
-    assert "setting 'spacing' is 0, not from 0.5" in error_of(StrokeStyle, spacing=0)
+    assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA)
+    assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
-    assert "'sun', not one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
+    assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
     assert "pen" in error_of(Pen, width=0.0)

@@ -870,8 +870,8 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
     for arguments, message in (
-        (["--camera", "Close"], "ball.obj: --camera is for .blend files"),
-        (["--frames", "1-3"], "ball.obj: --frames is for .blend files"),
+        (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
+        (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
         (["--tone", "--light", "scene"], "ball.obj: has no lights"),
     ):
         assert main([*command, "-o", str(out), *arguments]) == 2
@@ -892,9 +892,9 @@ def test_errors_are_one_line(error_of):
     assert "above 0" in error_of(trace_strokes, instance, 0.0)
     assert "too many" in error_of(trace_strokes, instance, 1e-6)
     assert "no field" in error_of(trace_strokes, MeshInstance(surface, IDENTITY), 0.1)
-    assert "zero all over" in error_of(
+    assert "zero everywhere" in error_of(
         trace_strokes, MeshInstance(surface, IDENTITY, RosyField(4, np.zeros((16, 3)))), 0.1
     )
-    assert "vertices" in error_of(trace_strokes, instance, np.ones(7))
-    assert "first" in error_of(SeparationRules, min_separation=1.2)
-    assert "shortest" in error_of(SeparationRules, min_length=5.0, max_length=3.0)
+    assert "per vertex" in error_of(trace_strokes, instance, np.ones(7))
+    assert "min_separation" in error_of(SeparationRules, min_separation=1.2)
+    assert "min_length" in error_of(SeparationRules, min_length=5.0, max_length=3.0)

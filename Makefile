@@ -15,7 +15,7 @@
 PYTHON ?= python3.11
 # Processes of a test run: `make test JOBS=1` for one, `auto` for one per core.
 JOBS   ?= auto
-PYTEST  = -m pytest -p no:cacheprovider --numprocesses $(JOBS)
+PYTEST  = -m pytest -p no:cacheprovider --numprocesses $(JOBS) --dist worksteal
 
 UNIT  = .venv/bin/python
 BPY42 = .venv-bpy42/bin/python

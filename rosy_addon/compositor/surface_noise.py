@@ -182,11 +182,11 @@ def instance_hashes(names: Sequence[str]) -> np.ndarray:
     """(B,) uint32 hashes of mesh instances, stable from picture to picture.
 
     A hash depends on the name of an instance and, if several instances have that name, on its
-    position among them.
+    position among them. The name of a mesh file is its path, of which the folder does not count.
     """
     counts: Counter[str] = Counter()
     hashes = []
-    for name in names:
+    for name in (name.replace("\\", "/").rpartition("/")[2] for name in names):
         hashes.append(zlib.crc32(f"{name} {counts[name]}".encode()))
         counts[name] += 1
     return np.array(hashes, dtype=np.uint32)

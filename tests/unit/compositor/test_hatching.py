@@ -670,6 +670,8 @@ def test_bodies_have_noise_of_their_own():
     assert len(set(instance_hashes(names).tolist())) == 5
     # A body that joins in does not change the others'.
     assert instance_hashes(["z", *names])[1:].tolist() == instance_hashes(names).tolist()
+    # A mesh file looks the same in every folder.
+    assert instance_hashes(["some/ball.obj"]) == instance_hashes(["C:\\other\\ball.obj"])
 
 
 def test_clear_paper_is_ink_alone():

@@ -83,7 +83,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Str
     first, last = strokes.start[:-1][candidates], strokes.start[1:][candidates] - 1
     tolerance = CLOSING_TOLERANCE * strokes.spacing[first]
     # Secant method. The first two samples are angle 0 with the offset of the stroke as it was
-    # traced, and the angle that removes this offset if the stroke is straight.
+    # traced, and the angle that would remove this offset if the stroke were straight.
     previous_angle, offset = (
         np.zeros(len(candidates)),
         _left_offset(strokes, first, strokes.points[last]),
@@ -161,7 +161,7 @@ def _trace_loops(
     origin, tangent = strokes.points[first], strokes.member[first]
     spacing, length = strokes.spacing[first], strokes.length[candidates]
     particles = _particles_at_start(mesh, strokes, first)
-    travelled = np.zeros(len(candidates))
+    total_walked = np.zeros(len(candidates))
     passed = np.zeros(len(candidates), dtype=bool)
     active = np.arange(len(candidates))
     segments: list[tuple[np.ndarray, ...]] = []
@@ -169,12 +169,12 @@ def _trace_loops(
         current = particles.take(active)
         to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)
         forward = dot(to_origin, tangent[active])
-        is_near = (travelled > length - 2 * spacing)[active] & (
+        is_near = (total_walked > length - 2 * spacing)[active] & (
             dot(to_origin, to_origin) < spacing[active] ** 2
         )
         arrived = is_near & (forward < 1e-6 * spacing[active])
         passed[active[arrived]] = True
-        overran = travelled[active] > length[active] + (MAX_FORWARD_GAP + 1) * spacing[active]
+        overran = total_walked[active] > length[active] + (MAX_FORWARD_GAP + 1) * spacing[active]
         continuing = np.flatnonzero(~arrived & ~overran)
         if not len(continuing):
             break
@@ -184,7 +184,7 @@ def _trace_loops(
         current, walked, ended, path = advance(mesh, current, step, angle[active])
         segments.append((active[path.particle], path.triangle, path.end_weights, path.direction))
         particles.assign(active, current)
-        travelled[active] += walked
+        total_walked[active] += walked
         active = active[~ended & (walked > 0)]
     columns = [np.concatenate(column) for column in zip(*segments, strict=True)]
     left_offset = _left_offset(

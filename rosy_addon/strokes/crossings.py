@@ -121,7 +121,7 @@ def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Str
         under[same_family] = np.argmax(crossings.stroke[same_family], axis=1)
     row = np.arange(len(under))
     stroke, arc = crossings.stroke[row, under], crossings.arc[row, under]
-    # The spacing at the start of a stroke stands for all of it.
+    # The gaps of a stroke are measured in the spacing at its start.
     spacing = strokes.spacing[strokes.start[:-1]][stroke]
     return cut_intervals(strokes, stroke, arc - gap / 2 * spacing, arc + gap / 2 * spacing)
 

@@ -112,7 +112,7 @@ def find_lateral_neighbors(
 
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
-    """Return the pairs of given samples and others of their family near them on the surface."""
+    """Return the pairs of a given sample and another of its family that is near on the surface."""
     query, neighbor = samples.grid.pairs_within(
         samples.position[sample],
         SEARCH_RADIUS * samples.spacing[sample],
@@ -155,10 +155,9 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
 
 
 def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
-    """Return (m,) bool: whether the neighbor was there before the sample.
+    """Return (m,) bool: whether the neighbor was added before the sample.
 
-    Of two samples that were added in the same step, that of the stroke with the lower number is
-    older.
+    If both were added in the same step, the sample of the stroke with the lower number is older.
     """
     step, neighbor_step = samples.step[pairs.sample], samples.step[pairs.neighbor]
     older = neighbor_step < step

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..field.surface import build_edges
+from ..field.surface import Surface, build_edges
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .stroke_set import Strokes
@@ -60,7 +60,7 @@ _Segments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def _no_segments() -> _Segments:
-    """Return empty arrays."""
+    """Return the arrays of no segments."""
     return (
         np.empty((0, 2), np.int64),
         np.empty((0, 2, 3)),
@@ -69,7 +69,9 @@ def _no_segments() -> _Segments:
     )
 
 
-def _silhouettes(surface, corner: np.ndarray, normal: np.ndarray, camera: Camera) -> _Segments:
+def _silhouettes(
+    surface: Surface, corner: np.ndarray, normal: np.ndarray, camera: Camera
+) -> _Segments:
     """Return the zero set of n . w, where w is the direction to the camera.
 
     It has a straight segment in each triangle in which n . w changes its sign.
@@ -97,7 +99,7 @@ def _silhouettes(surface, corner: np.ndarray, normal: np.ndarray, camera: Camera
 
 
 def _crease_and_border_corners(
-    surface, corner: np.ndarray, crease_angle: float
+    surface: Surface, corner: np.ndarray, crease_angle: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners (3 t + k) at which the edges of creases and of borders start."""
     vertex = surface.triangle_vertex.ravel()

@@ -1,4 +1,4 @@
-"""Overshoot: extend strokes beyond occluding edges, borders and the end of the shade.
+"""Overshoot: extend strokes beyond occluding edges, borders and the ends of shaded areas.
 
 This imitates quick drawings by hand, in which lines continue a little too far.
 """
@@ -17,7 +17,7 @@ from ..projection.gbuffer import MeshInstance
 from .stroke_set import POINT_COLUMNS, Strokes, arc_lengths
 from .tangent_mesh import TangentMesh
 from .visibility import (
-    MAX_STEEPNESS,
+    MAX_BIAS_STEEPNESS,
     SAMPLE_STEP_PX,
     pixel_size,
     project_to_pixels,
@@ -301,7 +301,9 @@ def _drop_onto_surfaces(
     column, row = np.clip(np.nan_to_num(pixels), 0, frame_size - 1).astype(np.int64).T
     depth_buffer = rasterize_depth(instances, camera)
     target_depth = depth_buffer.depth[row, column]
-    tolerance = MAX_STEEPNESS * (distance[extended] + BACKTRACK_PX) * pixel_size(points, camera)
+    tolerance = (
+        MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX) * pixel_size(points, camera)
+    )
     moves = target_depth < depth + tolerance
     extended = extended[moves]
     moved, normal = strokes.points.copy(), strokes.normal.copy()

@@ -49,7 +49,7 @@ SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
 
 #: Largest tangent of the angle between the normal and the direction to the camera for which the
 #: offset toward the camera grows.
-MAX_STEEPNESS = 12.0
+MAX_OFFSET_STEEPNESS = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ def draw_instances_task(
             f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
         )
     # Families of different instances are still separate. Each belongs to one instance.
-    family_counts = [len(single.names) for single in strokes_of_instances]
+    family_counts = [len(traced.names) for traced in strokes_of_instances]
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden
@@ -239,7 +239,10 @@ def _vertex_spacing(instance: MeshInstance, camera: Camera, style: StrokeStyle) 
 
 
 def _is_in_view(instance: MeshInstance, camera: Camera) -> bool:
-    """Return False if all vertices are beyond one plane of the view frustum, except the far one."""
+    """Return whether an instance may be in view.
+
+    It is not if all its vertices are outside one plane of the view frustum. The far plane is not
+    tested."""
     points = instance.world_points()
     matrix = camera.projection @ camera.view
     clip = points @ matrix[:, :3].T + matrix[:, 3]
@@ -347,6 +350,6 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
     """
     to_camera = camera.view_directions(strokes.points)
     facing = np.abs(dot(strokes.normal, to_camera))
-    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / MAX_STEEPNESS)
+    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / MAX_OFFSET_STEEPNESS)
     offset = width * (1 + steepness) * pixel_size(strokes.points, camera)
     return strokes.points + offset[:, None] * to_camera

@@ -29,7 +29,7 @@ MAX_EXPECTED_SAMPLES = 5e7
 
 
 class CoveringPairs(NamedTuple):
-    """m pairs of samples of different strokes that are beside each other and cover these sides.
+    """m pairs of samples that are beside each other, so that each covers a side of the other.
 
     Attributes
     ----------
@@ -134,8 +134,8 @@ class StrokeSamples(ColumnTable):
             1.01 * SEARCH_RADIUS * float(np.median(mean_spacing)), int(self.expected_count)
         )
         self.current_step = 0
-        # Open sides, as 2 * sample + side. Those that got covered stay in it until the next call of
-        # `open_sides`.
+        # Open sides, as 2 * sample + side. Sides that were covered since are dropped by the next
+        # call of `open_sides`.
         self._open_sides = np.empty(0, dtype=np.int64)
         # Arrays of samples whose sides `reset_coverage` resets.
         self._recheck: list[np.ndarray] = []
@@ -186,7 +186,7 @@ class StrokeSamples(ColumnTable):
 
     @contextmanager
     def probes(self, particles: SurfaceParticles) -> Iterator[np.ndarray]:
-        """Give the numbers of temporary samples at n particles, for a `with` block.
+        """Yield the numbers of temporary samples at n particles, for a `with` block.
 
         They can be compared with other samples, but others do not find them. Do not add samples in
         the block.
@@ -237,7 +237,9 @@ class StrokeSamples(ColumnTable):
         self.grid.remove(sample)
 
     def remove_strokes(self, stroke_alive: np.ndarray, first: int) -> None:
-        """Remove all samples of strokes that are not alive, and recheck their neighbors.
+        """Remove all samples of strokes that are not alive.
+
+        `reset_coverage` then resets the sides of their neighbors.
 
         Parameters
         ----------
@@ -256,7 +258,7 @@ class StrokeSamples(ColumnTable):
     # --- coverage of sides ------------------------------------------------------------------------
 
     def mark_covered(self, pairs: CoveringPairs) -> None:
-        """Mark the sides on which samples and their neighbors have each other as covered."""
+        """Mark the sides of samples and neighbors that face each other as covered."""
         self.covered[pairs.sample, pairs.sample_side] = True
         self.covered[pairs.neighbor, pairs.neighbor_side] = True
         self.side_neighbor[pairs.sample, pairs.sample_side] = pairs.neighbor
@@ -285,7 +287,7 @@ class StrokeSamples(ColumnTable):
         self._recheck.append(sample)
 
     def close_open_sides(self) -> None:
-        """Forget all open sides until `reset_coverage`."""
+        """Treat all open sides as covered until `reset_coverage`."""
         self._recheck.append(np.unique(self._open_sides >> 1))
         self._open_sides = np.empty(0, dtype=np.int64)
 

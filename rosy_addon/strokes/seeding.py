@@ -70,7 +70,7 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
 
 
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
-    """Return the seeds that have no stroke of their family near."""
+    """Return the seeds that are not near a stroke of their family."""
     is_uncovered = np.zeros(len(seeds), dtype=bool)
     for start in range(0, len(seeds), SEED_BATCH_SIZE):
         batch = np.arange(start, min(start + SEED_BATCH_SIZE, len(seeds)))
@@ -196,7 +196,7 @@ def _free_gap(
 ) -> np.ndarray:
     """Return (n,) gaps from seeds to the next stroke on the side away from the sample.
 
-    They are in spacings, and infinite if there is no stroke or no room for the seed.
+    Gaps are in spacings. They are infinite if there is no stroke or no room for the seed.
     """
     free_gap = np.full(len(sample), np.inf)
     indices = np.flatnonzero(has_room)

@@ -82,7 +82,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     too_close = _dilate(refined, too_close)
     cut = np.unique(refined.stroke[too_close])
     remaining = refined.runs_where(~too_close, free_at_removed=False)
-    is_cut = np.repeat(False, len(candidates))
+    is_cut = np.zeros(len(candidates), dtype=bool)
     is_cut[cut] = True
     remaining = remaining.select(is_cut[_run_owner(refined, ~too_close)])
     remaining = replace(remaining, weights=mesh.weights_at(remaining.triangle, remaining.points))
@@ -97,10 +97,10 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
 
 def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
-    surface_turn = surface_turn_per_spacing(mesh, strokes)
+    surface_turn = _surface_turn_per_spacing(mesh, strokes)
     suspect = (
-        (stroke_turn_per_spacing(strokes) > MAX_TURN)
-        | (field_turn_per_spacing(mesh, strokes) > MAX_TURN)
+        (_stroke_turn_per_spacing(strokes) > MAX_TURN)
+        | (_field_turn_per_spacing(mesh, strokes) > MAX_TURN)
         | (surface_turn > FOLD_ANGLE)
     )
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
@@ -113,7 +113,7 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     return suspect
 
 
-def surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) radians by which the shading normal turns within a spacing.
 
     It is the norm of the derivatives in two perpendicular directions.
@@ -126,7 +126,7 @@ def surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     )
 
 
-def stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
+def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
     """Return (n,) radians by which strokes turn in space within half a spacing on either side."""
     arc, stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(strokes.spacing.max(initial=0)))
@@ -139,8 +139,8 @@ def stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
     return np.arccos(np.clip(dot(member_before, member_after), -1, 1))
 
 
-def field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
-    """Return (n,) radians by which the field turns within a spacing, at most over directions."""
+def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+    """Return (n,) radians by which the field turns within a spacing, along the fastest direction."""
     z, gradient = mesh.z[strokes.triangle], mesh.gradient[strokes.triangle]
     value = np.einsum("nk,nk->n", strokes.weights, z)
     derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()

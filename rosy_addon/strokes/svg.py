@@ -185,26 +185,23 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
         np.bincount(strokes.stroke[first], minlength=len(strokes))[strokes.stroke[first]] == 1
     )
     paths = []
-    for segment, level in enumerate(opacity_level[first].tolist()):
-        span = slice(start[segment], start[segment + 1])
-        if not level or not max_radius[segment]:
+    for piece, level in enumerate(opacity_level[first].tolist()):
+        span = slice(start[piece], start[piece + 1])
+        if not level or not max_radius[piece]:
             continue
         attributes = "" if level == OPACITY_LEVELS else f' opacity="{level / OPACITY_LEVELS:.3g}"'
-        if (
-            is_whole[segment]
-            and max_radius[segment] - min_radius[segment] <= WIDTH_TOLERANCE * width / 2
-        ):
-            width_px = 2 * max_radius[segment]
+        if is_whole[piece] and max_radius[piece] - min_radius[piece] <= WIDTH_TOLERANCE * width / 2:
+            width_px = 2 * max_radius[piece]
             attributes += (
                 ""
                 if width_px > (1 - WIDTH_TOLERANCE) * width
                 else f' stroke-width="{width_px:.3g}"'
             )
-            closed = strokes.closed[strokes.stroke[first[segment]]]
+            closed = strokes.closed[strokes.stroke[first[piece]]]
             paths.append(f'<path{attributes} d="{_line_path(points[span], closed)}"/>')
         else:
             attributes += f' fill={quoteattr(color)} stroke="none"'
-            ends = radius[span][[0, -1]] * is_whole[segment]
+            ends = radius[span][[0, -1]] * is_whole[piece]
             paths.append(f'<path{attributes} d="{_outline_path(left[span], right[span], ends)}"/>')
     return paths
 
@@ -225,11 +222,11 @@ def _split_by_opacity(
     """
     last_of_stroke = np.zeros(len(opacity_level), dtype=bool)
     last_of_stroke[strokes.start[1:] - 1] = True
-    starts_segment = np.ones(len(opacity_level), dtype=bool)
-    starts_segment[1:] = (opacity_level[1:] != opacity_level[:-1]) | last_of_stroke[:-1]
-    # The last point of a stroke is no piece of its own: it ends the previous piece.
-    starts_segment &= ~last_of_stroke
-    first = np.flatnonzero(starts_segment)
+    starts_piece = np.ones(len(opacity_level), dtype=bool)
+    starts_piece[1:] = (opacity_level[1:] != opacity_level[:-1]) | last_of_stroke[:-1]
+    # No piece starts at the last point of a stroke: it ends the previous piece.
+    starts_piece &= ~last_of_stroke
+    first = np.flatnonzero(starts_piece)
     end = np.append(first[1:], len(opacity_level))
     # A piece ends at the end of its stroke, or at the first point of the next piece.
     last = np.where(last_of_stroke[end - 1], end - 1, np.minimum(end, len(opacity_level) - 1))
@@ -268,7 +265,9 @@ def _outline_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) ->
     """
     reversed_right = right[::-1]
     return (
-        f"M{_format_points(left)} {_end_cap(end_radii[1])}{_format_points(reversed_right[:1])} L{_format_points(reversed_right[1:])} "
+        f"M{_format_points(left)} "
+        f"{_end_cap(end_radii[1])}{_format_points(reversed_right[:1])} "
+        f"L{_format_points(reversed_right[1:])} "
         f"{_end_cap(end_radii[0])}{_format_points(left[:1])}Z"
     )
 
@@ -390,16 +389,16 @@ def _nearest_end(
     cell_size: float,
 ) -> int:
     """Return the end in the grid that is nearest to the current position, ring by ring."""
-    best, least_distance = -1, np.inf
+    best, best_distance = -1, np.inf
     for ring in range(cell_count + 1):
-        if best >= 0 and least_distance <= (max(ring - 1, 0) * cell_size) ** 2:
+        if best >= 0 and best_distance <= (max(ring - 1, 0) * cell_size) ** 2:
             break
         for key in _ring_cells(current_cell, ring):
             for end_index in sorted(grid.get(key, ())):
                 x, y = positions[end_index]
                 distance = (x - current[0]) ** 2 + (y - current[1]) ** 2
-                if distance < least_distance:
-                    best, least_distance = end_index, distance
+                if distance < best_distance:
+                    best, best_distance = end_index, distance
     return best
 
 

@@ -17,7 +17,7 @@ from ..errors import RosyError
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
-from ..field.surface import build_edges
+from ..field.surface import Surface, build_edges
 from ..progress import run_to_completion
 from ..projection.corner_field import cached_corner_field_task
 from ..projection.field_channel import rotation_order
@@ -229,26 +229,26 @@ def build_tangent_mesh(
             f"{surface.name}: the field has {len(field.vectors)} vectors, but the mesh has "
             f"{surface.face_count} faces"
         )
-    carried = run_to_completion(
+    corner_field = run_to_completion(
         cached_corner_field_task(surface, instance.matrix, field, display, cache)
     )
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     points = vertices[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
-    corner_normal = carried.corner_normals.astype(np.float64).transpose(2, 0, 1)
+    corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
     rotations = _rotations_to_planes(
-        carried.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
+        corner_field.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
     )
-    z = carried.representation.T.astype(np.complex128) * power(rotations, field.degree)
+    z = corner_field.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
         raise RosyError(f"{surface.name}: the field is zero everywhere")
     harmonics, family_z = [], None
-    for trait, values in carried.channels.items():
-        values = values.T * signed_power(rotations, rotation_order(trait, field.degree))
-        if trait[0] == "deviation":
-            harmonics.append((trait[1], values))
+    for channel, values in corner_field.channels.items():
+        values = values.T * signed_power(rotations, rotation_order(channel, field.degree))
+        if channel[0] == "deviation":
+            harmonics.append((channel[1], values))
         else:
             family_z = values.sum(axis=1)
     neighbor, neighbor_edge, edge_transport = _adjacency(
@@ -367,7 +367,7 @@ def _rotations_to_planes(
 
 
 def _adjacency(
-    surface,
+    surface: Surface,
     points: np.ndarray,
     x: np.ndarray,
     y: np.ndarray,
@@ -401,19 +401,19 @@ def _adjacency(
     edge_vector = points[triangle_a, (a + 1) % 3] - points[triangle_a, a % 3]
     edge_in_a = dot(edge_vector, x[triangle_a]) + 1j * dot(edge_vector, y[triangle_a])
     edge_in_b = dot(edge_vector, x[triangle_b]) + 1j * dot(edge_vector, y[triangle_b])
-    transport = edge_in_b * edge_in_a.conj()
-    norm = np.abs(transport)
-    transport = np.divide(transport, norm, out=np.ones_like(transport), where=norm > 0)
+    factor = edge_in_b * edge_in_a.conj()
+    norm = np.abs(factor)
+    factor = np.divide(factor, norm, out=np.ones_like(factor), where=norm > 0)
     neighbor[triangle_a, edge_a], neighbor[triangle_b, edge_b] = triangle_b, triangle_a
     neighbor_edge[triangle_a, edge_a], neighbor_edge[triangle_b, edge_b] = edge_b, edge_a
     edge_transport[triangle_a, edge_a], edge_transport[triangle_b, edge_b] = (
-        transport,
-        transport.conj(),
+        factor,
+        factor.conj(),
     )
     return neighbor, neighbor_edge, edge_transport
 
 
-def is_sharp_edge(surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def is_sharp_edge(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return (n,) bool: whether normals are not interpolated across edges between triangles.
 
     Parameters

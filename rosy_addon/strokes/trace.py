@@ -21,9 +21,9 @@ from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
 from .tangent_mesh import build_tangent_mesh, corner_values
 
-#: Steps between two rounds of seeding, and the number of tips below which seeds are added at every
+#: Steps between two attempts to seed beside strokes, and the number of tips below which seeds are added at every
 #: step.
-ROUNDS_PER_SEEDING, MIN_TIPS = 3, 64
+STEPS_PER_SEEDING, MIN_TIPS = 3, 64
 
 #: Distance in spacings between seeds that are added at once: in the first round, and the value at
 #: which rounds stop. Each round divides it by 4.
@@ -146,13 +146,14 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
     nothing grows any more.
     """
-    rounds, max_tips = 0, 0
+    steps, max_tips = 0, 0
     while True:
-        if rounds % ROUNDS_PER_SEEDING == 0 or len(placer.tips) < MIN_TIPS:
+        if steps % STEPS_PER_SEEDING == 0 or len(placer.tips) < MIN_TIPS:
             seeded = placer.seed_neighbors()
             if not seeded and not len(placer.tips):
                 if not placer.samples.has_open_sides:
                     return
+                # Each call closes the sides that it tried. Try others twice more.
                 if not placer.seed_neighbors() and not placer.seed_neighbors():
                     return
             fraction = placer.samples.count / max(placer.samples.expected_count, 1)
@@ -163,7 +164,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
             return
         if tip_count:
             placer.step()
-        rounds += 1
+        steps += 1
 
 
 def collect_strokes(placer: StreamlinePlacer) -> Strokes:

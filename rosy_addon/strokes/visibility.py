@@ -24,9 +24,9 @@ MIN_RUN_PX = 2.5
 #: in world space at the depth of the point.
 DEPTH_BIAS_PX = 1.5
 
-#: Largest addition to this bias by the steepness of the surface, in pixels. Steepness is the
+#: Largest amount that the steepness of the surface adds to this bias, in pixels. Steepness is the
 #: tangent of the angle between the normal and the direction to the camera.
-MAX_STEEPNESS = 4.0
+MAX_BIAS_STEEPNESS = 4.0
 
 
 def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -219,7 +219,9 @@ def _is_hidden(
                 steepness = np.sqrt(np.maximum(length**2 / facing_plane**2 - 1, 0))
             bias = footprint * (
                 DEPTH_BIAS_PX
-                + np.minimum(np.nan_to_num(steepness, posinf=MAX_STEEPNESS), MAX_STEEPNESS)
+                + np.minimum(
+                    np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
+                )
             )
             faces_away = np.sign(facing_plane) * facing < 0
             hidden &= (triangle >= 0) & (distance > bias)

@@ -17,7 +17,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take away everything `register` added."""
+    """Remove everything that `register` added."""
     global _cli_command
     import bpy
 

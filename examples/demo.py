@@ -1,7 +1,9 @@
 """Build a scene with Suzanne, bake a cross field along her curvature, and render it.
 
-python examples/demo.py [DEMO.png]           with Blender's Python module, bpy
-blender -b -P examples/demo.py -- [DEMO.png]
+With Blender's Python module, bpy, or with Blender:
+
+    python examples/demo.py [DEMO.png]
+    blender -b -P examples/demo.py -- [DEMO.png]
 """
 
 import sys

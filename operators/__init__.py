@@ -1,4 +1,7 @@
-"""The operators of the extension, one task in each file."""
+"""The operators of the extension, one verb in each file.
+
+`modal_task`, `poll` and `preset_shared` are helpers that operators share.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ from . import (
     viewport,
 )
 
-#: All modules with operators, in the order of registration.
+#: Modules with operators, in the order of registration.
 MODULES = (
     field_generate,
     field_convert,

@@ -28,7 +28,7 @@ def selected_mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def poll_editable(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether a mesh is selected that can get a field. Sets the poll message if not."""
+    """Return whether a mesh is selected that can get a field. Set the poll message if not."""
     if not poll_idle(operator):
         return False
     if not selected_mesh_objects(context):
@@ -41,7 +41,7 @@ def poll_editable(operator: type[bpy.types.Operator], context: bpy.types.Context
 
 
 def poll_idle(operator: type[bpy.types.Operator]) -> bool:
-    """Whether no modal task is running. Sets the poll message if one is."""
+    """Return whether no modal task is running. Set the poll message if one is."""
     if job_status.current is not None:
         operator.poll_message_set("RoSy is busy: wait, or press ESC to cancel")
         return False
@@ -49,7 +49,7 @@ def poll_idle(operator: type[bpy.types.Operator]) -> bool:
 
 
 def poll_active_field(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether the active mesh has a field. Sets the poll message if not."""
+    """Return whether the active mesh has a field. Set the poll message if not."""
     objects = selected_mesh_objects(context)
     if not objects or not has_field(objects[0]):
         operator.poll_message_set("The active mesh has no field: make or import one first")
@@ -58,7 +58,7 @@ def poll_active_field(operator: type[bpy.types.Operator], context: bpy.types.Con
 
 
 def poll_has_field(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether there is a field to draw, and no modal task. Sets the poll message if not."""
+    """Return whether there is a field to draw, and no modal task. Set the poll message if not."""
     if not poll_idle(operator):
         return False
     if not field_objects(context.view_layer):

@@ -8,9 +8,9 @@ import bpy
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.presets.store import MAX_NAME_LENGTH, Preset, preset_key, save_preset
+from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
-from ..rosy_addon.ui.properties import read_look
 from .preset_shared import DESCRIPTION_ARGUMENTS, draw_name_and_description
 
 
@@ -58,7 +58,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
 
 
 def _is_user_preset(name: Any) -> bool:
-    """Whether the user has a preset of this name."""
+    """Return whether the user has a preset of this name."""
     try:
         return preset_key(name) in preset_library.user_preset_keys()
     except RosyError:

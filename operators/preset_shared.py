@@ -15,7 +15,6 @@ PRESET_ARGUMENTS = {
     "description": "Name of the preset. Empty: the active preset of the scene",
 }
 
-
 #: Arguments of the property for the description of a preset.
 DESCRIPTION_ARGUMENTS = {
     "name": "Description",
@@ -37,7 +36,7 @@ def target_preset(operator: Any, context: bpy.types.Context) -> str:
 
 
 def poll_user_presets(operator: type[bpy.types.Operator]) -> bool:
-    """Whether the user has presets. Sets the poll message if not."""
+    """Return whether the user has presets. Set the poll message if not."""
     if not preset_library.user_preset_keys():
         operator.poll_message_set("You have no presets yet: save one first")
         return False

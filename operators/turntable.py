@@ -63,7 +63,6 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         min=-1.5,
         max=1.5,
     )
-
     skip_browser: bpy.props.BoolProperty(
         name="Skip Browser",
         description="Start without a file browser",

@@ -64,8 +64,8 @@ function compileJob(job) {
     }
 }
 
-// One task: the command that a user would run for these frames. Frames that are there and up to date
-// stay, so it may be run again, or twice at once.
+// Return a task that runs the command `bake` for some frames. Frames that exist and are up to date are
+// kept, so a task can run again, or twice at once.
 function bakeTask(settings, camera, chunk) {
     const args = ["--out", settings.folder, "--frames", chunk];
     if (camera) {
@@ -82,7 +82,7 @@ function bakeTask(settings, camera, chunk) {
     return task;
 }
 
-// The names that are given, or one that stands for the camera that renders.
+// Return the names of the cameras, or one empty name for the camera that renders each frame.
 function cameraNames(text) {
     const names = (text || "").split(",").map((name) => name.trim()).filter((name) => name);
     return names.length ? names : [""];

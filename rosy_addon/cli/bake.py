@@ -131,7 +131,7 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
 
     frames = parse_frames(options.frames)
     if uses_workers(options):
-        # The workers have drawn all frames. The range is enough to make the materials play them.
+        # The workers have drawn all frames. The first and the last set the range of the materials.
         frames = sorted({frames[0], frames[-1]})
     has_look_options = bool(options.preset or options.set)
     task = bake_animation_task(

@@ -60,7 +60,7 @@ def add_tone_options(parser: argparse.ArgumentParser) -> None:
 
 
 def requested_look(options: argparse.Namespace, default: Look) -> Look:
-    """Return the preset, or else the default, with the settings of --set."""
+    """Return the look of --preset, by default `default`, with the settings of --set."""
     look = load_preset(options.preset, user_presets_folder()).look if options.preset else default
     return look.with_settings(dict(_parse_setting(text) for text in options.set))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Return width and height of a text such as 640x480."""
+    """Return the width and height from a text such as 640x480."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if match is None:
         raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 640x480")

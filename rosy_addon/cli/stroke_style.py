@@ -16,9 +16,9 @@ METAVARS = {"pixels": "PX", "length": "UNITS", "spacings": "SPACINGS", "": "AMOU
 
 
 def add_style_options(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each setting of `StrokeStyle`; those not given are absent from the result.
+    """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
 
-    The unit has no option: `--spacing` is in pixels, `--distance` in units of the mesh.
+    The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
     """
     for name, setting in settings_of(StrokeStyle).items():
         if name != "unit":

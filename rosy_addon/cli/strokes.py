@@ -104,7 +104,7 @@ def _draw_scene_strokes(options: argparse.Namespace) -> None:
 
 
 def _path_of_frame(path: Path, frame: int) -> Path:
-    """Return the path with each row of # in the file name replaced by the frame number."""
+    """Return the path with each run of # in the file name replaced by the frame number."""
     return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
 
 

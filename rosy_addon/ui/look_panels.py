@@ -22,7 +22,7 @@ LOOK_PANELS = {
     "quality": "Quality",
 }
 
-#: Settings of how the picture is made, stored and shown.
+#: Properties of `Scene.rosy` that set how the picture is made, stored and shown.
 OUTPUT_SETTINGS = (
     "percentage",
     "device",
@@ -34,13 +34,11 @@ OUTPUT_SETTINGS = (
     "image_format",
 )
 
-
 #: Height of a preset's picture in the panel and in the selection, in units of Blender's layout: 128
 #: screen pixels, half the size of the picture, at a resolution scale of 1.
 THUMBNAIL_SCALE = 6.4
 
-#: Properties of the scene and of objects that say where the tone comes from, with the source that
-#: each belongs to.
+#: Properties of the scene and of objects that belong to a source of the tone, with that source.
 TONE_SOURCE_OF_SETTING = {
     "tone_attribute": "attribute",
     "tone_image": "image",
@@ -48,7 +46,7 @@ TONE_SOURCE_OF_SETTING = {
     "tone_picture": "picture",
 }
 
-#: Properties that name something of the active mesh, with the collection that they are chosen from.
+#: Properties that hold a name in a collection of the active mesh, with that collection.
 SEARCH_COLLECTIONS = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
 
 #: Labels of the scene's properties that are too long for the sidebar.
@@ -157,7 +155,7 @@ def _make_settings_panel(
 
 
 def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings of the scene and of the active object that say where the tone comes from."""
+    """Draw the properties of the scene and of the active object for the source of the tone."""
     settings, obj = context.scene.rosy, context.view_layer.objects.active
     mesh_object = obj if obj is not None and obj.type == "MESH" else None
     for name, source in TONE_SOURCE_OF_SETTING.items():

@@ -13,7 +13,7 @@ from . import job_status, overlay
 from .generator_settings import generator_setting_names
 from .sidebar import SidebarPanel, draw_progress, use_property_columns
 
-#: Placeholders that empty settings of the generator show.
+#: Placeholder texts of empty settings of the generator.
 PLACEHOLDERS = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
 
 
@@ -173,7 +173,7 @@ def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -
 def _draw_view_hints(
     layout: bpy.types.UILayout, context: bpy.types.Context, bake_infos: list[BakeInfo]
 ) -> None:
-    """Draw buttons that show the picture, in views that do not show materials or the camera's view."""
+    """Draw buttons that make the picture visible, where materials or the camera's view are not shown."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     if view.shading.type in {"WIREFRAME", "SOLID"}:

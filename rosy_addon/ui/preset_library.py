@@ -55,7 +55,7 @@ class _PresetLibrary:
         """Read the files again if any was added, changed or removed.
 
         Panels call this many times per redraw. The times of the folders show at once whether files
-        were added or removed. Edited files are looked for every `REFRESH_SECONDS`.
+        were added or removed. Edited files are found every `REFRESH_SECONDS`.
         """
         user_folder = user_presets_folder()
         folder_keys = (user_folder, _stat_key(user_folder), _stat_key(SHIPPED_FOLDER))

@@ -14,12 +14,9 @@ from ..gpu.select import RENDER_DEVICES
 from ..presets.store import DEFAULT_KEY
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
-from ..scene.look_properties import apply_look, read_look
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
 from ..strokes.style import StrokeStyle
 from . import preset_library
-
-__all__ = ["apply_look", "ensure_registered", "read_look", "register", "unregister"]
 
 CAMERA_ITEMS = [
     ("SCENE", "Scene Camera", "Active camera of the scene"),
@@ -48,7 +45,7 @@ INK_ITEMS = [
     ("ONE", "One", "One ink for all strokes"),
     ("FAMILIES", "By Family", "One ink for each family of strokes"),
 ]
-#: Viewpoints of strokes. There is one drawing at a time.
+#: Viewpoints of strokes. Only one drawing is made at a time, so there is no item for all cameras.
 STROKE_CAMERA_ITEMS = [item for item in CAMERA_ITEMS if item[0] != "ALL"]
 #: Subtypes of number properties by the unit of the setting.
 SUBTYPE_BY_UNIT = {"angle": "ANGLE", "length": "DISTANCE", "pixels": "PIXEL"}

@@ -14,8 +14,8 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
+from rosy.rosy_addon.scene.look_properties import apply_look, read_look
 from rosy.rosy_addon.scene.pictures import show_bake
-from rosy.rosy_addon.ui.properties import apply_look, read_look
 from scenes import add_camera, add_field, add_plane, contents, link, pixels, set_vectors
 
 

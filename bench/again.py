@@ -1,4 +1,4 @@
-"""A bake in Blender after another that differs in one setting of the look, over a first bake."""
+"""Time of a bake in Blender after a change of one setting of the look, relative to a first bake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rosy_addon.projection.camera import Camera
 from . import cases
 from .timing import Case, compare, main
 
-#: What a user turns, by turns.
+#: Settings that a user changes, with the two values between which each alternates.
 CHANGES: dict[str, tuple[object, ...]] = {
     "gain": (3.0, 3.5),
     "shading": (0.5, 0.6),
@@ -31,7 +31,7 @@ CHANGES: dict[str, tuple[object, ...]] = {
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Bakes of the ball as Blender's mesh."""
+    """Time bakes of the ball as a mesh of Blender."""
     try:
         import bpy
     except ImportError:
@@ -44,23 +44,23 @@ def measure(runs: int) -> Iterator[Case]:
         scene = ball_scene(bpy, triangles)
         view = cases.camera()
 
-        def baked(look: Look, scene: object = scene, view: Camera = view) -> None:
+        def bake_look(look: Look, scene: object = scene, view: Camera = view) -> None:
             bake(scene, look=look, cameras=[view])
 
-        def first(baked=baked) -> None:
+        def bake_first(bake_look=bake_look) -> None:
             BAKE_CACHE.clear()
-            baked(cases.LOOK)
+            bake_look(cases.LOOK)
 
         for setting, values in CHANGES.items():
-            turn = itertools.cycle(values)
+            alternating = itertools.cycle(values)
 
-            def changed(setting=setting, turn=turn, baked=baked) -> None:
-                baked(replace(cases.LOOK, **{setting: next(turn)}))
+            def bake_changed(setting=setting, alternating=alternating, bake_look=bake_look) -> None:
+                bake_look(replace(cases.LOOK, **{setting: next(alternating)}))
 
             yield compare(
                 f"bake after a change of {setting} / first bake, {triangles // 1000}K",
-                changed,
-                first,
+                bake_changed,
+                bake_first,
                 target=0.5,
                 higher_is_better=False,
                 runs=runs,
@@ -68,7 +68,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 
 def ball_scene(bpy, triangles: int) -> object:
-    """The ball with a field of degree 4, alone in Blender."""
+    """Return a scene that contains only the ball, with a field of degree 4."""
     from rosy_addon.scene.write_field import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 
@@ -80,10 +80,10 @@ def ball_scene(bpy, triangles: int) -> object:
     mesh.from_pydata(surface.vertices.tolist(), [], corners.tolist())
     mesh.shade_smooth()
     write_mesh_field(mesh, cases.instance(triangles, 4).field)
-    thing = bpy.data.objects.new("Ball", mesh)
-    bpy.context.scene.collection.objects.link(thing)
+    obj = bpy.data.objects.new("Ball", mesh)
+    bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
-    assert np.allclose(thing.matrix_world, np.eye(4))
+    assert np.allclose(obj.matrix_world, np.eye(4))
     return bpy.context.scene
 
 

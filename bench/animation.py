@@ -17,11 +17,11 @@ from .timing import Case, compare, main
 
 TRIANGLES = 50_000
 
-#: Number of frames in each timing.
-TOGETHER = 10
+#: Number of frames that each timing draws.
+FRAMES_PER_TIMING = 10
 
 #: Number of frames of 640 x 480 pixels that the processes share.
-FRAMES = 80
+SHARED_FRAMES = 80
 
 
 def measure(runs: int) -> Iterator[Case]:
@@ -43,24 +43,24 @@ def measure(runs: int) -> Iterator[Case]:
             ("static camera, deforming mesh", _deform),
         ):
             scene = _scene(bpy, animate)
-            number = itertools.count(1)
+            frame_numbers = itertools.count(1)
 
             # The first frame costs as much as a bake.
-            def frames(scene=scene, number=number) -> None:
-                some = [next(number) for _ in range(TOGETHER)]
-                bake_animation(scene, some, look=cases.LOOK, settings=settings, show=False)
+            def bake_frames(scene=scene, frame_numbers=frame_numbers) -> None:
+                batch = [next(frame_numbers) for _ in range(FRAMES_PER_TIMING)]
+                bake_animation(scene, batch, look=cases.LOOK, settings=settings, show=False)
 
-            def singles(scene=scene, number=number) -> None:
-                for _ in range(TOGETHER):
-                    scene.frame_set(next(number))
+            def bake_singly(scene=scene, frame_numbers=frame_numbers) -> None:
+                for _ in range(FRAMES_PER_TIMING):
+                    scene.frame_set(next(frame_numbers))
                     BAKE_CACHE.clear()
                     bake(scene, look=cases.LOOK, settings=settings)
 
-            frames()
+            bake_frames()
             yield compare(
-                f"{TOGETHER} frames / as many single bakes, {name}",
-                frames,
-                singles,
+                f"{FRAMES_PER_TIMING} frames / as many single bakes, {name}",
+                bake_frames,
+                bake_singly,
                 target=0.7,
                 higher_is_better=False,
                 runs=runs,
@@ -69,18 +69,18 @@ def measure(runs: int) -> Iterator[Case]:
         scene.render.resolution_x, scene.render.resolution_y = 640, 480
         path = Path(folder) / "scene.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(path))
-        fresh = itertools.count()
+        folder_numbers = itertools.count()
 
-        def processes(count: int) -> None:
-            out = Path(folder) / f"frames{next(fresh)}"
+        def run_processes(count: int) -> None:
+            out = Path(folder) / f"frames{next(folder_numbers)}"
             command = [sys.executable, "-m", "rosy_addon", "bake", str(path), "--out", str(out)]
-            command += ["--frames", f"1-{FRAMES}", "--jobs", str(count)]
+            command += ["--frames", f"1-{SHARED_FRAMES}", "--jobs", str(count)]
             subprocess.run(command, check=True, capture_output=True)
 
         yield compare(
-            f"one process / two, {FRAMES} frames, start and all",
-            lambda: processes(1),
-            lambda: processes(2),
+            f"one process / two, {SHARED_FRAMES} frames, start and all",
+            lambda: run_processes(1),
+            lambda: run_processes(2),
             target=1.8,
             higher_is_better=True,
             runs=min(runs, 3),
@@ -100,15 +100,17 @@ def _scene(bpy, animate) -> object:
 
 
 def _move_camera(scene) -> None:
+    """Animate the location of the camera."""
     for frame, x in ((1, -0.4), (500, 0.4)):
         scene.camera.location.x = x
         scene.camera.keyframe_insert("location", frame=frame)
 
 
 def _deform(scene) -> None:
-    thing = scene.objects["Ball"]
-    thing.shape_key_add(name="Basis")
-    key = thing.shape_key_add(name="Wide")
+    """Animate the ball with a shape key that widens it."""
+    obj = scene.objects["Ball"]
+    obj.shape_key_add(name="Basis")
+    key = obj.shape_key_add(name="Wide")
     points = np.empty(3 * len(key.data))
     key.data.foreach_get("co", points)
     points[::3] *= 1.2

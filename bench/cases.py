@@ -32,14 +32,14 @@ def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
     y, x = np.mgrid[0:size, 0:size] + 0.5
     plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
     minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
-    flow = planar_pixel_field((plus - minus) / degree + 0.3, degree)
-    return flow, look_noise(flow, LOOK)
+    field = planar_pixel_field((plus - minus) / degree + 0.3, degree)
+    return field, look_noise(field, LOOK)
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:
     """Run the LIC stage: from a planar field and noise to the images of its members."""
-    flow, noise = plane(degree, size)
-    run_to_completion(METHODS[method](flow, look, noise))
+    field, noise = plane(degree, size)
+    run_to_completion(METHODS[method](field, look, noise))
 
 
 @lru_cache(maxsize=8)
@@ -47,11 +47,16 @@ def ball(triangles: int, bumps: float = 0.06) -> Surface:
     """Return a bumpy sphere with about this many triangles of similar size."""
     rows = round(np.sqrt(triangles / 4))
     columns = 2 * rows
-    up = np.linspace(0, np.pi, rows + 1)[:, None]
-    around = np.arange(columns) * (2 * np.pi / columns)
-    out = 1 + bumps * np.sin(up) ** 3 * np.sin(5 * around) * np.sin(4 * up)
-    point = out[..., None] * np.stack(
-        [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up) + 0 * around], axis=-1
+    polar = np.linspace(0, np.pi, rows + 1)[:, None]
+    azimuth = np.arange(columns) * (2 * np.pi / columns)
+    radius = 1 + bumps * np.sin(polar) ** 3 * np.sin(5 * azimuth) * np.sin(4 * polar)
+    point = radius[..., None] * np.stack(
+        [
+            np.sin(polar) * np.cos(azimuth),
+            np.sin(polar) * np.sin(azimuth),
+            np.cos(polar) + 0 * azimuth,
+        ],
+        axis=-1,
     )
     return _surface("ball", point)
 
@@ -60,20 +65,24 @@ def ball(triangles: int, bumps: float = 0.06) -> Surface:
 def torus(triangles: int, tube: float = 0.45) -> Surface:
     """Return a torus around the z axis with about this many triangles."""
     rows = round(np.sqrt(triangles / 4))
-    across = np.linspace(0, -2 * np.pi, rows + 1)[:, None]
-    around = np.arange(2 * rows) * (np.pi / rows)
-    out, up = 1 + tube * np.cos(across), tube * np.sin(across) + 0 * around
-    return _surface("torus", np.stack([out * np.cos(around), out * np.sin(around), up], axis=-1))
+    tube_angle = np.linspace(0, -2 * np.pi, rows + 1)[:, None]
+    azimuth = np.arange(2 * rows) * (np.pi / rows)
+    radius, height = 1 + tube * np.cos(tube_angle), tube * np.sin(tube_angle) + 0 * azimuth
+    return _surface(
+        "torus", np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1)
+    )
 
 
 def _surface(name: str, point: np.ndarray) -> Surface:
     """Return a surface of triangles between rings of points, from top to bottom."""
     rows, columns = point.shape[0] - 1, point.shape[1]
-    here = np.arange(rows)[:, None] * columns + np.arange(columns)
-    right = np.roll(here, -1, axis=1)
-    below = np.stack([here, here + columns, right + columns], axis=-1)
-    above = np.stack([here, right + columns, right], axis=-1)
-    corners = np.concatenate([below.reshape(-1, 3), above.reshape(-1, 3)]).astype(np.int32)
+    upper_left = np.arange(rows)[:, None] * columns + np.arange(columns)
+    upper_right = np.roll(upper_left, -1, axis=1)
+    lower_triangles = np.stack([upper_left, upper_left + columns, upper_right + columns], axis=-1)
+    upper_triangles = np.stack([upper_left, upper_right + columns, upper_right], axis=-1)
+    corners = np.concatenate(
+        [lower_triangles.reshape(-1, 3), upper_triangles.reshape(-1, 3)]
+    ).astype(np.int32)
     starts = np.arange(0, corners.size + 1, 3)
     points = point.reshape(-1, 3)
     return build_surface(points, corners.ravel(), starts, name=f"{name} {len(corners)}")
@@ -99,14 +108,14 @@ def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -
 
 def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
     """Draw a mesh for the first time, including the work that does not depend on the camera."""
-    fresh = instance(triangles, degree)
+    cached = instance(triangles, degree)
     gbuffer = project(
-        [MeshInstance(_fresh(fresh.surface), fresh.matrix, fresh.field)], camera(size)
+        [MeshInstance(_without_cache(cached.surface), cached.matrix, cached.field)], camera(size)
     )
     return compose(gbuffer, look).rgba
 
 
-def _fresh(surface: Surface) -> Surface:
+def _without_cache(surface: Surface) -> Surface:
     """Return a copy without cached results."""
     return Surface(**{entry.name: getattr(surface, entry.name) for entry in fields(surface)})
 

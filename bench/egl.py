@@ -1,6 +1,6 @@
-"""The shaders without Blender: an OpenGL device with an EGL context.
+"""`EglDevice`: runs the shaders without Blender, on OpenGL with an EGL context.
 
-A replacement of `rosy_addon.gpu.device.BlenderDevice` with the same interface.
+It has the same interface as `rosy_addon.gpu.device.BlenderDevice`.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 
 FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
 
-#: The function that Blender defines for shaders that draw into its views.
-BLENDER = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
+#: A function that Blender defines for shaders that draw into its views.
+BLENDER_DEFINES = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
 
 
 class EglDevice:
-    """As `rosy_addon.gpu.device.Device`."""
+    """A device on an EGL context, with the interface of `rosy_addon.gpu.device.Device`."""
 
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
@@ -120,28 +120,32 @@ class EglDevice:
         return program
 
     def _compile(self, shader: ComputePass | RasterPass) -> Any:
-        head = "#version 430\n"
+        header = "#version 430\n"
         for name in shader.textures:
-            head += f"uniform sampler2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
+            header += f"uniform sampler2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
         for name, kind in shader.uniforms:
-            head += f"uniform {kind} {name};\n"
+            header += f"uniform {kind} {name};\n"
         if isinstance(shader, ComputePass):
-            head += (
+            header += (
                 f"layout(local_size_x={WORKGROUP_SIZE[0]}, local_size_y={WORKGROUP_SIZE[1]}) in;\n"
             )
             for slot, (name, kind) in enumerate(shader.images):
-                head += (
+                header += (
                     f"layout({kind.lower()}, binding={slot}) writeonly uniform "
                     f"image2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"
                 )
-            return self.context.compute_shader(head + shader.source)
-        ways = [
+            return self.context.compute_shader(header + shader.source)
+        varyings = [
             f"{'flat ' * (name == 'triangle_id')}{{}} {kind} {name};\n"
             for name, kind in shader.varyings
         ]
-        vertex = head + "in vec4 vertex_data;\n" + "".join(way.format("out") for way in ways)
-        fragment = head + BLENDER + f"out vec4 {shader.output};\n"
-        fragment += "".join(way.format("in") for way in ways)
+        vertex = (
+            header
+            + "in vec4 vertex_data;\n"
+            + "".join(varying.format("out") for varying in varyings)
+        )
+        fragment = header + BLENDER_DEFINES + f"out vec4 {shader.output};\n"
+        fragment += "".join(varying.format("in") for varying in varyings)
         return self.context.program(
             vertex + shader.vertex_source, fragment_shader=fragment + shader.fragment_source
         )

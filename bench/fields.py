@@ -31,7 +31,7 @@ def measure(runs: int) -> Iterator[Case]:
     connection = build_connection(cases.ball(200_000))
     matrix = laplacian(connection, DEGREE)
 
-    def theirs() -> None:
+    def solve_with_scipy() -> None:
         shifted = _csc(matrix, connection)
         inverse = scipy.sparse.linalg.splu(shifted)
         z = np.random.default_rng(0).standard_normal(connection.node_count).astype(complex)
@@ -42,7 +42,7 @@ def measure(runs: int) -> Iterator[Case]:
     yield compare(
         f"smoothest field / SciPy's LU and {ITERATIONS} iterations, 200K triangles, N = {DEGREE}",
         lambda: run_to_completion(smallest_eigenvectors_task(connection, DEGREE)),
-        theirs,
+        solve_with_scipy,
         target=1.5,
         higher_is_better=False,
         runs=runs,
@@ -62,8 +62,8 @@ def _csc(matrix: CSRMatrix, connection: Connection) -> object:
     import scipy.sparse
 
     shape = len(matrix), matrix.column_count
-    whole = scipy.sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
-    return (whole + 1e-8 * scipy.sparse.diags(connection.mass)).tocsc()
+    sparse = scipy.sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
+    return (sparse + 1e-8 * scipy.sparse.diags(connection.mass)).tocsc()
 
 
 if __name__ == "__main__":

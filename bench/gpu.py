@@ -28,15 +28,16 @@ SIZES = ("512x512", "1920x1080", "3840x2160")
 
 DEGREES = (2, 3, 4, 6)
 
-#: Table 1 of the paper: its decomposition, 512 x 512 pixels and 12K triangles, on this card. Its
-#: objects are different, and it does not state their coverage of the frame; here it is 85 %.
-PAPER = {2: 17, 3: 46, 4: 32, 6: 46}
-PAPERS_CARD = "NVIDIA GeForce 8600 GTS"
-PAPERS_SIZE = (512, 512)
+#: Milliseconds by degree in Table 1 of the paper: its decomposition, 512 x 512 pixels and 12K
+#: triangles, on `PAPER_CARD`. Its objects are different, and it does not state how much of the frame
+#: they cover; here it is 85 %.
+PAPER_MILLISECONDS = {2: 17, 3: 46, 4: 32, 6: 46}
+PAPER_CARD = "NVIDIA GeForce 8600 GTS"
+PAPER_SIZE = (512, 512)
 
 TRIANGLES = 12_000
 
-#: Degree for the times of the stages.
+#: Size and degree for the times of the stages, and the passes of each stage.
 STAGES_SIZE, STAGES_DEGREE = (1920, 1080), 4
 STAGES = {
     "G-buffer (visibility, resolve)": ("visibility", "resolve"),
@@ -52,11 +53,11 @@ SECONDS = 6.0
 WARM_UP = 0.3
 
 #: Rotation of the camera between frames, in radians.
-ON = 0.01
+AZIMUTH_STEP = 0.01
 
 
-def device() -> Any:
-    """Return the device; None if there is none, after printing the reason."""
+def open_device() -> Any:
+    """Return a device; None if none can be opened, after printing the reason."""
     try:
         from .egl import EglDevice
     except ImportError:
@@ -73,29 +74,29 @@ def device() -> Any:
         return None
 
 
-def draw_texture(card: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
+def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
     """Draw a picture and leave it on the card."""
-    return run_to_completion(card.render_texture_task(items, ViewInput((), camera, look)))
+    return run_to_completion(renderer.render_texture_task(items, ViewInput((), camera, look)))
 
 
 class Frames:
     """Repeated frames of one object at one size."""
 
-    def __init__(self, drawn_by: Any, size: tuple[int, int], degree: int) -> None:
-        self.device = drawn_by
+    def __init__(self, device: Any, size: tuple[int, int], degree: int) -> None:
+        self.device = device
         self.size = size
-        self.card = GpuRenderer(drawn_by)
-        self.placed: list[DrawItem] = self.card.upload(
+        self.renderer = GpuRenderer(device)
+        self.items: list[DrawItem] = self.renderer.upload(
             [cases.instance(TRIANGLES, degree)], "smooth"
         )
-        self.drawn = 0
+        self.frame_count = 0
 
     def draw(self) -> float:
         """Draw the next frame and return its time in seconds."""
-        camera = cases.camera(*self.size, azimuth=self.drawn * ON)
-        self.drawn += 1
+        camera = cases.camera(*self.size, azimuth=self.frame_count * AZIMUTH_STEP)
+        self.frame_count += 1
         start = time.perf_counter()
-        draw_texture(self.card, self.placed, camera, cases.LOOK)
+        draw_texture(self.renderer, self.items, camera, cases.LOOK)
         self.device.finish()
         return time.perf_counter() - start
 
@@ -109,13 +110,13 @@ class Frames:
     def times(self, frames: int) -> np.ndarray:
         """Return the times of frames in milliseconds; fewer frames if they take long."""
         self.warm_up()
-        found: list[float] = []
-        while len(found) < frames and sum(found) < SECONDS:
-            found.append(self.draw())
-        return np.array(found) * 1e3
+        seconds: list[float] = []
+        while len(seconds) < frames and sum(seconds) < SECONDS:
+            seconds.append(self.draw())
+        return np.array(seconds) * 1e3
 
 
-class Staged:
+class TimedDevice:
     """A device that waits after each pass and records its time."""
 
     def __init__(self, device: Any) -> None:
@@ -130,7 +131,7 @@ class Staged:
         self._timed(self._device.compute, shader, *rest)
 
     def draw(self, shader: Any, *rest: Any) -> None:
-        """As `Device.render`."""
+        """As `Device.draw`."""
         self._timed(self._device.draw, shader, *rest)
 
     def _timed(self, work: Any, shader: Any, *rest: Any) -> None:
@@ -138,15 +139,17 @@ class Staged:
         start = time.perf_counter()
         work(shader, *rest)
         self._device.finish()
-        took = time.perf_counter() - start
-        self.seconds[shader.name] = self.seconds.get(shader.name, 0.0) + took
+        elapsed = time.perf_counter() - start
+        self.seconds[shader.name] = self.seconds.get(shader.name, 0.0) + elapsed
 
 
-def rows(drawn_by: Any, sizes: Sequence[tuple[int, int]], frames: int) -> Iterator[dict[str, Any]]:
+def measure_rows(
+    device: Any, sizes: Sequence[tuple[int, int]], frames: int
+) -> Iterator[dict[str, Any]]:
     """Yield the time for each size and degree."""
     for size in sizes:
         for degree in DEGREES:
-            times = Frames(drawn_by, size, degree).times(frames)
+            times = Frames(device, size, degree).times(frames)
             yield {
                 "width": size[0],
                 "height": size[1],
@@ -155,25 +158,29 @@ def rows(drawn_by: Any, sizes: Sequence[tuple[int, int]], frames: int) -> Iterat
                 "least": float(times.min()),
                 "largest": float(times.max()),
                 "frames": len(times),
-                "paper": PAPER[degree] if size == PAPERS_SIZE else None,
+                "paper": PAPER_MILLISECONDS[degree] if size == PAPER_SIZE else None,
             }
 
 
-def stages(drawn_by: Any, frames: int) -> dict[str, float]:
+def measure_stages(device: Any, frame_count: int) -> dict[str, float]:
     """Return the median time of each stage in milliseconds, with a wait after each pass."""
-    staged = Staged(drawn_by)
-    again = Frames(staged, STAGES_SIZE, STAGES_DEGREE)
-    again.warm_up()
-    found = []
+    timed_device = TimedDevice(device)
+    frames_of_case = Frames(timed_device, STAGES_SIZE, STAGES_DEGREE)
+    frames_of_case.warm_up()
+    stage_seconds = []
     start = time.perf_counter()
-    while len(found) < frames and (not found or time.perf_counter() - start < SECONDS):
-        staged.seconds.clear()
-        again.draw()
-        found.append([sum(staged.seconds[name] for name in names) for names in STAGES.values()])
-    return dict(zip(STAGES, (np.median(found, axis=0) * 1e3).tolist(), strict=True))
+    while len(stage_seconds) < frame_count and (
+        not stage_seconds or time.perf_counter() - start < SECONDS
+    ):
+        timed_device.seconds.clear()
+        frames_of_case.draw()
+        stage_seconds.append(
+            [sum(timed_device.seconds[name] for name in names) for names in STAGES.values()]
+        )
+    return dict(zip(STAGES, (np.median(stage_seconds, axis=0) * 1e3).tolist(), strict=True))
 
 
-def line(row: dict[str, Any]) -> str:
+def format_row(row: dict[str, Any]) -> str:
     """Format a row for printing."""
     size = f"{row['width']} x {row['height']}"
     spread = f"({row['least']:.2f} to {row['largest']:.2f})"
@@ -184,8 +191,8 @@ def line(row: dict[str, Any]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
-    about, _, more = (__doc__ or "").partition("\n")
-    parser = argparse.ArgumentParser(description=about, epilog=more.strip())
+    summary, _, details = (__doc__ or "").partition("\n")
+    parser = argparse.ArgumentParser(description=summary, epilog=details.strip())
     parser.add_argument("--sizes", nargs="+", type=_size, default=[_size(name) for name in SIZES])
     parser.add_argument(
         "--frames", type=int, default=FRAMES, help="number of frames per case (%(default)s)"
@@ -194,28 +201,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--no-stages", action="store_true", help="time only whole frames, not stages"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
-    chosen = parser.parse_args(arguments)
-    drawn_by = device()
-    if drawn_by is None:
+    options = parser.parse_args(arguments)
+    device = open_device()
+    if device is None:
         return 1
-    found: dict[str, Any] = {"renderer": drawn_by.name, "triangles": TRIANGLES, "rows": []}
-    print(drawn_by.name)
+    report: dict[str, Any] = {"renderer": device.name, "triangles": TRIANGLES, "rows": []}
+    print(device.name)
     print(
         f"{TRIANGLES // 1000}K triangles, {2 * cases.LOOK.length + 1} samples; milliseconds a frame,"
     )
-    print(f"the least and the largest, and the paper's on an {PAPERS_CARD}", flush=True)
-    for row in rows(drawn_by, chosen.sizes, chosen.frames):
-        found["rows"].append(row)
-        print(line(row), flush=True)
-    if not chosen.no_stages:
-        found["stages"] = stages(drawn_by, chosen.frames)
+    print(f"the least and the largest, and the paper's on an {PAPER_CARD}", flush=True)
+    for row in measure_rows(device, options.sizes, options.frames):
+        report["rows"].append(row)
+        print(format_row(row), flush=True)
+    if not options.no_stages:
+        report["stages"] = measure_stages(device, options.frames)
         width, height = STAGES_SIZE
         print(f"of {width} x {height}, N = {STAGES_DEGREE}, waiting after each pass")
-        for name, amount in found["stages"].items():
-            print(f"  {name:34} {amount:9.2f}", flush=True)
-    if chosen.json:
-        chosen.json.parent.mkdir(parents=True, exist_ok=True)
-        chosen.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        for name, milliseconds in report["stages"].items():
+            print(f"  {name:34} {milliseconds:9.2f}", flush=True)
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

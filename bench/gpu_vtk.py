@@ -16,14 +16,14 @@ import numpy as np
 from rosy_addon.gpu.renderer import GpuRenderer
 
 from . import cases
-from .gpu import device, draw_texture
-from .surface_vtk import DEGREE, LOOK, ON, renderer
+from .gpu import draw_texture, open_device
+from .surface_vtk import AZIMUTH_STEP, DEGREE, LOOK, vtk_renderer
 from .timing import Case, compare, main
 
 
 def measure(runs: int) -> Iterator[Case]:
     """Time a small and a large mesh."""
-    if device() is None:
+    if open_device() is None:
         return
     try:
         import vtk
@@ -31,37 +31,39 @@ def measure(runs: int) -> Iterator[Case]:
         print("shaders beside VTK: skipped, because vtk is not installed", file=sys.stderr)
         return
     for triangles in (12_000, 200_000):
-        case = _compared(vtk, triangles, runs)
+        case = _compare_mesh(vtk, triangles, runs)
         if case is not None:
             yield case
 
 
-def _compared(vtk: Any, triangles: int, runs: int) -> Case | None:
+def _compare_mesh(vtk: Any, triangles: int, runs: int) -> Case | None:
     """Time one mesh. Each needs its own context, because VTK makes the context of its window current."""
-    turn, read, theirs = renderer(vtk, triangles)
-    drawn_by = device()
-    print(f"shaders: {drawn_by.name}; VTK: {theirs}", flush=True)
-    if drawn_by.name != theirs:
+    draw_next, read_pixels, vtk_name = vtk_renderer(vtk, triangles)
+    device = open_device()
+    print(f"shaders: {device.name}; VTK: {vtk_name}", flush=True)
+    if device.name != vtk_name:
         print("shaders beside VTK: skipped, because they use different renderers", file=sys.stderr)
         return None
-    card = GpuRenderer(drawn_by)
-    placed = card.upload([cases.instance(triangles, DEGREE)], LOOK.display)
-    picture = card.read(draw_texture(card, placed, cases.camera(), LOOK), cases.SIZE, cases.SIZE)
-    turn()
-    ours, covered = (picture[..., 3] > 0).mean(), (read().min(axis=1) < 255).mean()
-    print(f"covered: {covered:.1%} by VTK, {ours:.1%} by the shaders", flush=True)
-    azimuths = iter(np.arange(1, 10_000) * ON)
+    renderer = GpuRenderer(device)
+    items = renderer.upload([cases.instance(triangles, DEGREE)], LOOK.display)
+    picture = renderer.read(
+        draw_texture(renderer, items, cases.camera(), LOOK), cases.SIZE, cases.SIZE
+    )
+    draw_next()
+    coverage, vtk_coverage = (picture[..., 3] > 0).mean(), (read_pixels().min(axis=1) < 255).mean()
+    print(f"covered: {vtk_coverage:.1%} by VTK, {coverage:.1%} by the shaders", flush=True)
+    azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
 
-    def frame() -> None:
+    def draw_frame() -> None:
         # VTK makes its own context current in every frame.
-        with drawn_by.context:
-            draw_texture(card, placed, cases.camera(azimuth=next(azimuths)), LOOK)
-            drawn_by.finish()
+        with device.context:
+            draw_texture(renderer, items, cases.camera(azimuth=next(azimuths)), LOOK)
+            device.finish()
 
     return compare(
         f"shaders, N = 4 / VTK's one vector field, {triangles // 1000}K triangles",
-        frame,
-        turn,
+        draw_frame,
+        draw_next,
         target=1.0,
         higher_is_better=False,
         runs=runs,

@@ -23,7 +23,7 @@ ALLOWED = 8.0
 
 WIDE = 3840, 2160
 
-#: Names, triangles, N, and settings of the look.
+#: Triangles, N, and settings of the look, by the name of the case.
 CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "3840 x 2160, N = 4": (12_000, 4, {}),
     "3840 x 2160, N = 7, color noise": (12_000, 7, {"noise": "colour"}),
@@ -37,8 +37,8 @@ def measure(runs: int) -> Iterator[Case]:
     """Measure each case once, because memory does not vary between runs."""
     for name in CASES:
         command = [sys.executable, "-m", "bench.memory", "--draw", name]
-        done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
-        peak = float(done.stdout.split()[-1])
+        completed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        peak = float(completed.stdout.split()[-1])
         ratio = peak / ALLOWED
         case = Case(
             name=f"peak memory / {ALLOWED:g} GB, {name}",
@@ -72,9 +72,9 @@ def draw(name: str) -> float:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--draw", choices=CASES)
-    chosen, rest = parser.parse_known_args()
-    if chosen.draw:
-        print(draw(chosen.draw))
+    options, rest = parser.parse_known_args()
+    if options.draw:
+        print(draw(options.draw))
         sys.exit()
     if os.name == "nt":
         sys.exit(

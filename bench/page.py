@@ -2,7 +2,7 @@
 
     python -m bench.page CASES.json ...
 
-A table stands between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``. It lists the cases whose names
+A table is between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``. It lists the cases whose names
 match the regular expression.
 """
 
@@ -21,8 +21,8 @@ TABLE = re.compile(r"(<!-- cases: (?P<pattern>.*?) -->\n).*?(<!-- end -->)", re.
 
 def main() -> int:
     """Rewrite all tables for which the files have cases."""
-    about = (__doc__ or "").partition("\n")[0]
-    parser = argparse.ArgumentParser(prog="python -m bench.page", description=about)
+    summary = (__doc__ or "").partition("\n")[0]
+    parser = argparse.ArgumentParser(prog="python -m bench.page", description=summary)
     parser.add_argument(
         "cases", nargs="+", type=Path, help="files that benchmarks wrote with --json"
     )
@@ -30,30 +30,36 @@ def main() -> int:
         entry for path in parser.parse_args().cases for entry in json.loads(path.read_text())
     ]
 
-    def filled(match: re.Match[str]) -> str:
-        chosen = [entry for entry in entries if re.search(match["pattern"], entry["name"])]
-        return match[1] + _table(chosen) + match[3] if chosen else match[0]
+    def fill_table(match: re.Match[str]) -> str:
+        matching = [entry for entry in entries if re.search(match["pattern"], entry["name"])]
+        return match[1] + _table(matching) + match[3] if matching else match[0]
 
-    PAGE.write_text(TABLE.sub(filled, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(TABLE.sub(fill_table, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     return 0
 
 
 def _table(entries: list[dict]) -> str:
     lines = ["| case | ratio | min to max | target | amounts |", "| --- " * 5 + "|"]
     for entry in entries:
-        asked = ""
+        target = ""
         if entry["target"] is not None:
             better = entry["higher_is_better"]
-            asked = f"{'at least' if better else 'at most'} {entry['target']:g}"
+            target = f"{'at least' if better else 'at most'} {entry['target']:g}"
             missed = (
                 entry["ratio"] < entry["target"] if better else entry["ratio"] > entry["target"]
             )
-            asked += ": **missed**" if missed else ""
+            target += ": **missed**" if missed else ""
         amounts = " / ".join(_rounded(amount) for amount in entry["amounts"])
         spread = f"{entry['low']:.2f} to {entry['high']:.2f}"
         spread = spread if entry["low"] < entry["high"] else ""
         name = entry["name"].strip().replace("|", "\\|")
-        cells = [name, f"{entry['ratio']:.2f}", spread, asked, f"{amounts} {entry['unit']}".strip()]
+        cells = [
+            name,
+            f"{entry['ratio']:.2f}",
+            spread,
+            target,
+            f"{amounts} {entry['unit']}".strip(),
+        ]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

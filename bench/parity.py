@@ -24,12 +24,12 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: Largest distance of two points that count as equal, in pixels. OpenGL rounds the vertices of
+#: Largest distance between two points that count as equal, in pixels. OpenGL rounds the vertices of
 #: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
-NEAR = 0.1
+MAX_DISTANCE_PX = 0.1
 
-#: Largest distance of unit normals, and of representations relative to the larger of the two.
-ALIKE = 1e-3
+#: Largest difference of unit normals, and of representations relative to the larger modulus.
+MAX_DIFFERENCE = 1e-3
 
 DEGREES = (1, 2, 3, 4, 5, 6)
 
@@ -80,9 +80,9 @@ class Pair:
     Attributes
     ----------
     gbuffer : GBuffer
-        Of numpy.
+        The G-buffer of numpy.
     images : dict of str to (H, W, 4) float32 ndarray
-        The card's G-buffer.
+        The G-buffer of the card.
     card, numpy : (H, W, 4) float32 ndarray
         The pictures, linear.
     """
@@ -103,44 +103,51 @@ class Pair:
         return likeness(self.card, self.numpy)
 
 
-def drawn_twice(
+def draw_pair(
     rosy: SimpleNamespace,
     card: Any,
     instances: Sequence[Any],
     camera: Any,
     look: Any,
     lights: Sequence[Any] = (),
-    rendered: Any = None,
+    reference: Any = None,
 ) -> Pair:
-    """Draw a picture on the card and with numpy, by brute force, which shares no averages.
+    """Draw a picture on the card and with numpy.
+
+    Numpy uses brute force, which averages each streamline separately.
 
     Parameters
     ----------
     rosy : SimpleNamespace
-        Of `rooms`.
-    card : Card
+        The result of `rooms`.
+    card : GpuRenderer
     instances : sequence of MeshInstance
     camera : Camera
-        Of `look.supersampling` times the size of the picture each way.
+        With `look.supersampling` times the width and height of the picture.
     look : Look
     lights : sequence of Light
-    rendered : Rendered, optional
+    reference : ReferenceRender, optional
     """
-    side = look.supersampling
-    width, height = camera.width // side, camera.height // side
+    supersampling = look.supersampling
+    width, height = camera.width // supersampling, camera.height // supersampling
     view = rosy.ViewInput(
-        tuple(instances), camera.resized(width, height), look, tuple(lights), rendered
+        tuple(instances), camera.resized(width, height), look, tuple(lights), reference
     )
     items = card.upload(instances, look.display)
     texture = rosy.run_to_completion(card.render_texture_task(items, view))
-    found = card.read(texture, width, height)
+    card_picture = card.read(texture, width, height)
     images = card.read_gbuffer(camera)
     gbuffer = rosy.project(instances, camera, look.display)
-    expected = rosy.compose(gbuffer, replace(look, method="brute"), lights, rendered).rgba
-    return Pair(gbuffer, {name: np.array(image) for name, image in images.items()}, found, expected)
+    numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
+    return Pair(
+        gbuffer,
+        {name: np.array(image) for name, image in images.items()},
+        card_picture,
+        numpy_picture,
+    )
 
 
-def drawn_on_card(
+def draw_on_card(
     rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
 ) -> np.ndarray:
     """Draw a picture on the card: (H, W, 4), without supersampling."""
@@ -151,23 +158,24 @@ def drawn_on_card(
 
 
 def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
-    """The fraction of pixels at which both G-buffers agree.
+    """Return the fraction of pixels at which both G-buffers agree.
 
-    Of all pixels that at least one of them covers with a field, those count that
+    The pixels are those that at least one of the G-buffers covers with a field. They agree if
 
-    - both cover, with the same instance,
-    - at the same point of it, within `NEAR` of a pixel: two points on the ray through the pixel, so
-      their distance is that in depth, and compared with what a pixel measures across there. Which
-      triangle is seen may differ where two meet, as OpenGL rounds their corners, but not the point;
-    - with the same normal, within `ALIKE` (its sign says which side is seen),
-    - and the same representation, z, within `ALIKE` of the greater modulus; 0 only with 0.
+    - both cover the pixel, with the same instance;
+    - the points are within `MAX_DISTANCE_PX`. Both are on the ray through the pixel, so their
+      distance is the difference in depth, in pixels at that depth. The triangles may be different
+      where two meet, because OpenGL rounds their corners, but the points may not;
+    - the normals differ by less than `MAX_DIFFERENCE`, and both G-buffers see the same side;
+    - the representations z differ by at most `MAX_DIFFERENCE` times the greater modulus; 0 agrees
+      only with 0.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        Of numpy.
+        The G-buffer of numpy.
     images : dict of str to (H, W, 4) ndarray
-        Of `Card.gbuffer`.
+        The G-buffer of the card; see `GpuRenderer.read_gbuffer`.
     """
     camera, pixel = gbuffer.camera, gbuffer.pixel
     normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))
@@ -177,23 +185,23 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
     normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
     same = values[:, 3] == gbuffer.instance_id + 1
     depth = -gbuffer.position[:, 2].astype(np.float64)
-    apart = np.abs(np.abs(normals[:, 3]) - depth)
+    distance = np.abs(np.abs(normals[:, 3]) - depth)
     if camera.is_perspective:
         # Along the ray, and in units of a pixel at that depth.
-        apart = apart / gbuffer.view_direction[:, 2] / depth
-    same &= apart * camera.pixels_per_unit < NEAR
-    same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < ALIKE
+        distance = distance / gbuffer.view_direction[:, 2] / depth
+    same &= distance * camera.pixels_per_unit < MAX_DISTANCE_PX
+    same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < MAX_DIFFERENCE
     same &= (normals[:, 3] > 0) == gbuffer.front_facing
     z = values[:, 0] + 1j * values[:, 1]
     expected = gbuffer.representation.astype(np.complex128)
-    same &= np.abs(z - expected) <= ALIKE * np.maximum(np.abs(z), np.abs(expected))
+    same &= np.abs(z - expected) <= MAX_DIFFERENCE * np.maximum(np.abs(z), np.abs(expected))
     return np.count_nonzero(same) / either
 
 
 def likeness(one: np.ndarray, other: np.ndarray) -> float:
-    """The correlation of two (H, W, 4) linear pictures over the pixels that both cover fully.
+    """Return the correlation of two (H, W, 4) linear pictures over pixels that both cover fully.
 
-    For gray pictures, of their values; for colored ones, the smallest of the channels.
+    It is the smallest of the correlations of the three channels.
     """
     both = (one[..., 3] == 1) & (other[..., 3] == 1)
     one, other = one[both].astype(np.float64), other[both].astype(np.float64)
@@ -215,49 +223,49 @@ def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
         modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
         modifier.levels = 2
     bpy.ops.object.shade_smooth()
-    thing = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
     meshes = module_of(rosy.package, "scene.meshes")
     try:
-        return meshes.mesh_surface(thing.to_mesh(), name)
+        return meshes.mesh_surface(evaluated.to_mesh(), name)
     finally:
-        thing.to_mesh_clear()
+        evaluated.to_mesh_clear()
         bpy.ops.object.delete()
 
 
-def surface_named(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
-    """The surface of a shape in `VIEWS`; None if its file is not in the data folder."""
+def surface_of_shape(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
+    """Return the surface of a shape in `VIEWS`; None if its file is not in the data folder."""
     if name not in FILES:
         return blender_surface(rosy, name)
     path = None if data is None else data / "meshes" / FILES[name]
     return rosy.read_mesh(path) if path is not None and path.is_file() else None
 
 
-def camera_for(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
+def camera_of_shape(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
     """Return the camera for a shape in `VIEWS`, with a square frame."""
     azimuth, elevation, perspective = VIEWS[name]
     return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
 
 
-def sweep(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) -> Iterator[str]:
-    """The lines of the table: its header, and a row for each shape and degree."""
+def table_lines(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) -> Iterator[str]:
+    """Yield the lines of the table: its header, and a row for each shape and degree."""
     yield "| shape | triangles | N | pixels | agree % | correlation | shaded | card s | numpy s |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
     for name in VIEWS:
-        surface = surface_named(rosy, name, data)
+        surface = surface_of_shape(rosy, name, data)
         if surface is None:
             continue
-        camera = camera_for(rosy, name, surface, size)
+        camera = camera_of_shape(rosy, name, surface, size)
         for degree in DEGREES:
             instance = rosy.MeshInstance(
                 surface, np.eye(4), rosy.generate(surface, "smoothest", degree)
             )
-            plain = rosy.Look(shading=0.0)
+            unshaded_look = rosy.Look(shading=0.0)
             start = time.perf_counter()
-            drawn_on_card(rosy, card, [instance], camera, plain)
+            draw_on_card(rosy, card, [instance], camera, unshaded_look)
             middle = time.perf_counter()
-            pair = drawn_twice(rosy, card, [instance], camera, plain)
+            pair = draw_pair(rosy, card, [instance], camera, unshaded_look)
             end = time.perf_counter()
-            shaded = drawn_twice(rosy, card, [instance], camera, rosy.Look())
+            shaded = draw_pair(rosy, card, [instance], camera, rosy.Look())
             yield (
                 f"| {name} | {len(surface.triangles)} | {degree} | {len(pair.gbuffer.pixel)} "
                 f"| {100 * pair.agreement:.3f} | {pair.likeness:.4f} | {shaded.likeness:.4f} "
@@ -275,7 +283,7 @@ def main() -> None:
     rosy = rooms()
     device = module_of(rosy.package, "gpu.device").BlenderDevice()
     lines = []
-    for line in sweep(rosy, rosy.GpuRenderer(device), options.size, options.data):
+    for line in table_lines(rosy, rosy.GpuRenderer(device), options.size, options.data):
         print(line, flush=True)
         lines.append(line)
     if options.out:

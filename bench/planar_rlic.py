@@ -27,13 +27,13 @@ def measure(runs: int) -> Iterator[Case]:
         print("planar images of rlic: skipped, because rlic is not installed", file=sys.stderr)
         return
     use_one_core()
-    flow, noise = cases.plane(DEGREE)
-    angle = (np.angle(flow.representation) / DEGREE).reshape(cases.SIZE, cases.SIZE)
+    field, noise = cases.plane(DEGREE)
+    angle = (np.angle(field.representation) / DEGREE).reshape(cases.SIZE, cases.SIZE)
     texture = np.ascontiguousarray(noise.reshape(angle.shape))
     kernel = np.full(2 * LOOK.length + 1, 1 / (2 * LOOK.length + 1), dtype=np.float32)
     members = [
-        (np.cos(turned).astype(np.float32), np.sin(turned).astype(np.float32))
-        for turned in (angle + 2 * np.pi * number / DEGREE for number in range(DEGREE))
+        (np.cos(rotated).astype(np.float32), np.sin(rotated).astype(np.float32))
+        for rotated in (angle + 2 * np.pi * index / DEGREE for index in range(DEGREE))
     ]
 
     def four_images() -> None:

@@ -53,22 +53,23 @@ ANGLES = (0.05, 0.37, 0.8, 1.1)
 
 
 #: White noise with half of the cells bright, as in the paper, which is the harder test.
-PAPER = replace(cases.LOOK, density=0.5, high_pass=0.0)
+PAPER_LOOK = replace(cases.LOOK, density=0.5, high_pass=0.0)
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurements:
     """The measurements of the images of one method.
 
     Attributes
     ----------
     deviation : (2,) ndarray
-        Of the members' images and of their mean.
+        Standard deviations of the images of members and of their blend.
     along, across : ndarray
-        Autocorrelations of members' images.
+        Autocorrelations of the images of members.
     sharpness : float
-        In a uniform field, the peaks of the blend's spectrum over orientations, whose mean is 1.
-        Elsewhere, the share of the members' slopes that stands across them.
+        In a uniform field, the mean height of the peaks of the orientation spectrum of the blend,
+        whose mean is 1. In other fields, the fraction of the variance of the gradients of members'
+        images that is perpendicular to the members.
     """
 
     deviation: np.ndarray
@@ -81,85 +82,92 @@ def measure(runs: int, data: Path | None = None) -> Iterator[Case]:
     """Compare all fields. `runs` is ignored, because pictures do not vary."""
     del runs
     for name, make in _fields(data).items():
-        flows = make()
-        for look_name, look in (("paper's noise", PAPER), ("default noise", cases.LOOK)):
-            sheets, brute = (_measured(flows, replace(look, method=m)) for m in ("sheets", "brute"))
-            yield from _compared(f"{name}, {look_name}", sheets, brute)
+        fields = make()
+        for look_name, look in (("paper's noise", PAPER_LOOK), ("default noise", cases.LOOK)):
+            sheets, brute = (
+                _measure_fields(fields, replace(look, method=m)) for m in ("sheets", "brute")
+            )
+            yield from _compare_methods(f"{name}, {look_name}", sheets, brute)
 
 
-def _compared(name: str, sheets: Measured, brute: Measured) -> Iterator[Case]:
-    apart = sheets.deviation / brute.deviation
-    apart = np.maximum(apart, 1 / apart).max()
+def _compare_methods(name: str, sheets: Measurements, brute: Measurements) -> Iterator[Case]:
+    deviation_ratio = sheets.deviation / brute.deviation
+    deviation_ratio = np.maximum(deviation_ratio, 1 / deviation_ratio).max()
     correlation = max(
         np.abs(sheets.along - brute.along).max(), np.abs(sheets.across - brute.across).max()
     )
-    sharper = max(sheets.sharpness / brute.sharpness, brute.sharpness / sheets.sharpness)
-    for what, value, target, amounts in (
-        ("deviation", apart, 1.02, (sheets.deviation[1], brute.deviation[1])),
+    sharpness_ratio = max(sheets.sharpness / brute.sharpness, brute.sharpness / sheets.sharpness)
+    for quantity, value, target, amounts in (
+        ("deviation", deviation_ratio, 1.02, (sheets.deviation[1], brute.deviation[1])),
         ("autocorrelation", correlation, 0.03, (sheets.across[0], brute.across[0])),
-        ("sharpness", sharper, 1.05, (sheets.sharpness, brute.sharpness)),
+        ("sharpness", sharpness_ratio, 1.05, (sheets.sharpness, brute.sharpness)),
     ):
         value = float(value)
         amounts = float(amounts[0]), float(amounts[1])
-        case = Case(f"{name}: {what}", value, value, value, target, False, amounts, "")
+        case = Case(f"{name}: {quantity}", value, value, value, target, False, amounts, "")
         print(case.line(), flush=True)
         yield case
 
 
-def _measured(flows: Sequence[PixelField], look: Look) -> Measured:
+def _measure_fields(fields: Sequence[PixelField], look: Look) -> Measurements:
     """Return means over several seeds, or over several fields with one seed each."""
-    found = []
-    for seed, flow in zip(SEEDS, flows * len(SEEDS) if len(flows) == 1 else flows, strict=True):
-        noise = look_noise(flow, replace(look, seed=seed))
-        found.append(_measured_in(flow, run_to_completion(METHODS[look.method](flow, look, noise))))
-    return Measured(
+    measurements = []
+    for seed, field in zip(SEEDS, fields * len(SEEDS) if len(fields) == 1 else fields, strict=True):
+        noise = look_noise(field, replace(look, seed=seed))
+        measurements.append(
+            _measure_images(field, run_to_completion(METHODS[look.method](field, look, noise)))
+        )
+    return Measurements(
         *(
-            np.mean([getattr(one, part) for one in found], axis=0)
-            for part in Measured.__annotations__
+            np.mean([getattr(measured, name) for measured in measurements], axis=0)
+            for name in Measurements.__annotations__
         )
     )
 
 
-def _measured_in(flow: PixelField, images: LicImages) -> Measured:
-    shape = flow.height, flow.width
-    inside = np.zeros(flow.height * flow.width, dtype=bool)
-    inside[flow.pixel] = flow.representation != 0
+def _measure_images(field: PixelField, images: LicImages) -> Measurements:
+    """Measure the images of one field, away from its borders and from undefined pixels."""
+    shape = field.height, field.width
+    inside = np.zeros(field.height * field.width, dtype=bool)
+    inside[field.pixel] = field.representation != 0
     inside = np.pad(inside.reshape(shape), 1)
     inside = ndimage.distance_transform_edt(inside)[1:-1, 1:-1] > BORDER
-    chosen = inside.ravel()[flow.pixel]
-    first = nearest_member(flow, 0.0)
+    chosen = inside.ravel()[field.pixel]
+    first = nearest_member(field, 0.0)
     along, across, lengthwise, crosswise = [], [], 0.0, 0.0
-    for number, member in enumerate(images.members[:, :, 0]):
-        ahead = _on_screen(flow, first * np.exp(2j * np.pi * number / flow.degree))
-        direction = _frame(ahead, flow)
-        image = _frame(member, flow)
+    for index, member in enumerate(images.members[:, :, 0]):
+        screen_direction = _on_screen(field, first * np.exp(2j * np.pi * index / field.degree))
+        direction = _frame(screen_direction, field)
+        image = _frame(member, field)
         along.append(persistence(image, direction, inside, max(ALONG))[list(ALONG)])
         across.append(persistence(image, 1j * direction, inside, max(ACROSS))[list(ACROSS)])
         slope = ndimage.sobel(image, 1) + 1j * ndimage.sobel(image, 0)
-        turned = (slope * direction.conj())[inside]
-        lengthwise, crosswise = lengthwise + turned.real.var(), crosswise + turned.imag.var()
+        rotated = (slope * direction.conj())[inside]
+        lengthwise, crosswise = lengthwise + rotated.real.var(), crosswise + rotated.imag.var()
     sharpness = crosswise / (crosswise + lengthwise)
-    if np.ptp(flow.representation[chosen]) == 0:
-        blend = _frame(images.blend[:, 0], flow)[BORDER:-BORDER, BORDER:-BORDER]
-        lines = flow.degree if flow.degree % 2 else flow.degree // 2
+    if np.ptp(field.representation[chosen]) == 0:
+        blend = _frame(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
+        lines = field.degree if field.degree % 2 else field.degree // 2
         spectrum = ndimage.gaussian_filter1d(mean_spectrum(blend, 256), 1.0, mode="wrap")
-        place = np.degrees(np.angle(first[0])) + 180 / lines * np.arange(lines)
-        sharpness = spectrum[np.rint(place - 0.5).astype(int) % 180].mean()
+        orientation = np.degrees(np.angle(first[0])) + 180 / lines * np.arange(lines)
+        sharpness = spectrum[np.rint(orientation - 0.5).astype(int) % 180].mean()
     deviation = np.array([images.members[:, chosen].std(), images.blend[chosen].std()])
-    return Measured(deviation, np.mean(along, axis=0), np.mean(across, axis=0), sharpness)
+    return Measurements(deviation, np.mean(along, axis=0), np.mean(across, axis=0), sharpness)
 
 
-def _on_screen(flow: PixelField, member: np.ndarray) -> np.ndarray:
-    """(P,) unit directions on the screen of members in the view plane."""
-    if flow.screen_jacobian is not None:
-        member = flow.screen_jacobian[:, 0] * member.real + flow.screen_jacobian[:, 1] * member.imag
+def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
+    """Return (P,) complex: the unit directions on the screen of members in the view plane."""
+    if field.screen_jacobian is not None:
+        member = (
+            field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
+        )
     return member / np.maximum(np.abs(member), 1e-12)
 
 
-def _frame(values: np.ndarray, flow: PixelField) -> np.ndarray:
-    frame = np.zeros(flow.height * flow.width, dtype=values.dtype)
-    frame[flow.pixel] = values
-    return frame.reshape(flow.height, flow.width)
+def _frame(values: np.ndarray, field: PixelField) -> np.ndarray:
+    frame = np.zeros(field.height * field.width, dtype=values.dtype)
+    frame[field.pixel] = values
+    return frame.reshape(field.height, field.width)
 
 
 # --- fields ----------------------------------------------------------------------------------------
@@ -188,25 +196,28 @@ def _uniform(degree: int) -> list[PixelField]:
 
 def _on_sphere(degree: int) -> list[PixelField]:
     surface = cases.ball(20_000, bumps=0.0)
-    return _seen(surface, axis_field(surface, degree, (0.3, 0.2, 1.0)))
+    return _pixel_fields_of(surface, axis_field(surface, degree, (0.3, 0.2, 1.0)))
 
 
 def _on_torus(degree: int) -> list[PixelField]:
     surface = cases.torus(20_000)
-    return _seen(surface, axis_field(surface, degree, (0.0, 0.0, 1.0)))
+    return _pixel_fields_of(surface, axis_field(surface, degree, (0.0, 0.0, 1.0)))
 
 
 def _on_bunny(data: Path) -> list[PixelField]:
     surface = read_mesh(data / "meshes" / "stanford-bunny.obj")
-    return _seen(surface, generate(surface, "curvature", 4))
+    return _pixel_fields_of(surface, generate(surface, "curvature", 4))
 
 
 def _on_vase(data: Path, degree: int) -> list[PixelField]:
     surface = read_mesh(data / "meshes" / "vase.off")
-    return _seen(surface, read_field(data / "fields" / f"vase-{degree}.rawfield", surface))
+    return _pixel_fields_of(
+        surface, read_field(data / "fields" / f"vase-{degree}.rawfield", surface)
+    )
 
 
-def _seen(surface: Surface, field: RosyField) -> list[PixelField]:
+def _pixel_fields_of(surface: Surface, field: RosyField) -> list[PixelField]:
+    """Return the field as a camera sees it, in a list of one."""
     camera = orbit_camera(surface, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
     return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
@@ -215,5 +226,5 @@ def _seen(surface: Surface, field: RosyField) -> list[PixelField]:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--data", type=Path)
-    given, rest = parser.parse_known_args()
-    sys.exit(main(__doc__, partial(measure, data=given.data), rest))
+    options, rest = parser.parse_known_args()
+    sys.exit(main(__doc__, partial(measure, data=options.data), rest))

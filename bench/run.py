@@ -41,29 +41,29 @@ QUICK_RUNS = 3
 
 def main() -> int:
     """Run the command line."""
-    about, _, more = (__doc__ or "").partition("\n")
-    parser = argparse.ArgumentParser(description=about, epilog=more.strip())
+    summary, _, details = (__doc__ or "").partition("\n")
+    parser = argparse.ArgumentParser(description=summary, epilog=details.strip())
     parser.add_argument("script", nargs="*", help=f"{', '.join(SCRIPTS)}; all if not given")
     parser.add_argument("--quick", action="store_true", help="only Table 1, without the peers")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
     parser.add_argument("--runs", type=int, help=f"runs per case ({RUNS}; --quick: {QUICK_RUNS})")
-    chosen = parser.parse_args()
-    unknown = [name for name in chosen.script if name not in SCRIPTS]
+    options = parser.parse_args()
+    unknown = [name for name in options.script if name not in SCRIPTS]
     if unknown:
         parser.error(f"there is no '{unknown[0]}', only {', '.join(SCRIPTS)}")
-    if chosen.quick:
+    if options.quick:
         print(machine(), flush=True)
-        cases = list(quick(chosen.runs or QUICK_RUNS, cold=True))
-        if chosen.json:
-            write(chosen.json, [case.entry() for case in cases])
+        cases = list(quick(options.runs or QUICK_RUNS, cold=True))
+        if options.json:
+            write(options.json, [case.entry() for case in cases])
         return 0
     entries = []
-    for name in chosen.script or SCRIPTS:
+    for name in options.script or SCRIPTS:
         print(f"--- {name}", flush=True)
-        entries += _run(name, chosen.runs or RUNS)
-    if chosen.json:
-        chosen.json.parent.mkdir(parents=True, exist_ok=True)
-        chosen.json.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+        entries += _run(name, options.runs or RUNS)
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

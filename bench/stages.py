@@ -42,8 +42,8 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
     cache = Cache()
     gbuffer = project([instance], camera, look.display, cache)
-    flow = surface_pixel_field(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
-    grain = look_noise(flow, look)
+    field = surface_pixel_field(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
+    noise = look_noise(field, look)
     points = np.column_stack([instance.surface.vertices, np.ones(len(instance.surface.vertices))])
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
@@ -58,9 +58,9 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
             gbuffer, look.crease_angle, look.cross_creases
         ),
         "  of which directions on screen": lambda: screen_jacobians(gbuffer),
-        "  of which noise": lambda: look_noise(flow, look),
+        "  of which noise": lambda: look_noise(field, look),
         "  of which streamlines": lambda: run_to_completion(
-            METHODS[look.method](flow, look, grain)
+            METHODS[look.method](field, look, noise)
         ),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }

@@ -23,7 +23,7 @@ DEGREE = 4
 LOOK = replace(cases.LOOK, length=20)
 
 #: Rotation of both cameras between frames, in radians.
-ON = 0.01
+AZIMUTH_STEP = 0.01
 
 
 def measure(runs: int) -> Iterator[Case]:
@@ -37,32 +37,38 @@ def measure(runs: int) -> Iterator[Case]:
         print("surfaces of VTK: skipped, because vtk is not installed", file=sys.stderr)
         return
     for triangles in (12_000, 200_000):
-        turn, read, name = renderer(vtk, triangles)
-        theirs = float((read().min(axis=1) < 255).mean())
-        ours = float((cases.frame(triangles, DEGREE, LOOK)[..., 3] > 0).mean())
-        print(f"{name}; covered: {theirs:.1%} by VTK, {ours:.1%} by RoSy", flush=True)
-        azimuths = iter(np.arange(1, 10_000) * ON)
+        draw_next, read_pixels, name = vtk_renderer(vtk, triangles)
+        vtk_coverage = float((read_pixels().min(axis=1) < 255).mean())
+        rosy_coverage = float((cases.frame(triangles, DEGREE, LOOK)[..., 3] > 0).mean())
+        print(
+            f"{name}; covered: {vtk_coverage:.1%} by VTK, {rosy_coverage:.1%} by RoSy", flush=True
+        )
+        azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
         yield compare(
             f"N = 4 / VTK's one vector field, frame, {triangles // 1000}K triangles",
-            lambda t=triangles, on=azimuths: cases.frame(t, DEGREE, LOOK, azimuth=next(on)),
-            lambda turn=turn, read=read: (turn(), read()),
+            lambda t=triangles, azimuths=azimuths: cases.frame(
+                t, DEGREE, LOOK, azimuth=next(azimuths)
+            ),
+            lambda draw=draw_next, read=read_pixels: (draw(), read()),
             target=0.5,
             higher_is_better=False,
             runs=runs,
         )
 
 
-def renderer(vtk: Any, triangles: int) -> tuple[Callable[[], None], Callable[[], np.ndarray], str]:
-    """VTK's surface LIC of the ball.
+def vtk_renderer(
+    vtk: Any, triangles: int
+) -> tuple[Callable[[], None], Callable[[], np.ndarray], str]:
+    """Set up VTK's surface LIC of the ball.
 
     Returns
     -------
-    turn : function
-        Turns the camera, draws, and waits till that is done.
-    read : function
-        The picture as (P, 3) uint8.
+    draw_next : function
+        Rotates the camera, draws, and waits until the picture is done.
+    read_pixels : function
+        Returns the picture as (P, 3) uint8.
     name : str
-        What it is drawn by.
+        Name of the renderer that the driver reports.
     """
     from vtk.util.numpy_support import vtk_to_numpy
 
@@ -83,30 +89,30 @@ def renderer(vtk: Any, triangles: int) -> tuple[Callable[[], None], Callable[[],
     window.SetMultiSamples(0)
     window.SetSize(cases.SIZE, cases.SIZE)
     window.AddRenderer(scene)
-    ours = cases.camera()
-    eye = -ours.view[:3, :3].T @ ours.view[:3, 3]
+    rosy_camera = cases.camera()
+    eye = -rosy_camera.view[:3, :3].T @ rosy_camera.view[:3, 3]
     camera = scene.GetActiveCamera()
     camera.SetPosition(*eye)
     camera.SetFocalPoint(0, 0, 0)
     camera.SetViewUp(0, 0, 1)
-    camera.SetViewAngle(np.degrees(2 * np.arctan(1 / ours.projection[1, 1])))
+    camera.SetViewAngle(np.degrees(2 * np.arctan(1 / rosy_camera.projection[1, 1])))
     scene.ResetCameraClippingRange()
     pixels = vtk.vtkUnsignedCharArray()
 
-    def turn() -> None:
-        camera.Azimuth(np.degrees(ON))
+    def draw_next() -> None:
+        camera.Azimuth(np.degrees(AZIMUTH_STEP))
         window.Render()
         window.WaitForCompletion()
 
-    def read() -> np.ndarray:
+    def read_pixels() -> np.ndarray:
         last = cases.SIZE - 1
         window.GetPixelData(0, 0, last, last, 0, pixels, 0)
         return vtk_to_numpy(pixels)
 
-    turn()
+    draw_next()
     lines = window.ReportCapabilities().splitlines()
     names = [line.split(":", 1)[1].strip() for line in lines if "renderer string" in line]
-    return turn, read, names[0] if names else window.GetClassName()
+    return draw_next, read_pixels, names[0] if names else window.GetClassName()
 
 
 def _poly_data(vtk: Any, triangles: int) -> Any:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-#: Number of runs of each function, of which a ratio is the median.
+#: Runs of each function. The ratio is the median over them.
 RUNS = 7
 
 
@@ -27,16 +27,16 @@ class Case:
     ----------
     name : str
     ratio : float
-        Median over the runs of what one takes over what the other takes, right after each other.
+        Median over the runs of the first time over the second, which are measured in turn.
     low, high : float
-        The least and the largest.
+        The smallest and the largest ratio.
     target : float or None
-        What it is to be.
+        Required ratio.
     higher_is_better : bool
     amounts : tuple of float
-        Medians of both, for reference.
+        Medians of the two times or amounts, for reference.
     unit : str
-        Of the amounts.
+        Unit of the amounts.
     """
 
     name: str
@@ -57,13 +57,13 @@ class Case:
 
     def line(self) -> str:
         """Format the case for printing."""
-        wanted = ""
+        verdict = ""
         if self.target is not None:
             sign = "at least" if self.higher_is_better else "at most"
-            wanted = f"  {sign} {self.target:g}: {'yes' if self.reached else 'NO'}"
+            verdict = f"  {sign} {self.target:g}: {'yes' if self.reached else 'NO'}"
         spread = f"({self.low:.2f} to {self.high:.2f})"
         amounts = " / ".join(f"{amount:.4g}" for amount in self.amounts)
-        return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{wanted}"
+        return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{verdict}"
 
     def entry(self) -> dict[str, object]:
         """Return the case as an object for JSON."""
@@ -129,20 +129,20 @@ def main(
     Parameters
     ----------
     about : str
-        Its help.
+        Text of its help.
     measure : function
-        From the number of runs to the cases.
+        Takes the number of runs, and returns the cases.
     arguments : sequence of str, optional
-        Those of the program if not given.
+        By default those of the program.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
     parser.add_argument("--runs", type=int, default=RUNS, help="runs per case (%(default)s)")
-    chosen = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     print(machine(), flush=True)
-    cases = list(measure(chosen.runs))
-    if chosen.json:
-        write(chosen.json, [case.entry() for case in cases])
+    cases = list(measure(options.runs))
+    if options.json:
+        write(options.json, [case.entry() for case in cases])
     return 0
 
 

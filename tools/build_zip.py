@@ -18,23 +18,23 @@ def main() -> int:
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
     target = folder / f"{manifest['id']}-{manifest['version']}.zip"
     builder = _builder()
-    for words in (
+    for arguments in (
         ["build", "--source-dir", str(ROOT), "--output-filepath", str(target)],
         ["validate", str(target)],
     ):
-        done = subprocess.run([sys.executable, builder, *words], check=False)
-        if done.returncode:
-            return done.returncode
+        completed = subprocess.run([sys.executable, builder, *arguments], check=False)
+        if completed.returncode:
+            return completed.returncode
     print(target)
     return 0
 
 
 def _builder() -> str:
-    """Import the script behind `blender --command extension`, without starting Blender."""
+    """Return the path of the script behind `blender --command extension`, in the module bpy."""
     spec = importlib.util.find_spec("bpy")
-    places = list(spec.submodule_search_locations or []) if spec else []
-    for place in places:
-        for script in sorted(Path(place).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")):
+    folders = list(spec.submodule_search_locations or []) if spec else []
+    for folder in folders:
+        for script in sorted(Path(folder).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")):
             return str(script)
     sys.exit("this Python has no bpy with Blender's extension builder")
 

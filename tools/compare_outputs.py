@@ -51,7 +51,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = ROOT / "build" / "compare"
 
-#: Cases that one child process runs, and seconds after which it is stopped.
+#: Cases that one child process runs, and seconds after which the process is stopped.
 BATCH_SIZE, BATCH_TIMEOUT = 12, 900
 
 #: What a case printed, and its exit status, which is written last.
@@ -63,7 +63,8 @@ NOT_COMPARED = (LOG, ".rosy.txt")
 #: Exit status of a command that refuses its input.
 REFUSED = 2
 
-#: An input file in the code of a case, the folder of these files, and one that is never there.
+#: Pattern of an input file in the code of a case, the folder of these files, and a file that does
+#: not exist.
 INPUT, INPUTS, MISSING = r"@([\w.-]+)", "inputs", "missing.off"
 
 LANES = ("numpy", "bpy", "card")
@@ -634,7 +635,10 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a tangent vector at each normal, and four that are two lines at no right angle."""
+    """Return a tangent at each normal, and four tangents on two lines that are not at right angles.
+
+    The shapes are those of (F, 3) normals: (F, 3) and (F, 4, 3).
+    """
     first = np.cross(normal, (0.3, 1.0, 0.1))
     second = 0.6 * np.cross(normal, first) + 0.5 * first
     return first, np.stack([first, second, -first, -second], axis=1)
@@ -645,7 +649,7 @@ def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def run_child(tree: Path, outputs: Path, lane: str, names: Sequence[str]) -> None:
     """Run cases with the package in `tree`."""
-    wanted = {case.name: case for case in all_cases()}
+    cases = {case.name: case for case in all_cases()}
     sys.path.insert(0, str(tree))
     extension = None if lane == "numpy" else load_extension(tree)
     main = importlib.import_module("rosy_addon.cli" if extension is None else "rosy.rosy_addon.cli")
@@ -657,7 +661,7 @@ def run_child(tree: Path, outputs: Path, lane: str, names: Sequence[str]) -> Non
         printed, start = io.StringIO(), time.process_time()
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             try:
-                status = str(run_case(wanted[name], main.main))
+                status = str(run_case(cases[name], main.main))
             except BaseException:
                 status = "error"
                 traceback.print_exc()
@@ -692,12 +696,12 @@ def type_hints(cls: type, *_: Any, **__: Any) -> dict[str, Any]:
     names of the module inside comprehensions, and a class that uses one registers without
     properties. Cases are to compare such classes too.
     """
-    found = {}
+    hints = {}
     for base in reversed(cls.__mro__):
         scope = vars(sys.modules[base.__module__])
         for name, value in vars(base).get("__annotations__", {}).items():
-            found[name] = eval(value, scope, dict(vars(base))) if isinstance(value, str) else value
-    return found
+            hints[name] = eval(value, scope, dict(vars(base))) if isinstance(value, str) else value
+    return hints
 
 
 def run_case(case: Case, main: Callable[..., int]) -> int:
@@ -809,7 +813,7 @@ def dump_attributes() -> None:
     """Write the attributes of all meshes, point clouds and curves, a number a line."""
     import bpy
 
-    found = {}
+    values_by_name = {}
     for kind in ("meshes", "pointclouds", "hair_curves"):
         for data in getattr(bpy.data, kind, ()):
             for attribute in data.attributes:
@@ -819,23 +823,25 @@ def dump_attributes() -> None:
                 properties = (p.identifier for p in rows[0].bl_rna.properties)
                 key = next(p for p in properties if p in ("value", "vector", "color"))
                 values = [getattr(row, key) for row in rows]
-                found[f"{kind} {data.name} {attribute.name}"] = [
+                values_by_name[f"{kind} {data.name} {attribute.name}"] = [
                     list(v) if hasattr(v, "__len__") else v for v in values
                 ]
-    write_json("attributes.json", found)
+    write_json("attributes.json", values_by_name)
 
 
 def dump_pencil() -> None:
     """Write the points of all Grease Pencil strokes."""
     import bpy
 
-    found = {}
+    points_by_layer = {}
     store = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)
     for data in store:
         for layer in data.layers:
             for frame in layer.frames:
                 strokes = frame.strokes if hasattr(frame, "strokes") else frame.drawing.strokes
-                found[f"{data.name} {layer.info if hasattr(layer, 'info') else layer.name}"] = [
+                points_by_layer[
+                    f"{data.name} {layer.info if hasattr(layer, 'info') else layer.name}"
+                ] = [
                     [
                         [*p.co, p.pressure, p.strength]
                         if hasattr(p, "co")
@@ -844,21 +850,26 @@ def dump_pencil() -> None:
                     ]
                     for stroke in strokes
                 ]
-    write_json("pencil.json", found)
+    write_json("pencil.json", points_by_layer)
 
 
 def dump_names() -> None:
     """Write the names of all datablocks, and of the modifiers and materials of objects."""
     import bpy
 
-    found: dict[str, Any] = {}
+    names_by_key: dict[str, Any] = {}
     for prop in bpy.data.bl_rna.properties:
         if prop.type == "COLLECTION":
-            found[prop.identifier] = [data.name for data in getattr(bpy.data, prop.identifier)]
+            names_by_key[prop.identifier] = [
+                data.name for data in getattr(bpy.data, prop.identifier)
+            ]
     for obj in bpy.data.objects:
         slots = [slot.material.name for slot in obj.material_slots if slot.material]
-        found[f"object {obj.name}"] = [*(modifier.name for modifier in obj.modifiers), *slots]
-    write_json("names.json", {key: sorted(names) for key, names in found.items()})
+        names_by_key[f"object {obj.name}"] = [
+            *(modifier.name for modifier in obj.modifiers),
+            *slots,
+        ]
+    write_json("names.json", {key: sorted(names) for key, names in names_by_key.items()})
 
 
 DUMPS = (dump_images, dump_attributes, dump_pencil, dump_names)
@@ -900,8 +911,8 @@ class Revision(NamedTuple):
 
     def folder(self, case: Case) -> Path:
         """Return where the outputs of a case are."""
-        made = self.outputs / case.name
-        return made if made.is_dir() else self.cached(case)
+        new = self.outputs / case.name
+        return new if new.is_dir() else self.cached(case)
 
     def extract(self) -> None:
         """Copy the files of the commit, or those of the working tree that git does not ignore."""
@@ -917,23 +928,25 @@ class Revision(NamedTuple):
                 shutil.copy(ROOT / name, self.tree / name)
 
 
-def git(*words: str) -> bytes:
-    """Return what git prints; end the program if it fails, as git says why."""
-    done = subprocess.run(["git", "-C", str(ROOT), *words], check=False, stdout=subprocess.PIPE)
-    if done.returncode:
-        sys.exit(f"git {words[0]} failed for {words[-1]}")
-    return done.stdout
+def git(*arguments: str) -> bytes:
+    """Return what git prints; end the program if it fails. Git prints the reason."""
+    completed = subprocess.run(
+        ["git", "-C", str(ROOT), *arguments], check=False, stdout=subprocess.PIPE
+    )
+    if completed.returncode:
+        sys.exit(f"git {arguments[0]} failed for {arguments[-1]}")
+    return completed.stdout
 
 
-def find_revision(side: str, given: str | None, work: Path, blender: str) -> Revision:
+def find_revision(side: str, name: str | None, work: Path, blender: str) -> Revision:
     """Return the revision that the user means; the working tree if none is given.
 
     Cached outputs are kept by all that they depend on: the commit, this tool, the inputs, the
     versions of Python and numpy, and which Blender draws.
     """
     sha = ""
-    if given is not None:
-        sha = git("rev-parse", "--verify", f"{given}^{{commit}}").decode().strip()
+    if name is not None:
+        sha = git("rev-parse", "--verify", f"{name}^{{commit}}").decode().strip()
     digest = hashlib.sha256(Path(__file__).read_bytes())
     digest.update(f"{sys.version} {np.__version__} {platform.platform()} {PRESETS}".encode())
     for path in sorted((work / INPUTS).iterdir()):
@@ -942,7 +955,7 @@ def find_revision(side: str, given: str | None, work: Path, blender: str) -> Rev
     digest.update(blender.encode())
     card = cache.with_name(digest.hexdigest()[:12])
     caches = {"numpy": cache, "bpy": cache, "card": card}
-    label = f"{side} ({given or 'working tree'})"
+    label = f"{side} ({name or 'working tree'})"
     return Revision(label, sha, work / f"{side}-tree", work / side, caches)
 
 
@@ -983,11 +996,11 @@ def run_batch(revision: Revision, batch: Sequence[Case], blender: str) -> None:
     if lane == "card":
         command = [*shlex.split(blender), "--factory-startup", "-P", script, "--"]
     command += ["--child", str(revision.tree), str(revision.outputs), lane]
-    left = list(batch)
-    while left:
+    remaining = list(batch)
+    while remaining:
         try:
-            done = subprocess.run(
-                [*command, *(case.name for case in left)],
+            completed = subprocess.run(
+                [*command, *(case.name for case in remaining)],
                 cwd=ROOT,
                 env=environment,
                 timeout=BATCH_TIMEOUT,
@@ -995,23 +1008,25 @@ def run_batch(revision: Revision, batch: Sequence[Case], blender: str) -> None:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
             )
-            printed = done.stdout.decode(errors="replace")
+            printed = completed.stdout.decode(errors="replace")
         except subprocess.TimeoutExpired:
             printed = f"stopped after {BATCH_TIMEOUT} s"
-        left = [case for case in left if not (revision.outputs / case.name / STATUS).is_file()]
-        started = left and (revision.outputs / left[0].name).is_dir()
-        for case in left[:1] if started else left:
+        remaining = [
+            case for case in remaining if not (revision.outputs / case.name / STATUS).is_file()
+        ]
+        started = remaining and (revision.outputs / remaining[0].name).is_dir()
+        for case in remaining[:1] if started else remaining:
             folder = revision.outputs / case.name
             folder.mkdir(parents=True, exist_ok=True)
             (folder / LOG).write_text(printed)
             (folder / STATUS).write_text("crashed")
-        left = left[1:] if started else []
+        remaining = remaining[1:] if started else []
     for case in batch if revision.sha else ():
-        made, cached = revision.outputs / case.name, revision.cached(case)
-        if (made / STATUS).read_text() == str(case.status):
+        new, cached = revision.outputs / case.name, revision.cached(case)
+        if (new / STATUS).read_text() == str(case.status):
             cached.parent.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(OSError):  # it is there already
-                os.replace(made, cached)
+                os.replace(new, cached)
 
 
 def report(revisions: Sequence[Revision], cases: Sequence[Case], keep: Path | None) -> Counter[str]:
@@ -1041,7 +1056,7 @@ def compare(old: Path, new: Path) -> dict[str, str]:
         if name not in first or name not in second:
             differences[name] = f"{name} is only in {'old' if name in first else 'new'}"
         elif first[name].read_bytes() != second[name].read_bytes():
-            differences[name] = f"{name}: {how_different(first[name], second[name])}"
+            differences[name] = f"{name}: {describe_difference(first[name], second[name])}"
     return differences
 
 
@@ -1052,15 +1067,15 @@ def compared_files(folder: Path) -> dict[str, Path]:
     return {name: path for name, path in files.items() if not name.endswith(NOT_COMPARED)}
 
 
-def how_different(old: Path, new: Path) -> str:
-    """Say how two files differ."""
+def describe_difference(old: Path, new: Path) -> str:
+    """Describe how two files differ."""
     if old.suffix == ".npy" or (old.suffix == ".png" and HAS_BLENDER):
         first, second = read_pixels(old), read_pixels(new)
         if first.shape != second.shape or first.ndim != 3:
             return f"arrays of shape {first.shape} and {second.shape}"
-        apart = np.abs(first.astype(np.float64) - second).max(axis=2)
-        count = np.count_nonzero(apart)
-        return f"{count} of {apart.size} pixels differ, by {apart.max():.6g} at most"
+        difference = np.abs(first.astype(np.float64) - second).max(axis=2)
+        count = np.count_nonzero(difference)
+        return f"{count} of {difference.size} pixels differ, by {difference.max():.6g} at most"
     before, after = old.read_bytes(), new.read_bytes()
     if b"\0" in before:
         return f"{len(before)} and {len(after)} bytes"
@@ -1129,17 +1144,17 @@ def main() -> int:
     if options.list:
         print(*(f"{case.lane:5}  {case.name}" for case in cases), sep="\n")
         return 0
-    there = {"numpy": True, "bpy": HAS_BLENDER, "card": bool(options.blender)}
-    cases = [case for case in cases if there[case.lane]]
+    is_available = {"numpy": True, "bpy": HAS_BLENDER, "card": bool(options.blender)}
+    cases = [case for case in cases if is_available[case.lane]]
     CACHE.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=CACHE, prefix="work-") as name:
-        work = Path(name)
+    with tempfile.TemporaryDirectory(dir=CACHE, prefix="work-") as work_name:
+        work = Path(work_name)
         write_inputs(work / INPUTS, options.data)
         inputs = {path.name for path in (work / INPUTS).iterdir()} | {MISSING}
         chosen = [case for case in cases if inputs.issuperset(re.findall(INPUT, case.code))]
         revisions = [
-            find_revision(side, given, work, options.blender)
-            for side, given in (("old", options.old), ("new", options.new))
+            find_revision(side, name, work, options.blender)
+            for side, name in (("old", options.old), ("new", options.new))
         ]
         run_cases(revisions, chosen, options.blender, options.jobs)
         counts = report(revisions, chosen, options.keep)

@@ -86,48 +86,52 @@ def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
         if fault.lane == "blender":
             shutil.rmtree(copy / "dist", ignore_errors=True)
             subprocess.run([python, "tools/build_zip.py", "dist"], check=True, **options)
-            (zipped,) = (copy / "dist").glob("*.zip")
-            lane = [
+            (zip_path,) = (copy / "dist").glob("*.zip")
+            lane_command = [
                 sys.executable,
                 "tests/blender/run.py",
                 "stable",
-                str(zipped),
+                str(zip_path),
                 "--windows",
                 "none",
             ]
-            command = [*lane, *fault.tests]
-        done = subprocess.run(command, check=False, timeout=TIME_LIMIT, **options)
+            command = [*lane_command, *fault.tests]
+        completed = subprocess.run(command, check=False, timeout=TIME_LIMIT, **options)
     except subprocess.TimeoutExpired:
         return -1, f"stopped after {TIME_LIMIT} s"
     except subprocess.CalledProcessError as error:
         return -1, f"the zip could not be built: {error.stderr.strip()}"
-    said = done.stdout.strip() or done.stderr.strip() or "no output"
-    return done.returncode, said.splitlines()[-1].strip("= ")
+    message = completed.stdout.strip() or completed.stderr.strip() or "no output"
+    return completed.returncode, message.splitlines()[-1].strip("= ")
 
 
 def try_fault(fault: Fault, copies: queue.Queue[Path], baseline: bool) -> bool:
-    """Run the tests of a fault, print a line, and return whether the outcome is the wanted one."""
+    """Run the tests of a fault, print a line, and return whether the outcome is as expected."""
     copy = copies.get()
     start = time.monotonic()
     path = copy / fault.file
-    whole, broken = path.read_bytes() if path.is_file() else b"", broken_text(fault, copy)
-    good, verdict, said = False, "does not apply", f"`find` is not in {fault.file} exactly once"
+    original, broken = path.read_bytes() if path.is_file() else b"", broken_text(fault, copy)
+    succeeded, verdict, message = (
+        False,
+        "does not apply",
+        f"`find` is not in {fault.file} exactly once",
+    )
     try:
         if broken is not None and baseline:
-            status, said = run_tests(fault, copy)
-            good = status == 0 and "passed" in said and "skipped" not in said
-            verdict = "passes" if good else "DOES NOT PASS"
+            status, message = run_tests(fault, copy)
+            succeeded = status == 0 and "passed" in message and "skipped" not in message
+            verdict = "passes" if succeeded else "DOES NOT PASS"
         elif broken is not None:
             path.write_text(broken, encoding="utf-8")
-            status, said = run_tests(fault, copy)
-            good = status == TESTS_FAILED and "failed" in said
-            verdict = "caught" if good else "MISSED"
+            status, message = run_tests(fault, copy)
+            succeeded = status == TESTS_FAILED and "failed" in message
+            verdict = "caught" if succeeded else "MISSED"
     finally:
         if broken is not None:
-            path.write_bytes(whole)
+            path.write_bytes(original)
         copies.put(copy)
-    print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {said}", flush=True)
-    return good
+    print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {message}", flush=True)
+    return succeeded
 
 
 def main() -> int:
@@ -144,17 +148,23 @@ def main() -> int:
         parser.error(f"no fault is named {', '.join(sorted(unknown))}")
     faults = [fault for fault in faults if not options.names or fault.name in options.names]
     if options.check:
-        lost = [fault.name for fault in faults if broken_text(fault, ROOT) is None]
-        print("\n".join([*(f"does not apply  {name}" for name in lost), f"{len(faults)} checked"]))
-        return 1 if lost else 0
+        unmatched = [fault.name for fault in faults if broken_text(fault, ROOT) is None]
+        print(
+            "\n".join(
+                [*(f"does not apply  {name}" for name in unmatched), f"{len(faults)} checked"]
+            )
+        )
+        return 1 if unmatched else 0
     with tempfile.TemporaryDirectory(prefix="rosy-faults-") as name:
         copies: queue.Queue[Path] = queue.Queue()
         for number in range(options.jobs):
             copies.put(copy_tree(Path(name) / str(number)))
         with ThreadPoolExecutor(options.jobs) as pool:
-            good = list(pool.map(lambda each: try_fault(each, copies, options.baseline), faults))
-    print(f"{sum(good)} of {len(good)} {'pass' if options.baseline else 'caught'}")
-    return 0 if all(good) else 1
+            succeeded = list(
+                pool.map(lambda fault: try_fault(fault, copies, options.baseline), faults)
+            )
+    print(f"{sum(succeeded)} of {len(succeeded)} {'pass' if options.baseline else 'caught'}")
+    return 0 if all(succeeded) else 1
 
 
 if __name__ == "__main__":

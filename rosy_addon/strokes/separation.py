@@ -140,7 +140,7 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
 
 
 def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
-    """Return (n,) radians by which the field turns within a spacing, along the fastest direction."""
+    """Return (n,) radians by which the field turns within a spacing, in the direction of most turn."""
     z, gradient = mesh.z[strokes.triangle], mesh.gradient[strokes.triangle]
     value = np.einsum("nk,nk->n", strokes.weights, z)
     derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()

@@ -173,7 +173,7 @@ def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -
 def _draw_view_hints(
     layout: bpy.types.UILayout, context: bpy.types.Context, bake_infos: list[BakeInfo]
 ) -> None:
-    """Draw buttons that make the picture visible, where materials or the camera's view are not shown."""
+    """Draw buttons that make the picture visible in a view that does not show it."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
     if view.shading.type in {"WIREFRAME", "SOLID"}:

@@ -21,13 +21,13 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from bench.parity import (
     DEGREES,
     VIEWS,
-    camera_for,
-    drawn_on_card,
-    drawn_twice,
+    camera_of_shape,
+    draw_on_card,
+    draw_pair,
     likeness,
     module_of,
     rooms,
-    surface_named,
+    surface_of_shape,
 )
 
 PACKAGE = f"{EXTENSION}.rosy_addon"
@@ -55,7 +55,7 @@ def card(rosy):
 @pytest.fixture(scope="module")
 def surface_of(rosy):
     bpy.ops.wm.read_homefile(use_empty=True)
-    return lru_cache(lambda name: surface_named(rosy, name, DATA))
+    return lru_cache(lambda name: surface_of_shape(rosy, name, DATA))
 
 
 def test_it_is_drawn_with_what_was_asked_for(card):
@@ -69,9 +69,9 @@ def test_parity(rosy, card, surface_of, name, degree):
     surface = surface_of(name)
     if surface is None:
         pytest.skip(f"no {name} in ../shared/data")
-    camera = camera_for(rosy, name, surface, SIZE)
+    camera = camera_of_shape(rosy, name, surface, SIZE)
     instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
-    pair = drawn_twice(rosy, card, [instance], camera, rosy.Look(shading=0.0, length=LENGTH))
+    pair = draw_pair(rosy, card, [instance], camera, rosy.Look(shading=0.0, length=LENGTH))
     assert len(pair.gbuffer.pixel) > 0.25 * SIZE * SIZE
     assert pair.agreement >= 0.999
     # Around a sink of one direction brute force goes round in circles where the card passes through;
@@ -84,7 +84,7 @@ def test_parity(rosy, card, surface_of, name, degree):
 def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
     """All that makes lines uneven, and an ink for each family."""
     surface = surface_of("torus")
-    camera = camera_for(rosy, "torus", surface, 2 * SIZE)
+    camera = camera_of_shape(rosy, "torus", surface, 2 * SIZE)
     instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
     look = rosy.Look(
         ink="hatch",
@@ -98,7 +98,7 @@ def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
         wobble=0.6,
         paper_grain=0.4,
     )
-    pair = drawn_twice(rosy, card, [instance], camera, look)
+    pair = draw_pair(rosy, card, [instance], camera, look)
     assert pair.likeness >= 0.98
 
 
@@ -120,7 +120,7 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     assert [instance.field is None for instance in instances] == [False, False, True]
     seen = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
     look = rosy.Look(shading=0.0)
-    pair = drawn_twice(rosy, card, instances, seen, look)
+    pair = draw_pair(rosy, card, instances, seen, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
     assert pair.agreement >= 0.999
     assert pair.likeness >= 0.98
@@ -139,8 +139,8 @@ def test_what_blender_draws_with_is_as_it_was(rosy, card, surface_of):
     try:
         surface = surface_of("sphere")
         instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 2))
-        camera = camera_for(rosy, "sphere", surface, 64)
-        drawn_on_card(rosy, card, [instance], camera, rosy.Look())
+        camera = camera_of_shape(rosy, "sphere", surface, 64)
+        draw_on_card(rosy, card, [instance], camera, rosy.Look())
         found = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         assert found == ("GREATER", False, "ADDITIVE")
     finally:

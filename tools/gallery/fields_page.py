@@ -24,7 +24,7 @@ IMAGES = ROOT / "docs" / "images"
 LOOK = Look(length=50, gain=2.8, supersampling=2)
 SIDE, WIDE = 256, 394
 
-#: Strokes on Suzanne: start, middle and end of each, in picture coordinates.
+#: Strokes on Suzanne: start, middle and end of each, as fractions of the picture from the top left.
 STROKES = (
     ((0.33, 0.22), (0.50, 0.14), (0.66, 0.22)),
     ((0.30, 0.44), (0.42, 0.33), (0.52, 0.42)),
@@ -71,16 +71,16 @@ def _strokes(monkey: Surface) -> list[Panel]:
     """Draw the smoothest field of Suzanne, and a field that follows strokes."""
     camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
     buffer = project([MeshInstance(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
-    place = np.full((camera.height * camera.width, 3), np.nan)
-    place[buffer.pixel] = (
+    position = np.full((camera.height * camera.width, 3), np.nan)
+    position[buffer.pixel] = (
         buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
     )
-    place = place.reshape(camera.height, camera.width, 3)
-    drawn = [_curve(*ends) for ends in STROKES]
+    position = position.reshape(camera.height, camera.width, 3)
+    curves = [_curve(*ends) for ends in STROKES]
     strokes = []
-    for stroke in drawn:
+    for stroke in curves:
         column, row = (stroke * (camera.width, camera.height)).astype(int).T
-        points = place[camera.height - 1 - row, column]
+        points = position[camera.height - 1 - row, column]
         strokes.append(points[np.isfinite(points).all(axis=1)])
     panels = [_panel(monkey, "smoothest", 2, (-26, 8), "Smoothest, N = 2", WIDE)]
     guided = _panel(
@@ -93,7 +93,7 @@ def _strokes(monkey: Surface) -> list[Panel]:
     )
     picture = Image.fromarray(guided.picture)
     pen = ImageDraw.Draw(picture)
-    for stroke in drawn:
+    for stroke in curves:
         line = [tuple(point) for point in (stroke * WIDE).tolist()]
         pen.line(line, fill=(255, 255, 255), width=8, joint="curve")
         pen.line(line, fill=INK, width=4, joint="curve")
@@ -101,7 +101,10 @@ def _strokes(monkey: Surface) -> list[Panel]:
 
 
 def _curve(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
-    """(n, 2) points of a parabola through three points, as fractions of the picture from the top left."""
+    """Return (n, 2) points of a parabola through three points, in picture coordinates.
+
+    These are fractions of the picture from the top left.
+    """
     t = np.linspace(0, 1, 60)[:, None]
     a, b, c = (np.array(point) for point in (start, middle, stop))
     return (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
@@ -134,8 +137,8 @@ def _tensor() -> list[Panel]:
     ring = torus()
     offset = ring.face_center - (1.2, -1.4, 0.6)
     distance = np.sqrt(dot(offset, offset))[:, None, None]
-    away = normalize(offset)
-    tensors = away[:, :, None] * away[:, None, :] / distance - 0.35 * np.eye(3) * distance
+    outward = normalize(offset)
+    tensors = outward[:, :, None] * outward[:, None, :] / distance - 0.35 * np.eye(3) * distance
     field = tensor_field(ring, tensors)
     panels = []
     for text, look in (
@@ -163,10 +166,12 @@ def _singular(monkey: Surface) -> list[Panel]:
         x, y = ((clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)).T
         z = (monkey.vertices[vertex] @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
         pixel = y.astype(int) * camera.width + x.astype(int)
-        seen = z > depth[pixel] - 0.03
-        for across, up, sign in zip(x[seen], y[seen], np.sign(index[seen]), strict=True):
-            finer = LOOK.supersampling
-            picture = dotted(picture, across / finer, WIDE - up / finer, DOTS[int(sign)])
+        visible = z > depth[pixel] - 0.03
+        for column, row, sign in zip(x[visible], y[visible], np.sign(index[visible]), strict=True):
+            supersampling = LOOK.supersampling
+            picture = dotted(
+                picture, column / supersampling, WIDE - row / supersampling, DOTS[int(sign)]
+            )
         panels.append(Panel(picture, f"Singularities, N = {degree}"))
     return panels
 

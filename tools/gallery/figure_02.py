@@ -33,12 +33,12 @@ def write() -> None:
     rows, letters = [], iter("abcd")
     for index in (1, -1):
         row = []
-        for field, degree, what in (
+        for field, degree, name in (
             (one_direction(index), 1, "one direction"),
             (singularity(index), DEGREE, "all six"),
         ):
-            drawn = dotted(draw_field(field, degree, SIZE, PLANE), SIZE / 2, SIZE / 2, RED)
-            row.append(Panel(drawn, f"({next(letters)}) {what}, index {signed(index)}/6"))
+            picture = dotted(draw_field(field, degree, SIZE, PLANE), SIZE / 2, SIZE / 2, RED)
+            row.append(Panel(picture, f"({next(letters)}) {name}, index {signed(index)}/6"))
         rows.append(row)
     page.picture(rows, "One direction of a 6-RoSy field beside all six, around two singularities")
     page.text("## Measurements")
@@ -62,8 +62,8 @@ def _measured(index: int, degree: int) -> list[object]:
     row = [f"{'one direction' if degree == 1 else 'all six'}, index {signed(index)}/6"]
     middle, columns = SIZE // 2, slice(SIZE // 2 + 52, SIZE // 2 + 180)
     for rows in (slice(middle + 2, middle + 66), slice(middle - 66, middle - 2)):
-        across, upward = ((side.start + side.stop) / 2 - middle for side in (columns, rows))
-        z = field(np.array(across + 1j * upward))
+        x, y = ((side.start + side.stop) / 2 - middle for side in (columns, rows))
+        z = field(np.array(x + 1j * y))
         members = np.degrees((np.angle(z) + 2 * np.pi * np.arange(degree)) / degree) % 180
         row.append(listed(np.unique(members.round(6))))
         row.append(listed(peaks(orientation_spectrum(tone[rows, columns]))))

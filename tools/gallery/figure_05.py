@@ -14,10 +14,10 @@ from .page import Page
 from .plane import averaged, enlarged, points, singularity
 from .sheet import Panel, gray, inset, magnified, outlined
 
-DEGREE, FINER = 3, 2
+DEGREE, SUPERSAMPLING = 3, 2
 #: Size of the drawn field, larger than the picture so that streamlines do not end at its border.
-WHOLE, LARGE, SMALL = 480, 400, 256
-LOOK = enlarged(MEASURED, FINER)
+FIELD_SIZE, LARGE, SMALL = 480, 400, 256
+LOOK = enlarged(MEASURED, SUPERSAMPLING)
 #: Contrast of all pictures except the uncorrected blend.
 GAIN = 2.2
 CLOSEUP, TIMES = 52, 3
@@ -26,7 +26,7 @@ CLOSEUP, TIMES = 52, 3
 def write() -> None:
     """Draw and write the page."""
     page = Page("figure-05", "From a 3-RoSy field to a picture, step by step")
-    angles = np.angle(singularity(1)(points(WHOLE, FINER))) / DEGREE
+    angles = np.angle(singularity(1)(points(FIELD_SIZE, SUPERSAMPLING))) / DEGREE
     first, second = _set(angles, 0.0), _set(angles, np.pi / DEGREE)
     blend = compose_planar(angles, DEGREE, LOOK).layers[0]
     brute = compose_planar(angles, DEGREE, LOOK.with_settings({"method": "brute"})).layers[0]
@@ -95,13 +95,13 @@ def _measure(
         high along the line to the left and to the right of the singularity, starting 24 pixels from
         it, and in the rest of the picture."""
     )
-    place = points(WHOLE)
-    shown = np.maximum(np.abs(place.real), np.abs(place.imag)) < LARGE / 2
-    strip = shown & (np.abs(place.imag) < 8.5)
-    left, right = strip & (place.real < -24), strip & (place.real > 24)
-    rest = shown & (np.abs(place.imag) > 40)
+    position = points(FIELD_SIZE)
+    in_picture = np.maximum(np.abs(position.real), np.abs(position.imag)) < LARGE / 2
+    strip = in_picture & (np.abs(position.imag) < 8.5)
+    left, right = strip & (position.real < -24), strip & (position.real > 24)
+    rest = in_picture & (np.abs(position.imag) > 40)
     tones = {
-        name: averaged(layers.images.blend, WHOLE, FINER)
+        name: averaged(layers.images.blend, FIELD_SIZE, SUPERSAMPLING)
         for name, layers in (("I", first), ("I′", second), ("blend", blend), ("brute", brute))
     }
     rows = [
@@ -126,9 +126,11 @@ def _set(angles: np.ndarray, guiding_angle: float) -> DegreeLayer:
 
 
 def _shown(values: np.ndarray, size: int) -> np.ndarray:
-    """(size, size) center of the (P, 1) values of a picture."""
-    margin = (WHOLE - size) // 2
-    return averaged(values, WHOLE, FINER)[margin : margin + size, margin : margin + size]
+    """Return the (size, size) center of the (P, 1) values of a picture."""
+    margin = (FIELD_SIZE - size) // 2
+    return averaged(values, FIELD_SIZE, SUPERSAMPLING)[
+        margin : margin + size, margin : margin + size
+    ]
 
 
 def _contrasted(values: np.ndarray, size: int) -> np.ndarray:
@@ -139,9 +141,9 @@ def _members(layers: DegreeLayer, name: str, guide: int) -> list[Panel]:
     return [
         Panel(
             _contrasted(image, SMALL),
-            f"{name}{'₀₁₂'[number]}, guided by {guide + 120 * number}°",
+            f"{name}{'₀₁₂'[index]}, guided by {guide + 120 * index}°",
         )
-        for number, image in enumerate(layers.images.members)
+        for index, image in enumerate(layers.images.members)
     ]
 
 
@@ -149,7 +151,7 @@ def _with_closeup(layers: DegreeLayer, side: int) -> np.ndarray:
     """Return the mean of a set with an enlarged closeup of its breaking points, on the left or right."""
     picture = _contrasted(layers.tone, LARGE)
     left, top = LARGE // 2 + side * 110 - CLOSEUP // 2, LARGE // 2 - CLOSEUP // 2
-    small = magnified(picture[top : top + CLOSEUP, left : left + CLOSEUP], TIMES)
+    closeup = magnified(picture[top : top + CLOSEUP, left : left + CLOSEUP], TIMES)
     picture = outlined(picture, (left, top, left + CLOSEUP, top + CLOSEUP), RED)
-    far = LARGE - CLOSEUP * TIMES - 6
-    return inset(picture, small, far if side < 0 else 6, far, RED)
+    far_offset = LARGE - CLOSEUP * TIMES - 6
+    return inset(picture, closeup, far_offset if side < 0 else 6, far_offset, RED)

@@ -14,7 +14,7 @@ from .page import Page
 from .plane import PlanarField, channel, compose_field
 from .sheet import Panel, chart, gray
 
-DEGREE, SIZE, WHOLE = 6, 256, 400
+DEGREE, SIZE, FIELD_SIZE = 6, 256, 400
 LOOK = MEASURED.with_settings({"noise": "colour"})
 EXPANDED, SEEDS = 2.5, 6
 MEMBER = np.radians(12)
@@ -29,7 +29,7 @@ def constant(angle: float, degree: int) -> PlanarField:
 def write() -> None:
     """Draw and write the page."""
     page = Page("figure-06", "Contrast")
-    layers = compose_field(constant(MEMBER, DEGREE), DEGREE, WHOLE, LOOK).layers[0]
+    layers = compose_field(constant(MEMBER, DEGREE), DEGREE, FIELD_SIZE, LOOK).layers[0]
     expected = expected_std(LOOK)
     # In the visible part, streamlines have their full length.
     gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
@@ -56,11 +56,11 @@ def write() -> None:
         [Panel(gray(image), f"({letter}) {name}"), _histogram(image[..., 0], deviation)]
         for image, (name, _, deviation), letter in zip(images, shown, "abcdef", strict=True)
     ]
-    for part, chosen in (("members", panels[:3]), ("blended", panels[3:])):
+    for suffix, chosen in (("members", panels[:3]), ("blended", panels[3:])):
         page.picture(
             [[pair[0] for pair in chosen], [pair[1] for pair in chosen]],
             "Images of a constant 6-RoSy field, each with the histogram of its red channel",
-            part,
+            suffix,
         )
     page.text("## Measurements")
     page.text(
@@ -69,14 +69,14 @@ def write() -> None:
     )
     rows = []
     for (name, _, deviation), image in zip(shown, images, strict=True):
-        found = float(image.std(axis=(0, 1)).mean())
+        measured = float(image.std(axis=(0, 1)).mean())
         rows.append(
             [
                 name,
                 float(image.mean()),
-                f"{found:.4f}",
+                f"{measured:.4f}",
                 f"{deviation:.4f}",
-                f"{100 * (found / deviation - 1):+.1f} %",
+                f"{100 * (measured / deviation - 1):+.1f} %",
             ]
         )
     page.table(["Image", "Mean", "Standard deviation", "Theory", "Difference"], rows)
@@ -113,24 +113,24 @@ def write() -> None:
 
 def _corrected(degree: int, look: Look) -> list[float]:
     """Return the correction factor, and the corrected deviation relative to one member image."""
-    found = []
+    deviations = []
     for seed in range(SEEDS):
         seeded = look.with_settings({"seed": seed})
-        tone = compose_field(constant(MEMBER, degree), degree, WHOLE, seeded).layers[0].tone
-        found.append(float(_cut(tone).std()))
+        tone = compose_field(constant(MEMBER, degree), degree, FIELD_SIZE, seeded).layers[0].tone
+        deviations.append(float(_cut(tone).std()))
     factor = float(
         blend_gain(degree if degree % 2 else degree // 2, np.float32([2 * look.length + 1]), look)[
             0
         ]
     )
-    return [factor, float(np.mean(found)) / expected_std(look)]
+    return [factor, float(np.mean(deviations)) / expected_std(look)]
 
 
 def _cut(image: np.ndarray) -> np.ndarray:
-    """(SIZE, SIZE, K) center of a picture."""
-    margin = (WHOLE - SIZE) // 2
-    whole = np.stack([channel(image, WHOLE, k) for k in range(image.shape[1])], axis=-1)
-    return whole[margin : margin + SIZE, margin : margin + SIZE]
+    """Return the (SIZE, SIZE, K) center of a picture."""
+    margin = (FIELD_SIZE - SIZE) // 2
+    channels = np.stack([channel(image, FIELD_SIZE, k) for k in range(image.shape[1])], axis=-1)
+    return channels[margin : margin + SIZE, margin : margin + SIZE]
 
 
 def _histogram(red: np.ndarray, deviation: float) -> Panel:

@@ -25,7 +25,7 @@ VIEW = (45, 35)
 _FIXED = SOLID.with_settings({"gain": 3.0})
 #: Side of the closeup, its magnification, and its distance from the silhouette.
 CLOSEUP, TIMES, MARGIN = 52, 5, 28
-WAYS = {
+LOOKS = {
     "off": _FIXED.with_settings({"view_plane": False}),
     "on": _FIXED,
     "brute": _FIXED.with_settings({"method": "brute"}),
@@ -59,16 +59,16 @@ def _write_plane(page: Page) -> None:
         layers = picture.layers[0]
         side = look.supersampling * TILTED_SIZE
         tone = frame_of(layers.tone[:, 0], layers.pixel, (side, side))
-        half = 0.45 * side * np.array([np.cos(np.radians(tilt)), 1.0])
-        down, across = np.rint(half).astype(int)
+        half_size = 0.45 * side * np.array([np.cos(np.radians(tilt)), 1.0])
+        down, across = np.rint(half_size).astype(int)
         middle = side // 2
         patch = tone[middle - down : middle + down, middle - across : middle + across]
         # Drawn at twice the size: each pixel is the mean of 2 x 2.
-        found = peaks(orientation_spectrum(_halved(patch), 720))
+        measured = peaks(orientation_spectrum(_downsampled(patch), 720))
         angles = MEMBER + np.array([0, np.pi / 2])
-        there = np.degrees(np.arctan2(np.sin(angles) * np.cos(np.radians(tilt)), np.cos(angles)))
-        there = sorted(there % 180)
-        rows.append([f"{tilt}°", listed(there), listed(found)])
+        expected = np.degrees(np.arctan2(np.sin(angles) * np.cos(np.radians(tilt)), np.cos(angles)))
+        expected = sorted(expected % 180)
+        rows.append([f"{tilt}°", listed(expected), listed(measured)])
     page.picture([panels], "A 4-RoSy field on a plane at three tilts", "plane")
     page.text(
         """The table lists the orientations of the projected members, and the peaks of the
@@ -91,22 +91,26 @@ def _write_sphere(page: Page) -> None:
         equal angles, and rotated back after the choice. No streak breaks."""
     )
     camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
-    pictures = {name: compose_view(surface, field, look, camera) for name, look in WAYS.items()}
+    pictures = {name: compose_view(surface, field, look, camera) for name, look in LOOKS.items()}
     tones = {name: _frame(picture.layers[0], 0) for name, picture in pictures.items()}
-    seen = _frame(pictures["on"].layers[0], None)
-    near = {
-        name: local_correlation(tones[name], tones["brute"], seen, 3.0 * SOLID.supersampling)
+    covered_weight = _frame(pictures["on"].layers[0], None)
+    local_correlations = {
+        name: local_correlation(
+            tones[name], tones["brute"], covered_weight, 3.0 * SOLID.supersampling
+        )
         for name in ("off", "on")
     }
-    left, top, right, bottom = box = _worst(near["on"] - near["off"], seen)
-    shown = {name: display(picture.rgba) for name, picture in pictures.items()}
+    left, top, right, bottom = box = _worst_box(
+        local_correlations["on"] - local_correlations["off"], covered_weight
+    )
+    displayed = {name: display(picture.rgba) for name, picture in pictures.items()}
     spheres = [
-        Panel(outlined(shown[name], box, RED), f"members chosen {NAMES[name]}")
+        Panel(outlined(displayed[name], box, RED), f"members chosen {NAMES[name]}")
         for name in ("off", "on")
     ]
     page.picture([spheres], "A sphere with the field of a cube, drawn with both methods", "sphere")
     closeups = [
-        Panel(magnified(shown[name][top:bottom, left:right], TIMES), f"{label}, {TIMES} times")
+        Panel(magnified(displayed[name][top:bottom, left:right], TIMES), f"{label}, {TIMES} times")
         for name, label in NAMES.items()
     ]
     page.picture([closeups], "Closeups of the marked square, and brute force", "closeup")
@@ -116,10 +120,10 @@ def _write_sphere(page: Page) -> None:
         standard deviation of 3 pixels): its 1st percentile, and the part of the sphere where it is
         below 0.9."""
     )
-    covered, square = seen > 0, np.zeros(seen.shape, dtype=bool)
-    square[_fine(SIZE - bottom, SIZE - top), _fine(left, right)] = True
+    covered, square = covered_weight > 0, np.zeros(covered_weight.shape, dtype=bool)
+    square[_subpixels(SIZE - bottom, SIZE - top), _subpixels(left, right)] = True
     rows = []
-    for name, local in near.items():
+    for name, local in local_correlations.items():
         row = [NAMES[name]]
         row += [correlation(tones[name][part], tones["brute"][part]) for part in (covered, square)]
         local = local[covered]
@@ -131,27 +135,31 @@ def _write_sphere(page: Page) -> None:
 
 
 def _frame(layers: DegreeLayer, channel: int | None) -> np.ndarray:
-    """(H, W) one channel of the uncorrected blend, or a mask of the covered pixels."""
+    """Return (H, W): one channel of the uncorrected blend, or 1 at covered pixels if it is None."""
     values = 1.0 if channel is None else layers.images.blend[:, channel]
     return frame_of(values, layers.pixel, (SIZE * SOLID.supersampling,) * 2)
 
 
-def _fine(start: int, stop: int) -> slice:
+def _subpixels(start: int, stop: int) -> slice:
     """Convert pixels of the finished picture to pixels of the supersampled one."""
     return slice(start * SOLID.supersampling, stop * SOLID.supersampling)
 
 
-def _worst(lost: np.ndarray, seen: np.ndarray, side: int = CLOSEUP) -> tuple[int, int, int, int]:
-    """Return the box (left, top, right, bottom) of the finished picture with the lowest correlation."""
-    finer = SOLID.supersampling
-    inside = ndimage.binary_erosion(seen > 0, iterations=finer * MARGIN)
-    spread = ndimage.uniform_filter(np.where(inside, np.nan_to_num(lost), 0), finer * side)
-    row, column = np.unravel_index(np.argmax(spread), spread.shape)
-    left = int(np.clip(column // finer - side // 2, 0, SIZE - side))
-    top = int(np.clip(SIZE - 1 - row // finer - side // 2, 0, SIZE - side))
+def _worst_box(
+    improvement: np.ndarray, covered_weight: np.ndarray, side: int = CLOSEUP
+) -> tuple[int, int, int, int]:
+    """Return the box (left, top, right, bottom) of the picture where the correlation improves most."""
+    supersampling = SOLID.supersampling
+    inside = ndimage.binary_erosion(covered_weight > 0, iterations=supersampling * MARGIN)
+    mean_improvement = ndimage.uniform_filter(
+        np.where(inside, np.nan_to_num(improvement), 0), supersampling * side
+    )
+    row, column = np.unravel_index(np.argmax(mean_improvement), mean_improvement.shape)
+    left = int(np.clip(column // supersampling - side // 2, 0, SIZE - side))
+    top = int(np.clip(SIZE - 1 - row // supersampling - side // 2, 0, SIZE - side))
     return left, top, left + side, top + side
 
 
-def _halved(patch: np.ndarray) -> np.ndarray:
+def _downsampled(patch: np.ndarray) -> np.ndarray:
     height, width = (side // 2 for side in patch.shape)
     return patch[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))

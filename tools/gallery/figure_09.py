@@ -25,9 +25,9 @@ REACH = 90.0
 def field(p: np.ndarray) -> np.ndarray:
     """Return a 4-RoSy field with three singularities of index +1/4 and two of −1/4."""
     z = np.ones(p.shape, dtype=complex)
-    for place, index in ZEROS:
-        away = p - place
-        z *= (away if index > 0 else away.conj()) / np.sqrt(np.abs(away) ** 2 + REACH**2)
+    for position, index in ZEROS:
+        offset = p - position
+        z *= (offset if index > 0 else offset.conj()) / np.sqrt(np.abs(offset) ** 2 + REACH**2)
     return z
 
 
@@ -48,8 +48,8 @@ def write() -> None:
         "both": "(d) as both",
     }
     panels = [
-        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings({"magnitude": way})), label)
-        for way, label in names.items()
+        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings({"magnitude": mapping})), label)
+        for mapping, label in names.items()
     ]
     page.picture([panels[:2], panels[2:]], "The magnitude of a 4-RoSy field shown in three ways")
     _measure(page)
@@ -69,45 +69,53 @@ def _measure(page: Page) -> None:
     )
     cells = (SIZE // 10, 10, SIZE // 10, 10)
     luminance = {}
-    for way in ("none", "colour", "length", "both"):
-        rgba = compose_field(field, DEGREE, SIZE, MEASURED.with_settings({"magnitude": way})).rgba
-        luminance[way] = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    for mapping in ("none", "colour", "length", "both"):
+        rgba = compose_field(
+            field, DEGREE, SIZE, MEASURED.with_settings({"magnitude": mapping})
+        ).rgba
+        luminance[mapping] = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
     ranks = {
-        way: float(
+        mapping: float(
             spearmanr(
                 rho.reshape(cells).mean(axis=(1, 3)).ravel(),
                 values.reshape(cells).mean(axis=(1, 3)).ravel(),
             ).statistic
         )
-        for way, values in luminance.items()
+        for mapping, values in luminance.items()
     }
     edges = (0.0, 0.25, 0.5, 0.75, 1.0)
     heads = [f"Half-length, ρ {low:g} to {high:g}" for low, high in pairwise(edges)]
     rows = []
-    for way, label in (
+    for mapping, label in (
         ("none", "not shown"),
         ("colour", "colour"),
         ("length", "length"),
         ("both", "both"),
     ):
-        rows.append([label, ranks[way], *_half_lengths(way, z, rho, edges)])
+        rows.append([label, ranks[mapping], *_half_lengths(mapping, z, rho, edges)])
     page.table(["Magnitude as", "Luminance", *heads], rows)
 
 
-def _half_lengths(way: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]) -> list[str]:
+def _half_lengths(
+    mapping: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]
+) -> list[str]:
     """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
-    look = MEASURED.with_settings({"magnitude": way, "weights": "none"})
+    look = MEASURED.with_settings({"magnitude": mapping, "weights": "none"})
     image = compose_field(field, DEGREE, SIZE, look).layers[0].images.members[0, :, 0]
     image = image.reshape(SIZE, SIZE)
     angle = np.angle(z) / DEGREE
     # Leave out the borders, and the breaking points of the image that is measured.
-    chosen = np.abs(DEGREE * angle) < 2.0
+    selected = np.abs(DEGREE * angle) < 2.0
     margin = 45
-    chosen[:margin] = chosen[-margin:] = chosen[:, :margin] = chosen[:, -margin:] = False
+    selected[:margin] = selected[-margin:] = selected[:, :margin] = selected[:, -margin:] = False
     lengths = []
     for low, high in pairwise(edges):
-        kept = persistence(image, np.exp(1j * angle), chosen & (rho >= low) & (rho < high), 60)
-        past = int(np.argmax(kept < 0.5))
-        share = (kept[past - 1] - 0.5) / (kept[past - 1] - kept[past])
-        lengths.append(f"{past - 1 + share:.1f} px")
+        correlations = persistence(
+            image, np.exp(1j * angle), selected & (rho >= low) & (rho < high), 60
+        )
+        first_below = int(np.argmax(correlations < 0.5))
+        fraction = (correlations[first_below - 1] - 0.5) / (
+            correlations[first_below - 1] - correlations[first_below]
+        )
+        lengths.append(f"{first_below - 1 + fraction:.1f} px")
     return lengths

@@ -23,9 +23,9 @@ from .solid import (
     compose_view,
     harmonic_field,
     icosahedron_axes,
-    seen_points,
     smoothed,
     view,
+    visible_points,
 )
 
 WIDTH = 402
@@ -71,14 +71,14 @@ def write() -> None:
             shown = _marked(shown, *fields[name], camera, look.supersampling)
         panels.append(Panel(shown, label))
         rows.append([label, *_spread(picture, look)])
-    abouts = (
+    captions = (
         "Suzanne with a 4-RoSy field",
         "A triple torus with a 4-RoSy field",
         "A knot and a sphere",
         "A torus with a 6-RoSy field",
     )
-    for number, about in enumerate(abouts):
-        page.picture([panels[2 * number : 2 * number + 2]], about, "abcd"[number])
+    for number, caption in enumerate(captions):
+        page.picture([panels[2 * number : 2 * number + 2]], caption, "abcd"[number])
     page.text("## Measurements")
     page.text(
         """The first table lists the singularities with their indices in units of 1/N. By the
@@ -111,11 +111,11 @@ def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
 
 
 def _marked(
-    shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, finer: int
+    shown: np.ndarray, surface: Surface, field: RosyField, camera: Camera, supersampling: int
 ) -> np.ndarray:
     """Return a picture of the unit sphere with dots at the singularities."""
-    at = surface.vertices[find_singularities(surface, field)[0]]
-    for x, y in seen_points(at, at, camera, finer):
+    positions = surface.vertices[find_singularities(surface, field)[0]]
+    for x, y in visible_points(positions, positions, camera, supersampling):
         shown = dotted(shown, x, y, RED)
     return shown
 

@@ -60,7 +60,7 @@ INKS = {
 }
 
 #: Camera distances for lines in pixels and in Blender units.
-AWAY = (3.6, 7.2, 14.4)
+DISTANCES = (3.6, 7.2, 14.4)
 
 
 def write() -> None:
@@ -84,7 +84,7 @@ def write() -> None:
     save(sheet([guided]), IMAGES / "hatching-guide.png")
     for name, panels in {"hatching-hand": HAND, "hatching-inks": INKS}.items():
         shown = [
-            Panel(_closer(monkey, field, replace(load_preset(preset).look, **settings)), label)
+            Panel(_detail(monkey, field, replace(load_preset(preset).look, **settings)), label)
             for label, (preset, settings) in panels.items()
         ]
         save(sheet([shown[start : start + 2] for start in (0, 2)]), IMAGES / f"{name}.png")
@@ -99,11 +99,11 @@ def _on_a_table(monkey: Surface, field: RosyField) -> list[MeshInstance]:
     """Return Suzanne and a ball on a table."""
     ball, table = sphere(), plane(24)
     fields = field, smoothest_field(ball, 4), axis_field(table, 4, (1.0, 0.25, 0.0))
-    surfaces, places = (
+    surfaces, matrices = (
         (monkey, ball, table),
-        (_at(0, 0, 0.985), _at(1.55, -0.75, 0.5, 0.5), _at(0, 0, 0, 7.0)),
+        (_placement(0, 0, 0.985), _placement(1.55, -0.75, 0.5, 0.5), _placement(0, 0, 0, 7.0)),
     )
-    return [MeshInstance(*entry) for entry in zip(surfaces, places, fields, strict=True)]
+    return [MeshInstance(*entry) for entry in zip(surfaces, matrices, fields, strict=True)]
 
 
 def _ends(instances: list[MeshInstance]) -> list[Panel]:
@@ -131,7 +131,7 @@ def _outlines(
         ],
         [
             Panel(
-                _closer(monkey, field, replace(load_preset(name).look, **settings)),
+                _detail(monkey, field, replace(load_preset(name).look, **settings)),
                 f"{name}, outline 2",
             )
             for name, settings in others.items()
@@ -145,10 +145,10 @@ def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
     for unit in ("pixels", "world"):
         look = replace(load_preset("engraving").look, unit=unit, unit_size=0.008)
         row = []
-        for away in AWAY:
+        for distance in DISTANCES:
             side = THIRD * look.supersampling
-            place = look_at((-0.35 * away, -0.9 * away, 0.25 * away), (0, 0, 0))
-            camera = perspective_camera(place, side, side, fov=np.radians(24))
+            view_matrix = look_at((-0.35 * distance, -0.9 * distance, 0.25 * distance), (0, 0, 0))
+            camera = perspective_camera(view_matrix, side, side, fov=np.radians(24))
             shown = compose(project([MeshInstance(monkey, np.eye(4), field)], camera), look)
             row.append(Panel(display(shown.rgba), f"unit: {unit}"))
         rows.append(row)
@@ -157,7 +157,7 @@ def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
 
 def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
     """Draw the sources of tone one after the other."""
-    hidden = [
+    occluded = [
         replace(instance, tone=SurfaceTone(ambient_occlusion(bare, number)[:, None]))
         for number, instance in enumerate(bare)
     ]
@@ -167,11 +167,11 @@ def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
     return [
         [
             _tone_panel(bare, look, "light: scene, shadows"),
-            _tone_panel(hidden, replace(look, tone="attribute"), "tone: attribute, of occlusion"),
+            _tone_panel(occluded, replace(look, tone="attribute"), "tone: attribute, of occlusion"),
         ],
         [
             _tone_panel(
-                hidden,
+                occluded,
                 replace(look, tone="attribute", tone_lit=True, tone_gamma=1.3),
                 "the same, lit",
             ),
@@ -199,13 +199,13 @@ def _banded(surface: Surface) -> SurfaceTone:
     return SurfaceTone(uv.astype(np.float32), image.astype(np.float32))
 
 
-def _at(x: float, y: float, z: float, scale: float = 1.0) -> np.ndarray:
+def _placement(x: float, y: float, z: float, scale: float = 1.0) -> np.ndarray:
     matrix = np.diag([scale, scale, scale, 1.0])
     matrix[:3, 3] = x, y, z
     return matrix
 
 
-def _closer(surface: Surface, field: RosyField, look: Look) -> np.ndarray:
+def _detail(surface: Surface, field: RosyField, look: Look) -> np.ndarray:
     """Return a part of a large picture, which shows single lines."""
     camera = view(surface, (-26, 8), (LARGE, LARGE), look.supersampling)
     shown = display(compose_view(surface, field, look, camera).rgba)

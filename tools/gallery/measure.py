@@ -10,14 +10,14 @@ BAND = (0.05, 0.35)
 
 
 def correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Pearson's correlation of two sets of values."""
+    """Return Pearson's correlation of two sets of values."""
     return float(np.corrcoef(a.ravel(), b.ravel())[0, 1])
 
 
 def local_correlation(
     a: np.ndarray, b: np.ndarray, weight: np.ndarray, deviation: float
 ) -> np.ndarray:
-    """(H, W) correlation of two (H, W) pictures under a Gaussian window around each pixel.
+    """Return the (H, W) correlation of two (H, W) pictures under a Gaussian window around each pixel.
 
     `weight` is 1 where the pictures count and 0 where not; NaN is returned where it is 0.
     """
@@ -26,17 +26,20 @@ def local_correlation(
         return ndimage.gaussian_filter(values * weight, deviation, mode="constant")
 
     a, b = a.astype(np.float64), b.astype(np.float64)
-    share = mean(np.ones_like(a))
+    total_weight = mean(np.ones_like(a))
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean_a, mean_b = mean(a) / share, mean(b) / share
-        product = mean(a * b) / share - mean_a * mean_b
-        spread_a, spread_b = mean(a * a) / share - mean_a**2, mean(b * b) / share - mean_b**2
+        mean_a, mean_b = mean(a) / total_weight, mean(b) / total_weight
+        product = mean(a * b) / total_weight - mean_a * mean_b
+        spread_a, spread_b = (
+            mean(a * a) / total_weight - mean_a**2,
+            mean(b * b) / total_weight - mean_b**2,
+        )
         result = product / np.sqrt(spread_a * spread_b)
     return np.where(weight > 0, result, np.nan)
 
 
 def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
-    """(bins,) power of a patch in streaks of each orientation, 0 to 180 degrees; mean 1.
+    """Return (bins,): the power of a patch by orientation of streaks, 0 to 180 degrees; mean 1.
 
     Parameters
     ----------
@@ -52,15 +55,15 @@ def orientation_spectrum(tone: np.ndarray, bins: int = 180) -> np.ndarray:
     # A streak is long and narrow, so its spectrum is perpendicular to it.
     angle = np.degrees(np.arctan2(ky, kx) + np.pi / 2) % 180
     used = (radius > BAND[0]) & (radius < BAND[1])
-    place = (angle[used] * bins / 180).astype(int) % bins
-    total = np.bincount(place, power[used], bins)
-    count = np.bincount(place, minlength=bins)
+    bin_index = (angle[used] * bins / 180).astype(int) % bins
+    total = np.bincount(bin_index, power[used], bins)
+    count = np.bincount(bin_index, minlength=bins)
     spectrum = total / np.maximum(count, 1)
     return spectrum / spectrum.mean()
 
 
 def mean_spectrum(tone: np.ndarray, side: int, bins: int = 180) -> np.ndarray:
-    """The orientation spectrum of patches of `side` pixels that cover a picture, averaged."""
+    """Return the mean orientation spectrum of patches of `side` pixels that cover a picture."""
     step = side // 2
     patches = [
         orientation_spectrum(tone[row : row + side, column : column + side], bins)
@@ -70,24 +73,24 @@ def mean_spectrum(tone: np.ndarray, side: int, bins: int = 180) -> np.ndarray:
     return np.mean(patches, axis=0)
 
 
-def peaks(spectrum: np.ndarray, least: float = 1.5) -> list[float]:
+def peaks(spectrum: np.ndarray, min_height: float = 1.5) -> list[float]:
     """Return the orientations of the distinct maxima of a spectrum in degrees.
 
-    The spectrum is smoothed over 5 degrees; a maximum counts if it is `least` times the mean. Its
-    place is the center of the power within 6 degrees of it.
+    The spectrum is smoothed over 5 degrees; a maximum counts if it is `min_height` times the mean. Its
+    position is the center of the power within 6 degrees of it.
     """
     bins = len(spectrum)
     degree = 180 / bins
     smooth = ndimage.gaussian_filter1d(spectrum, 2.5 / degree, mode="wrap")
-    found = []
-    for place in np.flatnonzero(
-        (smooth > np.roll(smooth, 1)) & (smooth >= np.roll(smooth, -1)) & (smooth > least)
+    orientations = []
+    for peak in np.flatnonzero(
+        (smooth > np.roll(smooth, 1)) & (smooth >= np.roll(smooth, -1)) & (smooth > min_height)
     ):
-        reach = round(6 / degree)
-        around = np.arange(-reach, reach + 1)
-        weight = smooth[(place + around) % bins] - smooth[(place + around) % bins].min()
-        found.append(float((place + 0.5 + np.average(around, weights=weight)) * degree % 180))
-    return sorted(found)
+        half_width = round(6 / degree)
+        offset = np.arange(-half_width, half_width + 1)
+        weight = smooth[(peak + offset) % bins] - smooth[(peak + offset) % bins].min()
+        orientations.append(float((peak + 0.5 + np.average(offset, weights=weight)) * degree % 180))
+    return sorted(orientations)
 
 
 def peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
@@ -97,37 +100,41 @@ def peak_to_floor(spectrum: np.ndarray, lines: int, first: float) -> float:
     ----------
     spectrum : (bins,) ndarray
     lines : int
-        Different orientations of the N members.
+        Number of different orientations of the N members.
     first : float
-        One of them, degrees.
+        One of these orientations, in degrees.
     """
     bins = len(spectrum)
     smooth = ndimage.gaussian_filter1d(spectrum, 1.5 * bins / 180, mode="wrap")
-    place = (first + 180 / lines * np.arange(lines)) * bins / 180
-    here = np.rint(place - 0.5).astype(int) % bins
-    between = np.rint(place - 0.5 + bins / lines / 2).astype(int) % bins
-    return float(smooth[here].mean() / smooth[between].mean())
+    position = (first + 180 / lines * np.arange(lines)) * bins / 180
+    on_lines = np.rint(position - 0.5).astype(int) % bins
+    between = np.rint(position - 0.5 + bins / lines / 2).astype(int) % bins
+    return float(smooth[on_lines].mean() / smooth[between].mean())
 
 
 def persistence(
-    image: np.ndarray, direction: np.ndarray, chosen: np.ndarray, farthest: int
+    image: np.ndarray, direction: np.ndarray, selected: np.ndarray, max_distance: int
 ) -> np.ndarray:
-    """(farthest + 1,) correlation of an image with itself some pixels on along a direction.
+    """Return the autocorrelations of an image along a direction, by distance in pixels.
 
     Parameters
     ----------
     image : (H, W) ndarray
     direction : (H, W) complex ndarray
-        Unit.
-    chosen : (H, W) bool ndarray
-        From which pixels.
-    farthest : int
+        Unit directions.
+    selected : (H, W) bool ndarray
+        Pixels that are compared with others.
+    max_distance : int
+
+    Returns
+    -------
+    (max_distance + 1,) float64 ndarray
     """
-    row, column = np.nonzero(chosen)
-    ahead, here = direction[chosen], image[chosen]
-    values = []
-    for distance in range(farthest + 1):
-        place = [row + distance * ahead.imag, column + distance * ahead.real]
-        there = ndimage.map_coordinates(image, place, order=1, mode="nearest")
-        values.append(correlation(here, there))
-    return np.array(values)
+    row, column = np.nonzero(selected)
+    direction_at, values_at_start = direction[selected], image[selected]
+    correlations = []
+    for distance in range(max_distance + 1):
+        position = [row + distance * direction_at.imag, column + distance * direction_at.real]
+        values_at_distance = ndimage.map_coordinates(image, position, order=1, mode="nearest")
+        correlations.append(correlation(values_at_start, values_at_distance))
+    return np.array(correlations)

@@ -24,20 +24,20 @@ class Page:
         self.name, self.title = name, title
         self._pieces = [f"# {title}"]
 
-    def text(self, words: str) -> None:
+    def text(self, text: str) -> None:
         """Add a paragraph; line breaks in it do not count."""
-        self._pieces.append(" ".join(words.split()))
+        self._pieces.append(" ".join(text.split()))
 
-    def picture(self, rows: Sequence[Sequence[Panel]], about: str, part: str = "") -> None:
+    def picture(self, rows: Sequence[Sequence[Panel]], caption: str, part: str = "") -> None:
         """Add a sheet of panels, saved beside the page."""
         path = FOLDER / f"{self.name}{part and '-' + part}.png"
         save(sheet(rows), path)
-        self._pieces.append(f"![{about}]({path.name})")
+        self._pieces.append(f"![{caption}]({path.name})")
 
     def table(self, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
         """Add a table; floats are shown with three decimals."""
         lines = [head, ["---"] + ["---:"] * (len(head) - 1)]
-        lines += [[_shown(value) for value in row] for row in rows]
+        lines += [[_format_value(value) for value in row] for row in rows]
         self._pieces.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
 
     def write(self, figure: str) -> None:
@@ -46,7 +46,7 @@ class Page:
         (FOLDER / f"{self.name}.md").write_text("\n\n".join(self._pieces) + "\n", encoding="utf-8")
 
 
-def _shown(value: object) -> str:
+def _format_value(value: object) -> str:
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 

@@ -59,7 +59,7 @@ def _label(name: str, seconds: dict[str, float]) -> str:
 
 
 def _halved(picture: np.ndarray) -> np.ndarray:
-    """(H / 2, W / 2, 3) means of two by two pixels."""
+    """Return (H / 2, W / 2, 3) means of 2 x 2 pixels."""
     height, width = picture.shape
     small = Image.fromarray(picture).resize((width // 2, height // 2), Image.Resampling.BOX)
     return np.asarray(small.convert("RGB"))

@@ -3,8 +3,8 @@
     blender -b --factory-startup -P tools/gallery/peers_blender.py -- FOLDER [NAME ...]
 
 All use the same mesh, camera and sun. Writes a .png for each into FOLDER, and `seconds.json` with the
-processor time of each, including the render. `python -m tools.gallery peers FOLDER` puts the pictures
-side by side.
+processor time of each, including the render. If FOLDER is dist/peers,
+`python -m tools.gallery peers` puts the pictures side by side.
 """
 
 from __future__ import annotations
@@ -48,16 +48,18 @@ def main() -> None:
     """Draw the named pictures, by default all."""
     folder, *names = sys.argv[sys.argv.index("--") + 1 :]
     load_rosy()
-    kept = Path(folder).resolve() / "seconds.json"
-    kept.parent.mkdir(parents=True, exist_ok=True)
-    seconds = json.loads(kept.read_text()) if kept.exists() else {}
+    seconds_path = Path(folder).resolve() / "seconds.json"
+    seconds_path.parent.mkdir(parents=True, exist_ok=True)
+    seconds = json.loads(seconds_path.read_text()) if seconds_path.exists() else {}
     for prepare in (line_art, freestyle, shader, rosy):
         if not names or prepare.__name__ in names:
-            seconds[prepare.__name__] = drawn(prepare, kept.with_name(f"{prepare.__name__}.png"))
-            kept.write_text(json.dumps(seconds, indent=1) + "\n", encoding="utf-8")
+            seconds[prepare.__name__] = time_drawing(
+                prepare, seconds_path.with_name(f"{prepare.__name__}.png")
+            )
+            seconds_path.write_text(json.dumps(seconds, indent=1) + "\n", encoding="utf-8")
 
 
-def drawn(prepare: Prepare, path: Path) -> float:
+def time_drawing(prepare: Prepare, path: Path) -> float:
     """Return the processor time of a second run, when shaders are already compiled, in seconds."""
     for _ in range(2):
         monkey = new_scene()
@@ -81,8 +83,8 @@ def load_rosy() -> None:
 
 def new_scene() -> bpy.types.Object:
     """Open a scene with a white, subdivided Suzanne, a camera, a sun and a white background."""
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
     scene = bpy.context.scene
     scene.rosy.bakes.clear()
     bpy.ops.mesh.primitive_monkey_add()
@@ -97,9 +99,9 @@ def new_scene() -> bpy.types.Object:
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     camera.data.lens, camera.data.shift_x, camera.data.shift_y = 82, -0.082, -0.004
-    place = Vector((-2.62, -5.35, 0.88))
-    camera.location = place
-    camera.rotation_euler = (Vector((0, 0, -0.02)) - place).to_track_quat("-Z", "Y").to_euler()
+    location = Vector((-2.62, -5.35, 0.88))
+    camera.location = location
+    camera.rotation_euler = (Vector((0, 0, -0.02)) - location).to_track_quat("-Z", "Y").to_euler()
     scene.camera = camera
     bpy.context.view_layer.update()
 
@@ -121,8 +123,8 @@ def new_scene() -> bpy.types.Object:
     return monkey
 
 
-def subdivide(thing: bpy.types.Object, levels: int) -> None:
-    modifier = thing.modifiers.new("Subdivision", "SUBSURF")
+def subdivide(obj: bpy.types.Object, levels: int) -> None:
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
     modifier.levels = modifier.render_levels = levels
 
 
@@ -180,11 +182,11 @@ def freestyle(monkey: bpy.types.Object) -> None:
         settings.linesets.remove(lines)
     settings.use_smoothness = True
     form = settings.linesets.new("Form")
-    chosen(form, "silhouette", "border", "crease", "external_contour", "suggestive_contour")
-    sketched(form, thickness=3.2, rounds=2, shake=2.0)
+    select_edges(form, "silhouette", "border", "crease", "external_contour", "suggestive_contour")
+    set_sketchy_style(form, thickness=3.2, rounds=2, shake=2.0)
     shade = settings.linesets.new("Shade")
-    chosen(shade, "edge_mark")
-    sketched(shade, thickness=2.2, rounds=2, shake=1.2)
+    select_edges(shade, "edge_mark")
+    set_sketchy_style(shade, thickness=2.2, rounds=2, shake=1.2)
 
 
 def mark_shaded_edges(monkey: bpy.types.Object) -> None:
@@ -201,13 +203,13 @@ def mark_shaded_edges(monkey: bpy.types.Object) -> None:
         marks.data[edge.index].value = level and normal.dot(toward) < 0.45
 
 
-def chosen(lines: bpy.types.FreestyleLineSet, *kinds: str) -> None:
+def select_edges(lines: bpy.types.FreestyleLineSet, *kinds: str) -> None:
     """Select the edges that a line set draws."""
     for name in EDGES:
         setattr(lines, f"select_{name}", name in kinds)
 
 
-def sketched(
+def set_sketchy_style(
     lines: bpy.types.FreestyleLineSet, thickness: float, rounds: int, shake: float
 ) -> None:
     """Make lines look sketched: drawn several times, shaky, thinner toward their ends."""
@@ -236,7 +238,7 @@ def shader(monkey: bpy.types.Object) -> None:
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
 
-    def maths(operation: str, *inputs: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
+    def math_node(operation: str, *inputs: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
         node = nodes.new("ShaderNodeMath")
         node.operation = operation
         for socket, value in zip(node.inputs, inputs, strict=False):
@@ -250,25 +252,25 @@ def shader(monkey: bpy.types.Object) -> None:
     links.new(nodes.new("ShaderNodeBsdfDiffuse").outputs[0], light.inputs[0])
     tone = nodes.new("ShaderNodeRGBToBW")
     links.new(light.outputs[0], tone.inputs[0])
-    places = nodes.new("ShaderNodeTexCoord").outputs["Window"]
+    window_coordinates = nodes.new("ShaderNodeTexCoord").outputs["Window"]
     paper = None
     # Bands at three angles, each starting at a darker tone.
     for degrees, darker in ((40, 0.72), (-50, 0.45), (-5, 0.22)):
-        turned = nodes.new("ShaderNodeVectorRotate")
-        turned.rotation_type = "Z_AXIS"
-        links.new(places, turned.inputs["Vector"])
-        turned.inputs["Angle"].default_value = degrees * 3.14159 / 180
+        rotated = nodes.new("ShaderNodeVectorRotate")
+        rotated.rotation_type = "Z_AXIS"
+        links.new(window_coordinates, rotated.inputs["Vector"])
+        rotated.inputs["Angle"].default_value = degrees * 3.14159 / 180
         bands = nodes.new("ShaderNodeTexWave")
         bands.inputs["Scale"].default_value = 26
         bands.inputs["Distortion"].default_value = 1.2
         bands.inputs["Detail Scale"].default_value = 0.6
-        links.new(turned.outputs[0], bands.inputs["Vector"])
-        width = maths("SUBTRACT", darker, tone.outputs[0])
-        line = maths(
+        links.new(rotated.outputs[0], bands.inputs["Vector"])
+        width = math_node("SUBTRACT", darker, tone.outputs[0])
+        line = math_node(
             "LESS_THAN", bands.outputs["Factor" if "Factor" in bands.outputs else "Fac"], width
         )
-        clear = maths("SUBTRACT", 1.0, line)
-        paper = clear if paper is None else maths("MULTIPLY", paper, clear)
+        clear = math_node("SUBTRACT", 1.0, line)
+        paper = clear if paper is None else math_node("MULTIPLY", paper, clear)
     glow = nodes.new("ShaderNodeEmission")
     links.new(paper, glow.inputs["Color"])
     links.new(glow.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])

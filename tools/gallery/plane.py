@@ -16,10 +16,13 @@ from .sheet import display
 PlanarField = Callable[[np.ndarray], np.ndarray]
 
 
-def points(size: int, finer: int = 1) -> np.ndarray:
-    """(size * finer,) * 2 complex centers of the pixels of a square, relative to its center."""
-    along = (np.arange(size * finer) + 0.5) / finer - size / 2
-    return along + 1j * along[:, None]
+def points(size: int, supersampling: int = 1) -> np.ndarray:
+    """Return the pixel centers of a square as complex numbers, relative to its center.
+
+    The array has `size` times `supersampling` rows and columns, the first row at the bottom.
+    """
+    axis = (np.arange(size * supersampling) + 0.5) / supersampling - size / 2
+    return axis + 1j * axis[:, None]
 
 
 def singularity(index: int) -> PlanarField:
@@ -34,25 +37,27 @@ def compose_field(field: PlanarField, degree: int, size: int, look: Look) -> Pic
 
 
 def draw_field(
-    field: PlanarField, degree: int, size: int, look: Look, finer: int = 2
+    field: PlanarField, degree: int, size: int, look: Look, supersampling: int = 2
 ) -> np.ndarray:
-    """Draw (size, size, 3) uint8, supersampled `finer` times in each direction."""
-    z = field(points(size, finer))
-    rgba = compose_planar(np.angle(z) / degree, degree, enlarged(look, finer), np.abs(z)).rgba
-    return display(rgba.reshape(size, finer, size, finer, 4).mean(axis=(1, 3)))
+    """Return a picture of a field, (size, size, 3) uint8, supersampled in each direction."""
+    z = field(points(size, supersampling))
+    rgba = compose_planar(
+        np.angle(z) / degree, degree, enlarged(look, supersampling), np.abs(z)
+    ).rgba
+    return display(rgba.reshape(size, supersampling, size, supersampling, 4).mean(axis=(1, 3)))
 
 
-def enlarged(look: Look, finer: int) -> Look:
-    """Return a look with its lengths in pixels of a picture that is `finer` times larger."""
+def enlarged(look: Look, supersampling: int) -> Look:
+    """Return a look with its lengths in the pixels of a supersampled picture."""
     lengths = ("length", "grain", "high_pass")
-    return look.with_settings({name: getattr(look, name) * finer for name in lengths})
+    return look.with_settings({name: getattr(look, name) * supersampling for name in lengths})
 
 
-def averaged(values: np.ndarray, size: int, finer: int, number: int = 0) -> np.ndarray:
-    """(size, size) one channel of the (P, K) values of a picture that is `finer` times larger."""
-    return values[:, number].reshape(size, finer, size, finer).mean(axis=(1, 3))
+def averaged(values: np.ndarray, size: int, supersampling: int, index: int = 0) -> np.ndarray:
+    """Return one channel, (size, size), of the (P, K) values of a supersampled picture."""
+    return values[:, index].reshape(size, supersampling, size, supersampling).mean(axis=(1, 3))
 
 
-def channel(values: np.ndarray, size: int, number: int = 0) -> np.ndarray:
-    """(size, size) one channel of the (P, K) values of a planar picture."""
-    return values[:, number].reshape(size, size)
+def channel(values: np.ndarray, size: int, index: int = 0) -> np.ndarray:
+    """Return one channel, (size, size), of the (P, K) values of a planar picture."""
+    return values[:, index].reshape(size, size)

@@ -26,5 +26,5 @@ def _small(look: Look) -> Image.Image:
     shown = display(draw_preview(look))
     if look.noise == "colour":
         return Image.fromarray(np.minimum(np.rint(shown / TONE) * TONE, 255).astype(np.uint8))
-    few = Image.Quantize.MEDIANCUT
-    return Image.fromarray(shown).quantize(COLORS, few, kmeans=2, dither=Image.Dither.NONE)
+    method = Image.Quantize.MEDIANCUT
+    return Image.fromarray(shown).quantize(COLORS, method, kmeans=2, dither=Image.Dither.NONE)

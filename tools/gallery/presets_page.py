@@ -150,7 +150,7 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
 
 
 def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) uint8 picture of a model, on the paper of a look."""
+    """Return a picture of a model on the paper of a look, (H, W, 3) uint8."""
     instance = model.instance if look.magnitude == "none" else model.raw
     points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
@@ -160,7 +160,7 @@ def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
 
 
 def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
-    """A (H, W, 4) picture whose background is the paper of its look, if it has one."""
+    """Return an (H, W, 4) picture with the paper of its look as background, if it has paper."""
     if look.ink != "hatch":
         return rgba
     alpha = rgba[..., 3:]

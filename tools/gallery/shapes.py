@@ -10,8 +10,8 @@ from rosy_addon.field.surface import Surface, build_surface
 
 def plane(cells: int = 8) -> Surface:
     """Return the square from -1 to 1 in x and y, facing up."""
-    along = np.linspace(-1, 1, cells + 1)
-    x, y = np.meshgrid(along, along, indexing="ij")
+    axis = np.linspace(-1, 1, cells + 1)
+    x, y = np.meshgrid(axis, axis, indexing="ij")
     return _grid("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
 
 
@@ -19,36 +19,38 @@ def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: in
     """Return a torus around the z axis."""
     u = np.arange(around)[:, None] * (2 * np.pi / around)
     v = np.arange(across) * (2 * np.pi / across)
-    out = radius + tube * np.cos(v)
-    point = np.stack(np.broadcast_arrays(out * np.cos(u), out * np.sin(u), tube * np.sin(v)), -1)
+    ring_radius = radius + tube * np.cos(v)
+    point = np.stack(
+        np.broadcast_arrays(ring_radius * np.cos(u), ring_radius * np.sin(u), tube * np.sin(v)), -1
+    )
     return _grid("torus", point, closed=(True, True))
 
 
 def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
     """Return a tube around a trefoil knot."""
     t = np.arange(around) * (2 * np.pi / around)
-    curve, ahead = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
-    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    curve, tangent = _trefoil(t), _trefoil(t + 1e-4) - _trefoil(t - 1e-4)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
     # The knot winds around a torus, so the normal of that torus is never parallel to the knot.
-    middle = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
-    out = curve - middle
-    out -= np.sum(out * ahead, axis=1)[:, None] * ahead
-    out /= np.linalg.norm(out, axis=1)[:, None]
-    side = np.cross(ahead, out)
+    torus_center = np.stack([np.cos(2 * t), np.sin(2 * t), 0 * t], axis=1) * 2
+    outward = curve - torus_center
+    outward -= np.sum(outward * tangent, axis=1)[:, None] * tangent
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    binormal = np.cross(tangent, outward)
     v = np.arange(across)[:, None] * (2 * np.pi / across)
-    ring = np.cos(v)[None] * out[:, None] + np.sin(v)[None] * side[:, None]
+    ring = np.cos(v)[None] * outward[:, None] + np.sin(v)[None] * binormal[:, None]
     return _grid("knot", curve[:, None] + tube * ring, closed=(True, True))
 
 
 def _trefoil(t: np.ndarray) -> np.ndarray:
-    out = 2 + np.cos(3 * t)
-    return np.stack([out * np.cos(2 * t), out * np.sin(2 * t), np.sin(3 * t)], axis=1)
+    radius = 2 + np.cos(3 * t)
+    return np.stack([radius * np.cos(2 * t), radius * np.sin(2 * t), np.sin(3 * t)], axis=1)
 
 
 def sphere(cells: int = 48) -> Surface:
     """Return the unit sphere, as a cube whose faces are divided at equal angles."""
-    along = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
-    u, v = np.meshgrid(along, along, indexing="ij")
+    coordinates = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
+    u, v = np.meshgrid(coordinates, coordinates, indexing="ij")
     sides = []
     for axis in range(3):
         for sign in (1, -1):
@@ -57,7 +59,7 @@ def sphere(cells: int = 48) -> Surface:
             sides.append(side)
     vertices = np.concatenate([side.reshape(-1, 3) for side in sides])
     cell = _cells(cells + 1, cells + 1, (False, False))
-    faces = np.concatenate([cell + number * (cells + 1) ** 2 for number in range(6)])
+    faces = np.concatenate([cell + index * (cells + 1) ** 2 for index in range(6)])
     # Adjacent sides share the vertices of their common edge.
     _, first, same = np.unique(
         np.rint(vertices * 1e6), axis=0, return_index=True, return_inverse=True
@@ -79,21 +81,21 @@ def triple_torus(cells: int = 110) -> Surface:
     count = np.bincount(ends[:, 0], minlength=len(vertices))[:, None]
     # Marching cubes leave slivers: smooth the vertices, then project them back.
     for _ in range(12):
-        middle = np.zeros_like(vertices)
-        np.add.at(middle, ends[:, 0], vertices[ends[:, 1]])
-        vertices = _onto_level(0.5 * vertices + 0.5 * middle / count)
+        neighbor_sum = np.zeros_like(vertices)
+        np.add.at(neighbor_sum, ends[:, 0], vertices[ends[:, 1]])
+        vertices = _onto_level(0.5 * vertices + 0.5 * neighbor_sum / count)
     surface = _polygons("triple torus", vertices, faces)
     outward = np.sum(surface.face_normal * _gradient(surface.face_center)) > 0
     return surface if outward else _polygons("triple torus", vertices, faces[:, ::-1])
 
 
 def _rings(points: np.ndarray, tube: float = 0.43, blend: float = 0.16) -> np.ndarray:
-    """(P,) signed distance of points from three smoothly merged rings of radius 1."""
+    """Return the (P,) signed distances of points from three smoothly merged rings of radius 1."""
     total = np.zeros(len(points))
-    for turn in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
-        center = 1.2 * np.array([np.cos(turn * np.pi), np.sin(turn * np.pi)])
-        away = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1]) - 1
-        total += np.exp(-np.hypot(away, points[:, 2]) / blend)
+    for angle in (0.5, 0.5 + 4 / 3, 0.5 + 2 / 3):
+        center = 1.2 * np.array([np.cos(angle * np.pi), np.sin(angle * np.pi)])
+        ring_distance = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1]) - 1
+        total += np.exp(-np.hypot(ring_distance, points[:, 2]) / blend)
     return -blend * np.log(total) - tube
 
 
@@ -146,8 +148,8 @@ def _grid(name: str, point: np.ndarray, closed: tuple[bool, bool]) -> Surface:
 
 
 def _cells(a: int, b: int, closed: tuple[bool, bool]) -> np.ndarray:
-    """(cells, 4) indices of the corners of the cells of an a x b grid, closed to a ring or not."""
-    number = np.arange(a * b).reshape(a, b)
-    right, up = np.roll(number, -1, axis=0), np.roll(number, -1, axis=1)
-    corners = np.stack([number, right, np.roll(right, -1, axis=1), up], axis=-1)
+    """Return the (cells, 4) corners of the cells of an a x b grid, each direction closed or not."""
+    index = np.arange(a * b).reshape(a, b)
+    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    corners = np.stack([index, right, np.roll(right, -1, axis=1), up], axis=-1)
     return corners[: a if closed[0] else a - 1, : b if closed[1] else b - 1].reshape(-1, 4)

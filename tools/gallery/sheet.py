@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from rosy_addon.color import to_display
 
 #: Largest width of a sheet that a page shows unscaled, in pixels.
-WIDEST = 820
+MAX_WIDTH = 820
 
 GAP, LABEL_SIZE, LINE = 16, 13, 18
 INK, PAPER = (40, 40, 40), (255, 255, 255)
@@ -65,7 +65,9 @@ def outlined(
     return np.array(image)
 
 
-def inset(picture: np.ndarray, small: np.ndarray, left: int, top: int, color) -> np.ndarray:
+def inset(
+    picture: np.ndarray, small: np.ndarray, left: int, top: int, color: tuple[int, int, int]
+) -> np.ndarray:
     """Put a small framed picture into a picture."""
     picture = picture.copy()
     height, width = small.shape[:2]
@@ -81,8 +83,8 @@ def dotted(picture: np.ndarray, x: float, y: float, color: tuple[int, int, int])
     ImageDraw.Draw(disc).ellipse((8, 8, disc.width - 9, disc.height - 9), fill=255)
     disc = disc.resize((2 * size + 3,) * 2, Image.Resampling.BOX)
     image = Image.fromarray(picture)
-    place = (round(x) - size - 1, round(y) - size - 1)
-    image.paste(Image.new("RGB", disc.size, color), place, disc)
+    corner = (round(x) - size - 1, round(y) - size - 1)
+    image.paste(Image.new("RGB", disc.size, color), corner, disc)
     return np.array(image)
 
 
@@ -92,10 +94,10 @@ def sheet(rows: Sequence[Sequence[Panel]]) -> Image.Image:
     Raises
     ------
     ValueError
-        If a row is wider than `WIDEST`.
+        If a row is wider than `MAX_WIDTH`.
     """
     images, top = [], 0
-    widest = 0
+    sheet_width = 0
     for row in rows:
         left = 0
         height = max(panel.picture.shape[0] for panel in row)
@@ -106,16 +108,16 @@ def sheet(rows: Sequence[Sequence[Panel]]) -> Image.Image:
             lines = max(lines, len(text))
             images.append((panel.picture, text, left, top, top + height + 4))
             left += width + GAP
-        widest = max(widest, left - GAP)
+        sheet_width = max(sheet_width, left - GAP)
         top += height + 4 + lines * LINE + GAP
-    if widest > WIDEST:
-        raise ValueError(f"a row of panels is {widest} pixels wide, {WIDEST} at most")
-    image = Image.new("RGB", (widest, top - GAP + 4), PAPER)
+    if sheet_width > MAX_WIDTH:
+        raise ValueError(f"a row of panels is {sheet_width} pixels wide, {MAX_WIDTH} at most")
+    image = Image.new("RGB", (sheet_width, top - GAP + 4), PAPER)
     pen = ImageDraw.Draw(image)
     for picture, text, left, upper, below in images:
         image.paste(Image.fromarray(picture), (left, upper))
-        for number, line in enumerate(text):
-            pen.text((left, below + number * LINE), line, INK, font())
+        for index, line in enumerate(text):
+            pen.text((left, below + index * LINE), line, INK, font())
     return image
 
 

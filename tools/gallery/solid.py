@@ -36,17 +36,17 @@ def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField
 
 
 def icosahedron_axes() -> np.ndarray:
-    """(6, 3) unit directions to the vertices of an icosahedron, one of each opposite pair."""
+    """Return (6, 3) unit directions to vertices of an icosahedron, one of each opposite pair."""
     golden = (1 + np.sqrt(5)) / 2
-    axes = [np.roll([0, sign, golden], turn) for turn in range(3) for sign in (1, -1)]
+    axes = [np.roll([0, sign, golden], shift) for shift in range(3) for sign in (1, -1)]
     return normalize(np.array(axes, dtype=np.float64))
 
 
 def around_field(surface: Surface, degree: int) -> RosyField:
     """Return the field with one member around the z axis."""
-    ahead = np.cross([0.0, 0.0, 1.0], surface.face_center)
-    ahead -= np.sum(ahead * surface.face_normal, axis=1)[:, None] * surface.face_normal
-    return RosyField(degree, normalize(ahead))
+    direction = np.cross([0.0, 0.0, 1.0], surface.face_center)
+    direction -= np.sum(direction * surface.face_normal, axis=1)[:, None] * surface.face_normal
+    return RosyField(degree, normalize(direction))
 
 
 def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
@@ -55,10 +55,10 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
     Singularities of opposite signs cancel.
     """
     x, y = face_frames(surface)
-    turn = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
+    rotations = corner_rotations(surface.face_normal, x, surface.corner_face, surface.corner_normal)
     weights, z = corner_angles(surface), face_representation(surface, field)
     for _ in range(rounds):
-        z = smooth_face_values(surface, z, turn, field.degree, weights)
+        z = smooth_face_values(surface, z, rotations, field.degree, weights)
         z /= np.maximum(np.abs(z), 1e-12)
     return RosyField(field.degree, from_representation(z, x, y, field.degree))
 
@@ -67,11 +67,11 @@ def view(
     surface: Surface,
     angles: tuple[float, float],
     size: tuple[int, int],
-    finer: int,
+    supersampling: int,
     perspective: bool = True,
 ) -> Camera:
-    """Return a camera that frames a surface, with `finer` times `size` pixels."""
-    width, height = (finer * side for side in size)
+    """Return a camera that frames a surface, with `supersampling` times `size` pixels."""
+    width, height = (supersampling * side for side in size)
     return orbit_camera(surface, *angles, width, height, perspective=perspective, margin=0.006)
 
 
@@ -80,23 +80,25 @@ def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera)
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
-def seen_points(
-    points: np.ndarray, normals: np.ndarray, camera: Camera, finer: int
+def visible_points(
+    points: np.ndarray, normals: np.ndarray, camera: Camera, supersampling: int
 ) -> list[tuple[float, float]]:
-    """(x, y) of the visible points of a convex surface, in pixels from the upper left.
+    """Return (x, y) of the visible points of a convex surface, in pixels from the upper left.
 
-    `finer` is the number of camera pixels per picture pixel.
+    `supersampling` is the number of camera pixels per picture pixel.
     """
-    place = points @ camera.view[:3, :3].T + camera.view[:3, 3]
-    facing = np.sum(place * (normals @ camera.view[:3, :3].T), axis=1) < 0
-    clip = np.append(place[facing], np.ones((facing.sum(), 1)), axis=1) @ camera.projection.T
+    camera_points = points @ camera.view[:3, :3].T + camera.view[:3, 3]
+    facing = np.sum(camera_points * (normals @ camera.view[:3, :3].T), axis=1) < 0
+    clip = (
+        np.append(camera_points[facing], np.ones((facing.sum(), 1)), axis=1) @ camera.projection.T
+    )
     across, upward = (clip[:, :2] / clip[:, 3:] / 2 + 0.5).T
-    width, height = camera.width / finer, camera.height / finer
+    width, height = camera.width / supersampling, camera.height / supersampling
     return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
 
 
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:
-    """(H, W) values at their pixels, 0 elsewhere."""
+    """Return (H, W) values at their pixels, 0 elsewhere."""
     frame = np.zeros(int(np.prod(shape)), dtype=np.float64)
     frame[pixel] = values
     return frame.reshape(shape)

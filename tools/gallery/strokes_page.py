@@ -19,13 +19,13 @@ from .shapes import suzanne
 from .sheet import Panel, save, sheet
 
 #: Size of a picture, and subpixels per pixel in each direction.
-SIDE, FINE = 402, 4
+SIDE, SUPERSAMPLING = 402, 4
 
 #: Width of the strokes in pixels.
 WIDTH = 1.3
 
 #: Styles of the strokes on Suzanne, by label.
-DRAWN = {
+STYLES = {
     "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
     "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, tone=True, light="lamp"),
 }
@@ -41,26 +41,26 @@ def write() -> None:
     )
     camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
     panels = []
-    for label, style in DRAWN.items():
+    for label, style in STYLES.items():
         strokes = draw_instances([instance], camera, style, lights=lights_of(style, ())).strokes
-        panels.append(Panel(rastered(strokes, camera), label))
+        panels.append(Panel(rasterize(strokes, camera), label))
     save(sheet([panels]), IMAGES / "strokes.png")
 
 
-def rastered(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Rasterize strokes: (H, W, 3) uint8 from the top, black on white, drawn with a round pen."""
+def rasterize(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """Return a picture of strokes, (H, W, 3) uint8 from the top: a round pen, black on white."""
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
-    pixels *= FINE
-    paper = Image.new("L", (camera.width * FINE, camera.height * FINE), 255)
+    pixels *= SUPERSAMPLING
+    paper = Image.new("L", (camera.width * SUPERSAMPLING, camera.height * SUPERSAMPLING), 255)
     pen = ImageDraw.Draw(paper)
-    radius = strokes.width * (WIDTH * FINE / 2)
+    radius = strokes.width * (WIDTH * SUPERSAMPLING / 2)
     for start, stop in zip(strokes.start[:-1].tolist(), strokes.start[1:].tolist(), strict=True):
-        for number in range(start, stop):
-            x, y, r = *pixels[number], radius[number]
+        for point in range(start, stop):
+            x, y, r = *pixels[point], radius[point]
             pen.ellipse((x - r, y - r, x + r, y + r), fill=0)
-            if number > start:
-                ends = [tuple(pixels[number - 1]), (x, y)]
-                pen.line(ends, fill=0, width=max(round(r + radius[number - 1]), 1))
+            if point > start:
+                ends = [tuple(pixels[point - 1]), (x, y)]
+                pen.line(ends, fill=0, width=max(round(r + radius[point - 1]), 1))
     small = paper.resize((camera.width, camera.height), Image.Resampling.BOX)
     return np.repeat(np.asarray(small)[..., None], 3, axis=2)

@@ -1,4 +1,4 @@
-"""The command line, in processes of its own."""
+"""The command line, in this process and in its own processes."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
 
 
-def rosy(*words, **more) -> subprocess.CompletedProcess:
+def rosy(*arguments, **options) -> subprocess.CompletedProcess:
     """Run ``python -m rosy_addon``."""
-    command = [sys.executable, "-m", "rosy_addon", *map(str, words)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **more)
+    command = [sys.executable, "-m", "rosy_addon", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **options)
 
 
 def write_off(path, surface: Surface):
@@ -62,13 +62,15 @@ def pixels_of(path) -> np.ndarray:
     return rows.reshape(height, 1 + 4 * width)[:, 1:].reshape(height, width, 4)
 
 
-def assert_refused(done: subprocess.CompletedProcess, *wanted: str) -> None:
-    """Status 2 and one line of reason."""
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("rosy: ") and done.stderr.count("\n") == 1, done.stderr
-    assert done.stdout == ""
-    for words in wanted:
-        assert words in done.stderr
+def assert_refused(completed: subprocess.CompletedProcess, *expected: str) -> None:
+    """Check that a command has status 2 and prints one line with the expected texts."""
+    assert completed.returncode == 2, completed.stderr
+    assert completed.stderr.startswith("rosy: ") and completed.stderr.count("\n") == 1, (
+        completed.stderr
+    )
+    assert completed.stdout == ""
+    for text in expected:
+        assert text in completed.stderr
 
 
 @pytest.mark.slow
@@ -97,18 +99,18 @@ def test_same_command_same_bytes(ring, tmp_path):
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
-def test_y_is_up_in_off_files_unless_said_otherwise(tmp_path):
+def test_y_is_up_in_off_files_by_default(tmp_path):
     tall = torus(24, 12)
     path = write_off(tmp_path / "a.off", tall)  # around z
-    seen = {}
+    covered = {}
     for up in ("y", "z"):
-        rendered = tmp_path / f"{up}.png"
-        words = ["--size", "64x64", "--up", up, "--view", "0,0", "--ortho"]
-        assert main(["render", str(path), "-o", str(rendered), *words]) == 0
-        seen[up] = pixels_of(rendered)[..., 3] > 0
-    # From the front a ring around the upward axis is seen edge on, one around y with its hole.
-    assert seen["z"].any(axis=1).mean() < 0.5
-    assert seen["y"].any(axis=1).mean() > 0.8 and not seen["y"][32, 32]
+        picture = tmp_path / f"{up}.png"
+        options = ["--size", "64x64", "--up", up, "--view", "0,0", "--ortho"]
+        assert main(["render", str(path), "-o", str(picture), *options]) == 0
+        covered[up] = pixels_of(picture)[..., 3] > 0
+    # From the front, a ring around the upward axis is seen edge on. A ring around y shows its hole.
+    assert covered["z"].any(axis=1).mean() < 0.5
+    assert covered["y"].any(axis=1).mean() > 0.8 and not covered["y"][32, 32]
 
 
 @pytest.mark.parametrize("name", ["vase-7", "cheburashka", *long("vase-2", "vase-4", "dome-6")])
@@ -121,7 +123,7 @@ def test_render_fields_of_others(name, shared_data, tmp_path):
     assert ink[ink[..., 3] == 255][:, :3].std() > 15
 
 
-def test_what_is_not_a_rosy_is_drawn_but_not_written_as_one(shared_data, tmp_path):
+def test_fields_that_are_no_rosy_are_drawn_but_not_written_as_one(shared_data, tmp_path):
     mesh = shared_data / "meshes" / "cheburashka.off"
     field = shared_data / "fields" / "cheburashka-cf.rawfield"
     done = rosy("render", mesh, field, "-o", tmp_path / "a.png", "--size", "64x64")
@@ -217,14 +219,14 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
-    words, wanted = REFUSED[case]
+    words, expected = REFUSED[case]
     out = tmp_path / "a.png"
     words = [word.format(mesh=sphere, out=out) for word in words]
     assert main(words) == 2
-    said = capsys.readouterr()
-    assert said.err.startswith("rosy: ") and said.err.count("\n") == 1
-    assert wanted in said.err
-    assert said.out == ""
+    output = capsys.readouterr()
+    assert output.err.startswith("rosy: ") and output.err.count("\n") == 1
+    assert expected in output.err
+    assert output.out == ""
     assert not out.exists()
 
 
@@ -286,27 +288,27 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
         cwd=ROOT,
         stderr=subprocess.PIPE,
         text=True,
-        # Tests that run in the background of a shell are made to ignore it, and so is what they run.
+        # A shell makes its background processes and their children ignore SIGINT. Undo this.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:
         time.sleep(3)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=60)
+        _, error_output = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 130
-    assert said == "rosy: stopped\n"
+    assert error_output == "rosy: stopped\n"
     assert list(tmp_path.iterdir()) == []
 
 
-def test_bake_without_blender_says_so(monkeypatch, capsys):
+def test_bake_without_blender_is_an_error(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
     assert main(["bake", "--save"]) == 2
     assert "bake needs Blender" in capsys.readouterr().err
 
 
-def test_bake_that_would_keep_nothing_is_refused(capsys):
+def test_bake_without_an_output_is_refused(capsys):
     assert main(["bake"]) == 2
     assert "give --out DIR" in capsys.readouterr().err
 
@@ -348,8 +350,8 @@ def test_info_compares(sphere, tmp_path):
 
 
 def test_strokes_and_guides(sphere, tmp_path):
-    turn = np.linspace(0, 1.0, 30)
-    arc = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    angle = np.linspace(0, 1.0, 30)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     rows = "\n".join(" ".join(map(str, point)) for point in arc)
     (tmp_path / "strokes.txt").write_text(f"# one\n{rows}\n\n{rows}\n")
     out = tmp_path / "a.rosy"
@@ -385,7 +387,7 @@ HATCHED = ("--preset", "cross-hatch", "--size", "128x128", "--generate", "axis")
 
 
 def write_ply(path, surface: Surface, **columns):
-    """With more numbers of vertices: bytes where they are whole, floats where they are not."""
+    """Write a .ply file with further columns of vertices, integers as bytes and others as floats."""
     kinds = {
         name: "uchar" if values.dtype.kind in "iu" else "float" for name, values in columns.items()
     }
@@ -395,7 +397,7 @@ def write_ply(path, surface: Surface, **columns):
     head += [f"element face {surface.face_count}", "property list uchar int vertex_indices"]
     head.append("end_header")
     rows = zip(surface.vertices.tolist(), *(v.tolist() for v in columns.values()), strict=True)
-    lines = [" ".join(map(repr, [*place, *more])) for place, *more in rows]
+    lines = [" ".join(map(repr, [*position, *values])) for position, *values in rows]
     faces = np.split(surface.corner_vertex, surface.face_start[1:-1])
     lines += [" ".join(map(str, [len(face), *face])) for face in faces]
     path.write_text("\n".join(head + lines) + "\n")
@@ -403,10 +405,10 @@ def write_ply(path, surface: Surface, **columns):
 
 
 def halves_of(path) -> tuple[float, float]:
-    """How light the left and the right half of what is drawn is, linear."""
+    """Return the mean linear values of the left and the right half of the covered pixels."""
     rgba = pixels_of(path) / 255
-    whole = rgba[..., 3] == 1
-    left, right = whole.copy(), whole.copy()
+    covered = rgba[..., 3] == 1
+    left, right = covered.copy(), covered.copy()
     left[:, 58:], right[:, :70] = False, False
     light = to_linear(rgba[..., 1])
     return float(light[left].mean()), float(light[right].mean())
@@ -414,7 +416,7 @@ def halves_of(path) -> tuple[float, float]:
 
 @pytest.fixture(scope="module")
 def painted(tmp_path_factory):
-    """A ball, from the front dark to the left and light to the right, by a colour and by a number."""
+    """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
     right = ball.vertices[:, 0] > 0
     grey = np.where(right, 230, 60)
@@ -438,15 +440,15 @@ def test_tones_of_vertices(painted, tmp_path):
 
 
 def test_tones_of_pictures_and_images(sphere, tmp_path):
-    shown = np.ones((64, 64, 4), dtype=np.float32)
-    shown[:, :32, :3], shown[:, 32:, :3] = 0.2, 0.85
-    write_png(tmp_path / "shot.png", shown)
+    picture = np.ones((64, 64, 4), dtype=np.float32)
+    picture[:, :32, :3], picture[:, 32:, :3] = 0.2, 0.85
+    write_png(tmp_path / "shot.png", picture)
     out = tmp_path / "a.png"
     words = [*HATCHED, "-o", str(out), "--view", "0,0"]
     assert main(["render", str(sphere), *words, "--tone-picture", str(tmp_path / "shot.png")]) == 0
     left, right = halves_of(out)
     assert left == pytest.approx(0.2, abs=0.08) and right == pytest.approx(0.85, abs=0.08)
-    # A square across the view, the image upright on it.
+    # A square that faces the camera, with the image upright.
     square = tmp_path / "square.obj"
     square.write_text(
         "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -462,7 +464,7 @@ def test_tones_of_pictures_and_images(sphere, tmp_path):
 def test_tones_that_are_not_there(painted, sphere, tmp_path):
     write_png(tmp_path / "wide.png", np.ones((16, 64, 4), dtype=np.float32))
     out = ("-o", tmp_path / "a.png", "--size", "64x64")
-    for mesh, words, wanted in (
+    for mesh, words, expected in (
         (painted, ("--tone-attribute", "ink"), ("'ink'", "'cavity'", "ball.ply")),
         (sphere, ("--tone-attribute", "ink"), ("sphere.off", ".ply")),
         (sphere, ("--tone-image", "x.png"), ("sphere.off", "UV map")),
@@ -471,12 +473,12 @@ def test_tones_that_are_not_there(painted, sphere, tmp_path):
         (sphere, ("--set", "tone=picture"), ("picture", "none is given")),
         (painted, ("--tone-attribute", "red", "--tone-image", "x.png"), ("not both",)),
     ):
-        assert_refused(rosy("render", mesh, *out, *words), *wanted)
+        assert_refused(rosy("render", mesh, *out, *words), *expected)
         assert not (tmp_path / "a.png").exists()
 
 
 @pytest.mark.slow
-def test_a_field_that_follows_says_so(sphere, tmp_path):
+def test_a_transferred_field_is_reported(sphere, tmp_path):
     made = tmp_path / "sphere.rosy"
     assert rosy("field", sphere, "-o", made).returncode == 0
     cut = write_off(tmp_path / "cut.off", icosphere(4))

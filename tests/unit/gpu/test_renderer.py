@@ -18,7 +18,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
-from bench.parity import drawn_twice, rooms
+from bench.parity import draw_pair, rooms
 from rosy_addon.compositor.contrast import supersampling_gain
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import supersampled_look
@@ -459,7 +459,7 @@ def alike(
     card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, rendered=None
 ):
     """Compare with numpy; the pictures."""
-    pair = drawn_twice(ROSY, card, instances, camera, look, lights, rendered)
+    pair = draw_pair(ROSY, card, instances, camera, look, lights, rendered)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500
@@ -812,7 +812,7 @@ def test_shadows(card, lights, ink):
     ]
     look = replace(LOOK, light="scene", shading=0.9, shadows=True, ink=ink)
     shaded = alike(card, instances, view(), look, lights, agreement=0.995)
-    bare = drawn_twice(ROSY, card, instances, view(), replace(look, shadows=False), lights)
+    bare = draw_pair(ROSY, card, instances, view(), replace(look, shadows=False), lights)
     assert shaded.card[..., :3].mean() < 0.98 * bare.card[..., :3].mean()
 
 
@@ -906,7 +906,7 @@ def test_free_directions_by_hand(card, name):
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_clear_paper(card, hue):
     look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
-    pair = drawn_twice(ROSY, card, [ball(4)], view(), look)
+    pair = draw_pair(ROSY, card, [ball(4)], view(), look)
     laid, wanted = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < wanted[wanted > 0].mean() < 0.8
     assert np.corrcoef(laid.ravel(), wanted.ravel())[0, 1] > 0.98

@@ -1,7 +1,8 @@
 # `make demo` and `make test` need Python 3.11, make and git; the rest is set up in .venv* here.
 #
 #   make demo      Suzanne with a 4-RoSy field, baked and rendered: demo.png
-#   make check     format, lint and the quick unit tests
+#   make format    format the code
+#   make check     check format and lint, and run the quick unit tests
 #   make test      all unit tests, the quick ones with old numpy as well, and the tests with
 #                  Blender 4.2's Python module
 #   make smoke     the main job with Blender 4.5's and 5.0's modules

@@ -13,7 +13,7 @@ from ..field.field_io import READ_SUFFIXES, load_field
 from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.formats.obj import read_uv
 from ..field.generate import GENERATORS, GeneratorSettings, generate
-from ..field.mesh_io import read_mesh
+from ..field.mesh_io import READERS, read_mesh
 from ..field.rosy_field import RosyField, check_degree
 from ..field.surface import Surface, orientation_warning
 from .options import float_between, float_tuple, print_note
@@ -28,13 +28,15 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
     allow_scene : bool
         Whether MESH may be a .blend file, or absent.
     """
+    suffixes = list(READERS)
     if allow_scene:
-        help_text = ".obj, .off, .ply, .stl or .blend; in Blender, by default, the open file"
+        help_text = f"{', '.join(suffixes)} or .blend; in Blender, by default, the open file"
         parser.add_argument(
             "mesh", nargs="?", type=Path, metavar="MESH|SCENE.blend", help=help_text
         )
     else:
-        parser.add_argument("mesh", type=Path, metavar="MESH", help=".obj, .off, .ply or .stl")
+        help_text = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
+        parser.add_argument("mesh", type=Path, metavar="MESH", help=help_text)
     parser.add_argument(
         "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
     )

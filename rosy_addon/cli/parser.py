@@ -14,6 +14,9 @@ from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
 from .strokes import add_strokes_command
 
+#: Options whose values may begin with a minus sign.
+NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")
+
 #: Exit statuses: success, an error in the user's input, interrupted by Ctrl-C.
 EXIT_OK, EXIT_USER_ERROR, EXIT_INTERRUPTED = 0, 2, 130
 
@@ -74,11 +77,7 @@ def _join_negative_values(arguments: Sequence[str]) -> list[str]:
     """
     joined: list[str] = []
     for argument in arguments:
-        if (
-            joined
-            and joined[-1] in ("--view", "--axis", "--frames")
-            and re.match(r"-[\d.]", argument)
-        ):
+        if joined and joined[-1] in NEGATIVE_VALUE_OPTIONS and re.match(r"-[\d.]", argument):
             joined[-1] += f"={argument}"
         else:
             joined.append(argument)

@@ -10,7 +10,8 @@ from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import neighbor_masks, project
+from rosy_addon.projection.pixel_neighbors import neighbor_masks
+from rosy_addon.projection.project import project
 
 pytestmark = pytest.mark.filterwarnings("error")
 

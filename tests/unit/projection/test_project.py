@@ -15,7 +15,8 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.camera import perspective_camera as lens
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project, project_task, screen_jacobians
+from rosy_addon.projection.pixel_neighbors import screen_jacobians
+from rosy_addon.projection.project import project, project_task
 
 pytestmark = pytest.mark.filterwarnings("error")
 

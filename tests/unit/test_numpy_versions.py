@@ -12,7 +12,7 @@ from conftest import ROOT
 
 
 @pytest.mark.slow
-def test_another_numpy_draws_the_same(tmp_path):
+def test_another_numpy_version_draws_the_same(tmp_path):
     other = os.environ.get("ROSY_OTHER_PYTHON")
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")

@@ -15,7 +15,7 @@ from conftest import ROOT
 PACKAGE = ROOT / "rosy_addon"
 
 #: What each room may import besides itself. Modules at the top are rooms of their own.
-BASE = {
+BASE_ROOMS = {
     "errors",
     "progress",
     "file_io",
@@ -34,23 +34,23 @@ MAY_IMPORT = {
     "color": {"errors"},
     "file_io": {"errors"},
     "settings": {"errors"},
-    "field": BASE,
-    "projection": BASE | {"field"},
-    "compositor": BASE | {"field", "projection"},
-    "strokes": BASE | {"field", "projection"},
-    "image_io": BASE,
-    "render": BASE | {"field", "projection", "compositor", "cache"},
-    "presets": BASE | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE | {"field", "projection", "compositor", "render", "cache"},
-    "scene": BASE
+    "field": BASE_ROOMS,
+    "projection": BASE_ROOMS | {"field"},
+    "compositor": BASE_ROOMS | {"field", "projection"},
+    "strokes": BASE_ROOMS | {"field", "projection"},
+    "image_io": BASE_ROOMS,
+    "render": BASE_ROOMS | {"field", "projection", "compositor", "cache"},
+    "presets": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "render", "cache"},
+    "scene": BASE_ROOMS
     | {"field", "projection", "compositor", "strokes", "render", "cache", "image_io", "presets"},
-    "bake": BASE | {"compositor", "scene", "gpu", "cache"},
-    "animation": BASE | {"projection", "compositor", "render", "scene", "gpu", "cache"},
-    "viewport": BASE | {"projection", "compositor", "render", "scene", "gpu"},
-    "draw_strokes": BASE | {"projection", "compositor", "strokes", "scene", "cache"},
-    "frame_workers": BASE,
-    "turntable": BASE | {"projection", "compositor", "render", "image_io"},
-    "ui": BASE
+    "bake": BASE_ROOMS | {"compositor", "scene", "gpu", "cache"},
+    "animation": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu", "cache"},
+    "viewport": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu"},
+    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "strokes", "scene", "cache"},
+    "frame_workers": BASE_ROOMS,
+    "turntable": BASE_ROOMS | {"projection", "compositor", "render", "image_io"},
+    "ui": BASE_ROOMS
     | {
         "presets",
         "field",
@@ -62,7 +62,7 @@ MAY_IMPORT = {
         "bake",
         "viewport",
     },
-    "cli": BASE
+    "cli": BASE_ROOMS
     | {
         "field",
         "projection",
@@ -86,7 +86,7 @@ MAY_IMPORT = {
 NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
 
 #: What of the room `gpu` draws with Blender, and imports that when it does.
-DRAWN_WITH = ("device.py",)
+BLENDER_GPU_FILES = ("device.py",)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -121,14 +121,14 @@ def test_imports_run_one_way(path):
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in ("scene", "ui", "bake", "draw_strokes", "viewport", "cli", "animation"):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
-    if path.name in DRAWN_WITH and room == "gpu":
+    if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room == "frame_workers":
         allowed |= {"distributed"}  # asked for by name, and only then
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 
-def test_the_rule_is_seen_when_broken(tmp_path, monkeypatch):
+def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
     """The reader of imports finds what it is there to find."""
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
     (tmp_path / "field").mkdir()
@@ -167,7 +167,7 @@ def import_cycle(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("folder", ["rosy_addon", "operators"])
-def test_no_module_imports_itself_through_others(folder):
+def test_there_are_no_import_cycles(folder):
     """Not inside a room either, and not by an import in a function."""
     assert import_cycle(ROOT / folder) == []
 
@@ -181,7 +181,7 @@ def test_no_module_imports_itself_through_others(folder):
         "from .inner.third import x",
     ],
 )
-def test_a_cycle_is_seen(tmp_path, back):
+def test_import_cycle_finds_cycles(tmp_path, back):
     (tmp_path / "inner").mkdir()
     (tmp_path / "first.py").write_text("from . import second\n")
     (tmp_path / "second.py").write_text("import os\n")

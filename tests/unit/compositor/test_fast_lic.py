@@ -26,7 +26,7 @@ SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
 
 
-def noise_of(flow, look=LOOK, channels=1):
+def make_noise(flow, look=LOOK, channels=1):
     return image_noise(
         flow.pixel,
         flow.width,
@@ -38,21 +38,23 @@ def noise_of(flow, look=LOOK, channels=1):
     )
 
 
-def drawn(flow, look=LOOK, noise=None):
-    return run_to_completion(fast_lic_task(flow, look, noise_of(flow) if noise is None else noise))
-
-
-def brute(flow, look=LOOK, noise=None):
+def fast_images(flow, look=LOOK, noise=None):
     return run_to_completion(
-        brute_force_task(flow, look, noise_of(flow) if noise is None else noise)
+        fast_lic_task(flow, look, make_noise(flow) if noise is None else noise)
     )
 
 
-def uniform(angle, degree, size=SIZE):
+def brute_force_images(flow, look=LOOK, noise=None):
+    return run_to_completion(
+        brute_force_task(flow, look, make_noise(flow) if noise is None else noise)
+    )
+
+
+def uniform_field(angle, degree, size=SIZE):
     return planar_pixel_field(np.full((size, size), angle), degree)
 
 
-def singular(degree, size=SIZE):
+def singular_field(degree, size=SIZE):
     """Singularities of index 1 / N and -1 / N."""
     x, y = pixel_centres(size)
     return planar_pixel_field(pair_angle(x, y, size, degree), degree)
@@ -60,12 +62,10 @@ def singular(degree, size=SIZE):
 
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("taper", [False, True])
-def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_force(
-    taper, degree
-):
-    flow, look = uniform(0.0, degree), replace(LOOK, taper=taper)
-    noise = np.tile(noise_of(flow)[:SIZE], (SIZE, 1))
-    found, expected = drawn(flow, look, noise), brute(flow, look, noise)
+def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(taper, degree):
+    flow, look = uniform_field(0.0, degree), replace(LOOK, taper=taper)
+    noise = np.tile(make_noise(flow)[:SIZE], (SIZE, 1))
+    found, expected = fast_images(flow, look, noise), brute_force_images(flow, look, noise)
     np.testing.assert_allclose(found.effective_samples, expected.effective_samples, rtol=1e-6)
     contrast = (found.members - 0.5) / fast_lic.CONTRAST_MATCH
     np.testing.assert_allclose(contrast, expected.members - 0.5, atol=5e-4)
@@ -78,9 +78,7 @@ def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_
     guide=st.floats(-3, 3),
 )
 @settings(max_examples=200)
-def test_the_sheet_of_the_next_pixel_is_the_direction_nearest_to_this_one(
-    degree, here, there, guide
-):
+def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, here, there, guide):
     flow = planar_pixel_field(np.array([[here, there]]), degree)
     covering = build_covering(
         flow, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32)
@@ -96,7 +94,9 @@ def test_the_sheet_of_the_next_pixel_is_the_direction_nearest_to_this_one(
 
 def test_the_directions_of_states_are_the_members_and_their_opposites():
     angle, degree = 0.3, 5
-    covering = build_covering(uniform(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32))
+    covering = build_covering(
+        uniform_field(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32)
+    )
     states = (
         covering.state_table.reshape(covering.sheets, -1, 4)[:, covering.cell_of_pixel, :2]
         / 32767.0
@@ -120,12 +120,12 @@ def autocorrelations(image, angle, lags):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
+def test_streaks_match_brute_force_in_contrast_length_and_width(degree):
     lags = np.array([1.0, 2.0, 3.0, 4.0])
     spread, curves = [], []
     for angle in (0.05, 0.37, 0.8, 1.1):
-        flow = uniform(angle, degree, 512)
-        pair = [images.members[0, :, 0] for images in (drawn(flow), brute(flow))]
+        flow = uniform_field(angle, degree, 512)
+        pair = [images.members[0, :, 0] for images in (fast_images(flow), brute_force_images(flow))]
         spread.append([np.std(image) for image in pair])
         curves.append([autocorrelations(image, angle, lags) for image in pair])
     found, expected = np.mean(spread, axis=0)
@@ -138,8 +138,11 @@ def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
 @pytest.mark.parametrize("taper", [False, True])
 def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
-    flow, look = singular(degree), replace(LOOK, taper=taper)
-    found, expected = drawn(flow, look).blend[:, 0], brute(flow, look).blend[:, 0]
+    flow, look = singular_field(degree), replace(LOOK, taper=taper)
+    found, expected = (
+        fast_images(flow, look).blend[:, 0],
+        brute_force_images(flow, look).blend[:, 0],
+    )
     # Not the same: each streak is shifted by up to half a pixel.
     assert np.corrcoef(found, expected)[0, 1] > 0.85
     assert found.std() == pytest.approx(expected.std(), rel=0.03)
@@ -148,7 +151,7 @@ def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_the_surroundings_of_singularities_are_not_grainy(degree):
     # Grain is what changes from each pixel to the next; breaking points would show as well.
-    flow = singular(degree)
+    flow = singular_field(degree)
     x, y = (axis.ravel() for axis in pixel_centres(SIZE))
     near = np.zeros(SIZE * SIZE, dtype=bool)
     for centre in (0.33, 0.67):
@@ -158,16 +161,16 @@ def test_the_surroundings_of_singularities_are_not_grainy(degree):
         image = images.blend[:, 0].reshape(SIZE, SIZE)
         return ndimage.laplace(image).ravel()[near].std()
 
-    assert grain(drawn(flow)) < 1.15 * grain(brute(flow))
+    assert grain(fast_images(flow)) < 1.15 * grain(brute_force_images(flow))
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_streamlines_end_where_those_of_brute_force_end(taper):
+def test_streamlines_end_where_brute_force_ends_them(taper):
     look = replace(LOOK, taper=taper)
     x, y = pixel_centres(SIZE)
     angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, 4), np.nan)
     flow = planar_pixel_field(angles, 4)
-    found, expected = drawn(flow, look), brute(flow, look)
+    found, expected = fast_images(flow, look), brute_force_images(flow, look)
     inside = flow.representation != 0
     assert (found.effective_samples[~inside] == 1).all()
     difference = found.effective_samples[inside] - expected.effective_samples[inside]
@@ -176,42 +179,42 @@ def test_streamlines_end_where_those_of_brute_force_end(taper):
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_magnitude_sets_the_samples_of_a_pixel(taper):
+def test_magnitude_determines_the_samples_of_a_pixel(taper):
     x, _ = pixel_centres(SIZE)
     flow = planar_pixel_field(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
     look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, taper=taper)
-    samples = drawn(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
+    samples = fast_images(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
     np.testing.assert_allclose(
         samples, kernel_weights(reach, reach, reach, taper).effective_samples, rtol=1e-5
     )
-    expected = brute(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
+    expected = brute_force_images(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     np.testing.assert_allclose(samples, expected, rtol=1e-5)
 
 
 def test_three_channels_are_three_pictures():
-    flow = singular(3)
-    noise = noise_of(flow, channels=3)
-    together = drawn(flow, noise=noise).members
+    flow = singular_field(3)
+    noise = make_noise(flow, channels=3)
+    together = fast_images(flow, noise=noise).members
     for channel in range(3):
-        alone = drawn(flow, noise=noise[:, channel : channel + 1]).members
+        alone = fast_images(flow, noise=noise[:, channel : channel + 1]).members
         np.testing.assert_allclose(together[..., channel], alone[..., 0], atol=2e-4)
 
 
 def test_the_same_input_gives_the_same_bytes():
-    flow = singular(5)
-    assert drawn(flow).members.tobytes() == drawn(flow).members.tobytes()
+    flow = singular_field(5)
+    assert fast_images(flow).members.tobytes() == fast_images(flow).members.tobytes()
 
 
 def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
     # A tall picture, in streaks that run up and down: a seam would show as a change of rows.
     flow = planar_pixel_field(np.full((1024, 64), np.pi / 2 + 0.1), 2)
-    whole = drawn(flow)
+    whole = fast_images(flow)
     monkeypatch.setattr(fast_lic, "MAX_STATES_PER_STRIP", 64 * 256 * 2)
     wide = [(wide.stop - wide.start) // 64 for wide, _, _ in fast_lic._strips(flow, LOOK)]
     assert len(wide) == 4
     assert max(wide) <= 256 + 3 * (LOOK.length + 2)
-    found = drawn(flow)
+    found = fast_images(flow)
     assert found.effective_samples.min() >= 1
     assert np.abs(found.effective_samples - whole.effective_samples).mean() < 2
     image = found.members[0, :, 0].reshape(1024, 64)
@@ -221,13 +224,13 @@ def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
 def test_pictures_of_any_size(shape):
-    images = drawn(planar_pixel_field(np.full(shape, 0.7), 3))
+    images = fast_images(planar_pixel_field(np.full(shape, 0.7), 3))
     assert np.isfinite(images.members).all()
     assert images.effective_samples.min() >= 1
 
 
-def test_a_field_that_is_defined_nowhere_is_its_noise():
+def test_an_undefined_field_shows_its_noise():
     flow = planar_pixel_field(np.full((20, 20), np.nan), 4)
-    images = drawn(flow)
+    images = fast_images(flow)
     assert (images.effective_samples == 1).all()
     assert np.isfinite(images.blend).all()

@@ -110,26 +110,26 @@ def ball(rows=70):
     return build_surface(points, corners.ravel(), np.arange(0, corners.size + 1, 3), name="ball")
 
 
-def instance(surface: Surface, degree=4, matrix=None):
+def make_instance(surface: Surface, degree=4, matrix=None):
     field = axis_field(surface, degree, (0.3, 0.2, 1.0))
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
 
 
-def eye(azimuth=0.0, zoom=1.0, away=4.0):
+def make_camera(azimuth=0.0, zoom=1.0, away=4.0):
     place = away * np.array([np.sin(azimuth), -np.cos(azimuth), 0.3])
     return perspective_camera(
         look_at(place, (0, 0, 0)), SIZE, SIZE, fov=2 * np.arctan(np.tan(0.28) / zoom)
     )
 
 
-def finer(camera, side):
+def supersampled(camera, side):
     return Camera(
         camera.view, np.array(camera.projection), camera.width * side, camera.height * side, "fine"
     )
 
 
-def drawn(thing, camera, look, lights=()):
-    return compose(project([thing], finer(camera, look.supersampling)), look, lights).rgba
+def render(thing, camera, look, lights=()):
+    return compose(project([thing], supersampled(camera, look.supersampling)), look, lights).rgba
 
 
 # --- tone ------------------------------------------------------------------------------------------
@@ -139,8 +139,8 @@ def drawn(thing, camera, look, lights=()):
 def test_presets_reproduce_a_ramp(name):
     """A ball under one light, from 0 to 1: blurred, ink on paper is as light as it was to be."""
     look = PRESETS[name]
-    thing, camera = instance(ball()), eye()
-    rgba = drawn(thing, camera, look)
+    thing, camera = make_instance(ball()), make_camera()
+    rgba = render(thing, camera, look)
     gbuffer = project([thing], camera)
     asked = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     assert asked.min() < 1 - look.shading + 0.05 and asked.max() > 0.97
@@ -162,7 +162,7 @@ def test_presets_reproduce_a_ramp(name):
 
 
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
-def test_thresholds_cover_what_they_say(crispness):
+def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Of normal streaks, those of a threshold cover as much of the paper as it is for."""
     settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
     threshold, deviation, *_ = streak_statistics(settings)
@@ -173,7 +173,7 @@ def test_thresholds_cover_what_they_say(crispness):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6, 7])
 @pytest.mark.parametrize("layers", [1, 2, 3])
-def test_shares_of_families_are_whole_and_continuous(degree, layers):
+def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
     """They sum to 1, and change places without a jump as the field turns under the guide."""
     angles = np.linspace(-1, 1, 40001)[None]
     flow = planar_pixel_field(angles, degree)
@@ -199,7 +199,7 @@ def test_lines_run_along_the_field(name):
     field = axis_field(wall, 2, (np.cos(angle), 0, np.sin(angle)))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=6)
     look = replace(PRESETS[name], shading=0.8)
-    rgba = drawn(MeshInstance(wall, np.eye(4), field), camera, look)
+    rgba = render(MeshInstance(wall, np.eye(4), field), camera, look)
     picture = rgba[..., 1] * rgba[..., 3]
     up, right = (gaussian_filter(picture, 2.0, order=order) for order in ((1, 0), (0, 1)))
     across = np.angle(((right + 1j * up) ** 2).mean()) / 2
@@ -209,7 +209,7 @@ def test_lines_run_along_the_field(name):
 
 # --- uneven lines ------------------------------------------------------------------------------------
 
-UNEVEN = {
+UNEVEN_LINES = {
     "broken": {"breaks": 1.0},
     "by a hand that wavers": {"wobble": 1.0},
     "on paper with a tooth": {"paper_grain": 1.0},
@@ -217,7 +217,7 @@ UNEVEN = {
 }
 
 
-def on_a_plane(look, tone, degree=2, angle=0.3, side=320):
+def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """Coverage of a field of one direction in the plane, under one tone."""
     look = replace(look, anchor="picture", clear_paper=True)
     flow = planar_pixel_field(np.full((side, side), angle), degree)
@@ -237,46 +237,47 @@ def on_a_plane(look, tone, degree=2, angle=0.3, side=320):
     return alpha.reshape(side, side)[40:-40, 40:-40]
 
 
-@pytest.mark.parametrize("kind", UNEVEN)
+@pytest.mark.parametrize("kind", UNEVEN_LINES)
 @pytest.mark.parametrize("crispness", [0.1, 0.9])
-def test_uneven_lines_cover_as_much(kind, crispness):
+def test_uneven_lines_have_the_same_coverage(kind, crispness):
     """The tone is that of even lines, from the darkest to the lightest."""
-    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN[kind])
+    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
     for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
-        assert on_a_plane(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
+        assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
 
 
-@pytest.mark.parametrize("kind", mainly(["all three"], UNEVEN))
+@pytest.mark.parametrize("kind", mainly(["all three"], UNEVEN_LINES))
 def test_uneven_lines_reproduce_a_ramp(kind):
-    assert error_of_ramp(replace(INK, **UNEVEN[kind])) <= 0.04
+    assert ramp_error(replace(INK, **UNEVEN_LINES[kind])) <= 0.04
 
 
-def runs(ink):
+def mean_run_length(ink):
     """Mean length of the runs of ink along the rows."""
     ink = ink > 0.5
     begins = ink[:, 1:] & ~ink[:, :-1]
     return ink.sum() / begins.sum()
 
 
-def test_lines_break_in_the_lights_first():
+def test_lines_break_in_light_tones_first():
     look = Look(ink="hatch", grain=2.0, length=60, crispness=1.0)
     broken = replace(look, breaks=1.0)
     shorter = [
-        runs(on_a_plane(broken, tone, angle=0.0)) / runs(on_a_plane(look, tone, angle=0.0))
+        mean_run_length(plane_coverage(broken, tone, angle=0.0))
+        / mean_run_length(plane_coverage(look, tone, angle=0.0))
         for tone in (0.9, 0.5, 0.2)
     ]
     assert shorter[0] < 0.5
     assert shorter[0] < shorter[1] < shorter[2]
 
 
-def test_the_tooth_breaks_lines_into_grains():
+def test_paper_grain_breaks_lines():
     look = Look(ink="hatch", grain=2.0, length=60, crispness=0.8)
-    plain, rough = (on_a_plane(replace(look, paper_grain=share), 0.6) for share in (0, 1))
-    assert runs(rough) < 0.6 * runs(plain)
+    plain, rough = (plane_coverage(replace(look, paper_grain=share), 0.6) for share in (0, 1))
+    assert mean_run_length(rough) < 0.6 * mean_run_length(plain)
 
 
 @pytest.mark.parametrize("grain", [1.5, 3.0, 8.0])
-def test_the_tooth_of_paper(grain):
+def test_statistics_of_paper_grain(grain):
     """Even all over, as deep everywhere, and no cloud in it."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
@@ -288,15 +289,15 @@ def test_the_tooth_of_paper(grain):
     assert abs(np.corrcoef(tooth.ravel(), streaks[:, 0])[0, 1]) < 0.02
 
 
-def test_the_paper_stays_where_it_is():
+def test_paper_grain_depends_only_on_the_pixel():
     """A height is that of the pixel, whatever else is seen, and that of all its subpixels."""
     whole = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 3).reshape(300, 700)
     column, row = np.meshgrid(np.arange(310, 330), np.arange(250, 280))
-    some = picture_paper_grain((row * 700 + column).ravel().astype(np.int32), 700, 2.0, 3)
-    np.testing.assert_allclose(some.reshape(30, 20), whole[250:280, 310:330], atol=1e-5)
-    finer = picture_paper_grain(np.arange(1400 * 600, dtype=np.int32), 1400, 2.0, 3, 2)
+    part = picture_paper_grain((row * 700 + column).ravel().astype(np.int32), 700, 2.0, 3)
+    np.testing.assert_allclose(part.reshape(30, 20), whole[250:280, 310:330], atol=1e-5)
+    fine = picture_paper_grain(np.arange(1400 * 600, dtype=np.int32), 1400, 2.0, 3, 2)
     np.testing.assert_allclose(
-        finer.reshape(300, 2, 700, 2), np.broadcast_to(whole[:, None, :, None], (300, 2, 700, 2))
+        fine.reshape(300, 2, 700, 2), np.broadcast_to(whole[:, None, :, None], (300, 2, 700, 2))
     )
     other = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 4)
     assert abs(np.corrcoef(other[0], whole.ravel())[0, 1]) < 0.02
@@ -304,9 +305,9 @@ def test_the_paper_stays_where_it_is():
 
 @pytest.mark.parametrize("anchor", ["surface", "picture"])
 @pytest.mark.parametrize("away", [4.0, 30.0])
-def test_a_hand_wavers_about_the_field(anchor, away):
+def test_statistics_of_the_wobble(anchor, away):
     """To both sides alike, slowly, and as far from afar as from near."""
-    gbuffer = project([instance(tube())], eye(away=away, zoom=away / 4))
+    gbuffer = project([make_instance(tube())], make_camera(away=away, zoom=away / 4))
     found = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
     assert abs(found.mean()) < 0.25 * WOBBLE_STD
     assert 0.75 < found.std() / WOBBLE_STD < 1.25
@@ -315,7 +316,7 @@ def test_a_hand_wavers_about_the_field(anchor, away):
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
-def test_a_course_that_wavers_turns_all_directions(degree):
+def test_wobble_rotates_all_directions(degree):
     flow = planar_pixel_field(np.linspace(-2, 2, 90).reshape(9, 10), degree)
     angle = np.linspace(-0.3, 0.3, 90).astype(np.float32)
     harmonics = {("deviation", j): np.full(90, c) for j, c in ((-1, 0.1j), (0, 1), (1, 0.2 + 0j))}
@@ -333,10 +334,10 @@ def test_a_course_that_wavers_turns_all_directions(degree):
 # --- inks --------------------------------------------------------------------------------------------
 
 
-def error_of_ramp(look):
+def ramp_error(look):
     """Mean difference, blurred, of the luminance of a ball from what its inks were to leave of it."""
-    thing, camera = instance(ball(), degree=6), eye()
-    rgba = drawn(thing, camera, look)
+    thing, camera = make_instance(ball(), degree=6), make_camera()
+    rgba = render(thing, camera, look)
     gbuffer = project([thing], camera)
     asked = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     inks = inks_of(look, 3 if look.hue == "families" else 1)
@@ -351,7 +352,7 @@ def error_of_ramp(look):
     return np.abs(error / share[inner]).mean()
 
 
-COLOURED = {
+COLORED_INKS = {
     "from one to another": {"ink_ramp": True, "ink_colour": "#201848"},
     "from one to another, light": {
         "ink_ramp": True,
@@ -367,7 +368,7 @@ COLOURED = {
 }
 
 
-def test_a_third_ink_is_on_the_way_from_one_to_the_other():
+def test_a_third_ink_is_between_the_other_two():
     look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
     codes = [look.ink_colour, look.ink_colour_middle, look.ink_colour_light]
     dark, middle, light = (to_linear(from_hex(code)) for code in codes)
@@ -382,16 +383,16 @@ def test_a_third_ink_is_on_the_way_from_one_to_the_other():
 
 @pytest.mark.parametrize(
     "kind",
-    mainly(["families, light", "families from one to another", "through a third"], COLOURED),
+    mainly(["families, light", "families from one to another", "through a third"], COLORED_INKS),
 )
-def test_coloured_inks_leave_the_light_that_was_asked_for(kind):
-    assert error_of_ramp(replace(INK, layers=3, **COLOURED[kind])) <= 0.04
+def test_colored_inks_reproduce_a_ramp(kind):
+    assert ramp_error(replace(INK, layers=3, **COLORED_INKS[kind])) <= 0.04
 
 
-@pytest.mark.parametrize("kind", COLOURED)
-def test_an_ink_covers_what_its_tone_takes(kind):
+@pytest.mark.parametrize("kind", COLORED_INKS)
+def test_required_coverage_has_the_target_luminance(kind):
     """Paper and ink side by side have the luminance that is wanted."""
-    look = replace(INK, **COLOURED[kind])
+    look = replace(INK, **COLORED_INKS[kind])
     inks = inks_of(look, 4 if look.hue == "families" else 1)
     tone = np.linspace(0, 1, 101)
     wanted = inks.target_transmittance(1 - tone if inks.is_light else tone)
@@ -402,7 +403,7 @@ def test_an_ink_covers_what_its_tone_takes(kind):
         np.testing.assert_allclose(inks.luminance_transmittance(mixed), wanted, atol=2e-3)
 
 
-def test_inks_of_families_are_told_apart():
+def test_inks_of_families_differ_visibly():
     for code in ("#101010", "#8a2020", "#f4f0e8"):
         paper = "#000000" if code == "#f4f0e8" else "#ffffff"
         look = replace(INK, ink_colour=code, paper_colour=paper, hue="families")
@@ -416,7 +417,7 @@ def test_inks_of_families_are_told_apart():
 
 
 @pytest.mark.parametrize("degree", [3, 4, 6, 7])
-def test_inks_change_places_without_a_seam(degree):
+def test_inks_swap_ranks_without_a_seam(degree):
     """As the field turns under the guide, the inks in use go over from one to the next."""
     flow = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
     look = replace(INK, hue="families", guiding_angle=0.3)
@@ -427,7 +428,7 @@ def test_inks_change_places_without_a_seam(degree):
     assert line_ink_indices(flow, replace(look, magnitude="colour")) is None
 
 
-def test_families_that_are_told_apart_keep_their_inks():
+def test_families_keep_their_inks_at_any_guiding_angle():
     """Whatever the guiding angle: it says which is drawn first, not in which ink."""
     flow = planar_pixel_field(np.linspace(-1, 1, 101)[None], 4)
     flow = replace(flow, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
@@ -438,7 +439,7 @@ def test_families_that_are_told_apart_keep_their_inks():
         assert {0, 1} == set(np.unique(found))
 
 
-def test_ink_may_stand_for_the_magnitude():
+def test_ink_is_colored_by_magnitude():
     """Pixels of nothing but ink have the colours of the map."""
     look = replace(INK, magnitude="colour", colour_map="grey", clear_paper=True, shading=0.5)
     surface = ball()
@@ -446,7 +447,7 @@ def test_ink_may_stand_for_the_magnitude():
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]
     vectors = field.vectors / np.maximum(np.linalg.norm(field.vectors, axis=1), 1e-9)[:, None]
     field = replace(field, vectors=vectors * (1.5 + height)[:, None])
-    rgba = drawn(MeshInstance(surface, np.eye(4), field), eye(), look)
+    rgba = render(MeshInstance(surface, np.eye(4), field), make_camera(), look)
     row = np.nonzero(rgba[..., 3] > 0.5)[0]
     grey = rgba[..., 0][rgba[..., 3] > 0.5]
     assert np.corrcoef(row, to_display(grey))[0, 1] > 0.95
@@ -458,7 +459,7 @@ def test_ink_may_stand_for_the_magnitude():
 HALF = 4.0
 
 
-def half_dark(method, overshoot):
+def render_half_dark_wall(method, overshoot):
     """How light the columns and the single lines are of a wall whose left half is dark, the right white.
 
     Lines run from left to right.
@@ -474,14 +475,14 @@ def half_dark(method, overshoot):
         INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_colour="#000000"
     )
     # Images repeat: at the last column it gets dark again.
-    return drawn(thing, camera, look)[..., :-1, 0]
+    return render(thing, camera, look)[..., :-1, 0]
 
 
 @pytest.mark.parametrize("method", ["sheets", *long("members", "brute")])
-def test_lines_run_on_past_the_border_of_a_tone(method):
+def test_lines_overshoot_the_border_of_a_tone(method):
     """So that each column has the mean tone of those as near: a ramp as wide as twice the over-shoot."""
     reach = 24.0
-    light = half_dark(method, reach)
+    light = render_half_dark_wall(method, reach)
     from_border = np.arange(SIZE - 1) + 0.5 - SIZE / 2
     wanted = 0.3 + 0.7 * np.clip(0.5 + from_border / (2 * reach), 0, 1)
     off = np.abs(gaussian_filter(light.mean(axis=0), 3) - wanted)
@@ -496,21 +497,21 @@ def test_lines_run_on_past_the_border_of_a_tone(method):
 
 
 def test_without_overshoot_lines_end_with_the_tone():
-    light = half_dark("sheets", 0.0)
+    light = render_half_dark_wall("sheets", 0.0)
     assert (light[:, SIZE // 2 + 2 :] > 0.999).all()
     assert abs(light[:, 20 : SIZE // 2 - 2].mean() - 0.3) < 0.04
 
 
-def test_lines_that_run_on_reproduce_a_ramp():
-    assert error_of_ramp(replace(INK, overshoot=12.0)) <= 0.04
+def test_overshooting_lines_reproduce_a_ramp():
+    assert ramp_error(replace(INK, overshoot=12.0)) <= 0.04
 
 
 # --- stability ---------------------------------------------------------------------------------------
 
 
-def likeness(thing, camera, other, other_camera, look):
+def warped_correlation(thing, camera, other, other_camera, look):
     """Correlation of two pictures, the second one warped by the true motion."""
-    first, second = drawn(thing, camera, look), drawn(other, other_camera, look)
+    first, second = render(thing, camera, look), render(other, other_camera, look)
     here, there = project([thing], camera), project([other], other_camera)
     corners = thing.surface.triangle_vertex[here.triangle]
     moved = np.einsum("pi,pij->pj", here.barycentric, other.surface.vertices[corners])
@@ -528,18 +529,43 @@ def likeness(thing, camera, other, other_camera, look):
     return np.corrcoef(tone.reshape(-1)[here.pixel[seen]], warped)[0, 1]
 
 
-def moved_by(pixels):
+def shift_by_pixels(pixels):
     matrix = np.eye(4)
-    matrix[0, 3] = pixels * 4.0 / eye().pixels_per_unit
+    matrix[0, 3] = pixels * 4.0 / make_camera().pixels_per_unit
     return matrix
 
 
 MOTIONS = {
-    "camera turned": lambda: (instance(tube()), eye(), instance(tube()), eye(np.radians(1))),
-    "object moved": lambda: (instance(tube()), eye(), instance(tube(), matrix=moved_by(2)), eye()),
-    "zoomed": lambda: (instance(tube()), eye(), instance(tube()), eye(zoom=1.1)),
-    "bent": lambda: (instance(tube()), eye(), instance(tube(bend=0.05)), eye()),
-    "bent far": lambda: (instance(tube(bend=0.8)), eye(), instance(tube(bend=0.81)), eye()),
+    "camera turned": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube()),
+        make_camera(np.radians(1)),
+    ),
+    "object moved": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube(), matrix=shift_by_pixels(2)),
+        make_camera(),
+    ),
+    "zoomed": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube()),
+        make_camera(zoom=1.1),
+    ),
+    "bent": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube(bend=0.05)),
+        make_camera(),
+    ),
+    "bent far": lambda: (
+        make_instance(tube(bend=0.8)),
+        make_camera(),
+        make_instance(tube(bend=0.81)),
+        make_camera(),
+    ),
 }
 
 
@@ -553,10 +579,10 @@ def test_streaks_stay_on_the_surface(motion, ink):
     if ink == "uneven":
         look = replace(look, wobble=1.0, breaks=0.3)
     first, camera, second, other_camera = MOTIONS[motion]()
-    assert likeness(first, camera, second, other_camera, look) >= 0.9
+    assert warped_correlation(first, camera, second, other_camera, look) >= 0.9
     if motion == "zoomed":
         still = replace(look, anchor="picture")
-        assert likeness(first, camera, second, other_camera, still) < 0.5
+        assert warped_correlation(first, camera, second, other_camera, still) < 0.5
 
 
 @pytest.mark.parametrize(
@@ -565,7 +591,7 @@ def test_streaks_stay_on_the_surface(motion, ink):
 @pytest.mark.parametrize("name", mainly(HATCHED[:1], HATCHED))
 def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
-    assert likeness(*MOTIONS[motion](), look) >= 0.9
+    assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
 @pytest.mark.parametrize("grain", [2.5, *long(4.0)])
@@ -579,12 +605,12 @@ def test_lines_keep_their_width_through_a_zoom(grain):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
-        rgba = drawn(thing, camera, replace(INK, light="scene", shading=0.4, grain=grain))
-        widths.append(width_of_lines(rgba[..., 0]))
+        rgba = render(thing, camera, replace(INK, light="scene", shading=0.4, grain=grain))
+        widths.append(line_width(rgba[..., 0]))
     assert max(widths) / min(widths) < 1.15
 
 
-def test_lines_in_blender_units_are_wider_from_near():
+def test_lines_in_blender_units_scale_with_the_zoom():
     """In proportion, and as they are seen in the middle where a pixel is so many units wide."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
@@ -596,14 +622,14 @@ def test_lines_in_blender_units_are_wider_from_near():
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=4 / zoom
         )
-        widths.append(width_of_lines(drawn(thing, camera, inked)[..., 0]) / zoom)
+        widths.append(line_width(render(thing, camera, inked)[..., 0]) / zoom)
         if zoom == 1:
-            seen = width_of_lines(drawn(thing, camera, look)[..., 0])
+            seen = line_width(render(thing, camera, look)[..., 0])
     assert max(widths) / min(widths) < 1.15
     assert abs(widths[0] / seen - 1) < 0.15
 
 
-def test_near_lines_are_wider_than_far_ones_of_one_picture():
+def test_lines_in_blender_units_scale_with_the_distance():
     """Of two walls, one twice as far away; both are as dark as they are to be."""
     points = np.array([[-1, 0, -2], [1, 0, -2], [1, 0, 2], [-1, 0, 2]], dtype=float)
     walls = []
@@ -614,9 +640,9 @@ def test_near_lines_are_wider_than_far_ones_of_one_picture():
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 2, (1.0, 0, 0))))
     camera = perspective_camera(look_at((0, 0, 0), (0, 1, 0)), SIZE, SIZE, fov=2 * np.arctan(0.5))
     look = replace(INK, light="scene", shading=0.5, unit="world", unit_size=0.04)
-    picture = compose(project(walls, finer(camera, 2)), look).rgba[..., 0]
+    picture = compose(project(walls, supersampled(camera, 2)), look).rgba[..., 0]
     near, far = picture[:, 8 : SIZE // 2 - 8], picture[:, SIZE // 2 + 8 : -8]
-    assert width_of_lines(near) / width_of_lines(far) == pytest.approx(2, rel=0.2)
+    assert line_width(near) / line_width(far) == pytest.approx(2, rel=0.2)
     assert abs(near.mean() - 0.5) < 0.05 and abs(far.mean() - 0.5) < 0.05
 
 
@@ -625,10 +651,10 @@ def test_near_lines_are_wider_than_far_ones_of_one_picture():
 )
 def test_lines_in_blender_units_stay_on_the_surface(motion):
     look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
-    assert likeness(*MOTIONS[motion](), look) >= 0.9
+    assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
-def width_of_lines(picture):
+def line_width(picture):
     """Where the autocorrelation across horizontal lines has fallen to a half, pixels."""
     columns = picture - picture.mean()
     spectrum = np.abs(np.fft.fft(columns, axis=0)) ** 2
@@ -642,9 +668,9 @@ def width_of_lines(picture):
 # --- noise on the surface ---------------------------------------------------------------------------
 
 
-def test_places_at_rest_are_those_of_the_bodies():
-    thing = instance(tube(bend=0.8), matrix=np.diag([1.0, -1.0, 2.0, 1.0]))
-    gbuffer = project([thing], eye(away=9))
+def test_rest_coordinates_match_the_rest_shape():
+    thing = make_instance(tube(bend=0.8), matrix=np.diag([1.0, -1.0, 2.0, 1.0]))
+    gbuffer = project([thing], make_camera(away=9))
     places = rest_coordinates(gbuffer)
     corners = thing.surface.rest_vertices[thing.surface.triangle_vertex[gbuffer.triangle]]
     wanted = np.einsum("pi,pij->pj", gbuffer.barycentric, corners)
@@ -656,8 +682,8 @@ def test_places_at_rest_are_those_of_the_bodies():
 
 @pytest.mark.parametrize("high_pass", [0.0, 16.0])
 @pytest.mark.parametrize("away", [3.0, 4.7, 11.0])
-def test_noise_is_as_varied_as_that_of_the_picture(high_pass, away):
-    gbuffer = project([instance(tube())], eye(away=away, zoom=away / 4))
+def test_statistics_of_surface_noise(high_pass, away):
+    gbuffer = project([make_instance(tube())], make_camera(away=away, zoom=away / 4))
     noise = surface_noise(gbuffer, 2.0, 0, 3, density=0.3, high_pass=high_pass)
     assert np.abs(noise.mean(axis=0) - 0.5).max() < 0.02
     assert 0.3 < noise.std() < 0.5
@@ -665,7 +691,7 @@ def test_noise_is_as_varied_as_that_of_the_picture(high_pass, away):
     assert np.abs(channels[np.triu_indices(3, 1)]).max() < 0.03
 
 
-def test_bodies_have_noise_of_their_own():
+def test_instances_have_different_noise():
     names = ["a", "b", "a", "a", "c"]
     assert len(set(instance_hashes(names).tolist())) == 5
     # A body that joins in does not change the others'.
@@ -674,11 +700,11 @@ def test_bodies_have_noise_of_their_own():
     assert instance_hashes(["some/ball.obj"]) == instance_hashes(["C:\\other\\ball.obj"])
 
 
-def test_clear_paper_is_ink_alone():
+def test_clear_paper_shows_only_ink():
     look = replace(INK, clear_paper=True, ink_colour="#204060")
     clear, full = (
-        drawn(instance(ball()), eye(), look),
-        drawn(instance(ball()), eye(), replace(look, clear_paper=False)),
+        render(make_instance(ball()), make_camera(), look),
+        render(make_instance(ball()), make_camera(), replace(look, clear_paper=False)),
     )
     inked = clear[..., 3] > 0
     np.testing.assert_allclose(
@@ -693,10 +719,10 @@ def test_clear_paper_is_ink_alone():
 
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 3.5, 6.0])
-def test_an_outline_is_as_wide_as_it_is_to_be(width):
+def test_the_width_of_outlines(width):
     """Around a ball: of so much ink is a ring of that width, and it lies along the border."""
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
-    gbuffer = project([instance(ball())], camera)
+    gbuffer = project([make_instance(ball())], camera)
     covered = outline_coverage(gbuffer, Look(outline=width))
     radius = SIZE / 2.4
     ring = np.pi * (radius**2 - (radius - width) ** 2)
@@ -706,7 +732,7 @@ def test_an_outline_is_as_wide_as_it_is_to_be(width):
     assert (covered[(from_middle > radius - width + 2)] == 1).all()
 
 
-def test_outlines_are_of_what_is_nearer():
+def test_outlines_are_drawn_on_the_nearer_surface():
     """Two walls, one before the other; the one behind has no line where the other hides it."""
     points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
     walls = []
@@ -726,7 +752,7 @@ def test_outlines_are_of_what_is_nearer():
     assert hidden_by.sum() > 300 and (covered[hidden_by] == 0).all()
 
 
-def test_creases_have_lines_half_on_either_side():
+def test_lines_of_creases_are_half_on_each_side():
     """The edge of a cube that is seen at equal angles; none if streaks are to cross it."""
     soft = cube()
     box = build_surface(soft.vertices, soft.corner_vertex, soft.face_start, sharp_angle=1.0)
@@ -743,7 +769,8 @@ def test_creases_have_lines_half_on_either_side():
 def test_outlines_are_drawn_in_ink():
     plain = replace(INK, light="scene", shading=0.0)  # no light that would ask for lines
     bare, lined = (
-        drawn(instance(ball()), eye(), replace(plain, outline=width)) for width in (0.0, 2.0)
+        render(make_instance(ball()), make_camera(), replace(plain, outline=width))
+        for width in (0.0, 2.0)
     )
     changed = np.abs(lined - bare)[..., 0] > 1e-3
     assert changed.sum() > 500

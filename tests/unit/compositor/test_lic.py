@@ -41,17 +41,17 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def own_noise(size, grain=1.5, seed=0):
+def make_noise(size, grain=1.5, seed=0):
     return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
 
 
-def window(length, taper):
+def kernel_window(length, taper):
     """What the samples of a streamline weigh, from end to end."""
-    whole = np.arange(-length, length + 1)
-    return 1 - np.abs(whole) / (length + 1) if taper else np.ones(2 * length + 1)
+    offset = np.arange(-length, length + 1)
+    return 1 - np.abs(offset) / (length + 1) if taper else np.ones(2 * length + 1)
 
 
-def plain_lic(angle, noise, size, length, step, taper=False):
+def runge_kutta_lic(angle, noise, size, length, step, taper=False):
     """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
     x, y = pixel_centres(size)
     start = x + 1j * y
@@ -70,7 +70,7 @@ def plain_lic(angle, noise, size, length, step, taper=False):
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
-        for weight in window(length, taper)[length + 1 :]:
+        for weight in kernel_window(length, taper)[length + 1 :]:
             h = sign * step
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
@@ -83,18 +83,18 @@ def plain_lic(angle, noise, size, length, step, taper=False):
     return total / count
 
 
-def whole(image, margin=50):
+def crop_margin(image, margin=50):
     return image[margin:-margin, margin:-margin]
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_one_direction_agrees_with_a_plain_integrator(taper):
+def test_one_direction_agrees_with_a_runge_kutta_integrator(taper):
     x, y = pixel_centres(SIZE)
-    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
+    noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
     look = plain(method="members", taper=taper)
     found = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
-    assert correlation(whole(found), whole(expected)) > 0.99
+    assert correlation(crop_margin(found), crop_margin(expected)) > 0.99
 
 
 @pytest.mark.parametrize("taper", [False, True])
@@ -102,13 +102,13 @@ def test_one_direction_resembles_another_library(taper):
     rlic = pytest.importorskip("rlic")
     x, y = pixel_centres(SIZE)
     angles = swirl_angle(x, y, SIZE)
-    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     length = PLAIN.length
     expected = rlic.convolve(
-        noise, np.cos(angles), np.sin(angles), kernel=window(length, taper), iterations=1
+        noise, np.cos(angles), np.sin(angles), kernel=kernel_window(length, taper), iterations=1
     )
     found = tone(angles, 1, plain(taper=taper), noise=noise)
-    assert correlation(whole(found), whole(expected)) > 0.7
+    assert correlation(crop_margin(found), crop_margin(expected)) > 0.7
 
 
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
@@ -121,7 +121,7 @@ def test_the_decomposition_agrees_with_brute_force(degree):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("degree", range(1, 13))
-def test_any_member_stands_for_the_field(degree, method):
+def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     size = 64
     angles = pair_angle(*pixel_centres(size), size, degree)
     turns = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
@@ -134,17 +134,17 @@ def test_any_member_stands_for_the_field(degree, method):
 @pytest.mark.parametrize("noise", [{}, *long({"high_pass": 16.0, "density": 0.1}, {"taper": True})])
 @pytest.mark.parametrize("degree", [7, *long(2, 3, 4, 5, 6)])
 @pytest.mark.parametrize("method", ["members", "sheets"])
-def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
+def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
     size = 512
     angles = np.full((size, size), 0.2)
     layers = compose_planar(angles, degree, plain(method=method, **noise)).layers[0]
-    inner = whole(np.arange(size * size).reshape(size, size)).ravel()
+    inner = crop_margin(np.arange(size * size).reshape(size, size)).ravel()
     one = np.mean([member[inner].std() for member in layers.images.members])
     assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
     assert layers.tone[inner].mean() == pytest.approx(0.5, abs=0.01)
 
 
-def test_independence_alone_would_overstate_the_contrast_of_seven():
+def test_the_blend_gain_of_seven_lines_includes_correlations():
     # Equation 6 takes the images for independent; the correction for their crossing is a tenth.
     gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
@@ -167,13 +167,13 @@ def test_independence_alone_would_overstate_the_contrast_of_seven():
         product([False, True], [1.0, 1.5, 3.0], [20, 80], [0.0, 8.0, 24.0]),
     ),
 )
-def test_deviation_of_one_member_is_as_theory_says(taper, grain, length, high_pass):
+def test_the_standard_deviation_of_one_member_matches_theory(taper, grain, length, high_pass):
     size = 512
     look = plain(grain=grain, length=length, high_pass=high_pass, taper=taper)
     spread = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)
-        spread.append(whole(image, length + 5).std())
+        spread.append(crop_margin(image, length + 5).std())
     assert np.mean(spread) == pytest.approx(expected_std(look), rel=0.05)
 
 
@@ -194,7 +194,7 @@ def along_field_autocorrelation(image, angles, chosen, lag):
     ],
 )
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_breaking_points_do_not_show(degree, way):
+def test_breaking_points_are_not_visible(degree, way):
     size, guides = 384, 4
     x, _ = pixel_centres(size)
     # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
@@ -213,7 +213,7 @@ def test_breaking_points_do_not_show(degree, way):
     assert alike[0] == pytest.approx(alike[1], rel=0.05)
 
 
-def test_one_set_alone_shows_the_breaking_points():
+def test_breaking_points_are_visible_in_one_set_alone():
     angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
     brute = tone(angles, 4, plain(method="brute"))
     both = tone(angles, 4, plain(method="members"))
@@ -222,7 +222,7 @@ def test_one_set_alone_shows_the_breaking_points():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_short_streamlines_have_the_contrast_of_whole_ones(method):
+def test_short_streamlines_have_the_contrast_of_full_ones(method):
     look = plain(method=method)
     size = 256
     angles = np.full((size, size), 0.0)
@@ -234,12 +234,12 @@ def test_short_streamlines_have_the_contrast_of_whole_ones(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_undefined_pixels_end_streamlines_and_stay_grey(method):
+def test_streamlines_end_at_undefined_pixels(method):
     look = plain(method=method)
     angles = np.full((64, 64), 0.0)
     angles[:, 32:] = np.nan
     changed = np.full((64, 64), 0.0)
-    noise = own_noise(64).reshape(64, 64)
+    noise = make_noise(64).reshape(64, 64)
     other = noise.copy()
     other[:, 32:] = 1 - other[:, 32:]
     assert np.array_equal(
@@ -266,7 +266,7 @@ def test_magnitude_drives_the_length_of_streaks(method):
     assert along(slice(136, 256), 3) > 0.5
 
 
-def test_colour_noise_is_three_pictures():
+def test_color_noise_has_three_channels():
     angles = pair_angle(*pixel_centres(128), 128, 4)
     picture = compose_planar(angles, 4, plain(noise="colour"))
     channels = picture.layers[0].tone
@@ -286,8 +286,8 @@ def test_the_same_settings_give_the_same_bytes():
 def orientation_spectrum(image, bins=360):
     """Power by direction of the streaks (a half turn from the wave vectors), smoothed a little."""
     size = image.shape[0]
-    window = np.hanning(size)
-    power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(window, window))) ** 2
+    hann_window = np.hanning(size)
+    power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(hann_window, hann_window))) ** 2
     k = np.fft.fftfreq(size)
     kx, ky = np.meshgrid(k, k)
     ring = (np.hypot(kx, ky) > 0.05) & (np.hypot(kx, ky) < 0.35)

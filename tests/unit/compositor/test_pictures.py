@@ -34,13 +34,15 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def seen(surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0), display="smooth"):
+def project_surface(
+    surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0), display="smooth"
+):
     """A G-buffer of one surface under an orthographic camera."""
     camera = orthographic_camera(look_at(eye, (0, 0, 0), up), size, size, scale=scale)
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
 
-def members_turned(surface, field, seed):
+def with_other_members(surface, field, seed):
     """The same field with another member stored on each face."""
     turns = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
     angle = (2 * np.pi / field.degree * turns)[:, None]
@@ -51,7 +53,7 @@ def members_turned(surface, field, seed):
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 5, 6)])
 def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
     sphere = icosphere(5)
-    gbuffer = seen(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
+    gbuffer = project_surface(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
     members, brute = (
         compose(gbuffer, plain(method=method)).layers[0].tone for method in ("members", "brute")
     )
@@ -60,11 +62,13 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
 
 @pytest.mark.parametrize("method", ["members", "sheets"])
 @pytest.mark.parametrize("degree", [1, 4, 7])
-def test_the_stored_member_makes_no_difference_to_the_picture(degree, method):
+def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     surface, look = torus(48, 24), plain(method=method)
     field = axis_field(surface, degree, (0.2, 0.3, 1.0))
-    one = compose(seen(surface, field, 96, (2, 1, 4), 3.2), look)
-    other = compose(seen(surface, members_turned(surface, field, 1), 96, (2, 1, 4), 3.2), look)
+    one = compose(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
+    other = compose(
+        project_surface(surface, with_other_members(surface, field, 1), 96, (2, 1, 4), 3.2), look
+    )
     difference = np.abs(one.layers[0].tone - other.layers[0].tone)
     assert np.mean(difference > 1e-5) < 0.005
 
@@ -84,13 +88,13 @@ def test_two_degrees_in_one_picture():
     assert covered == np.count_nonzero(picture.rgba[..., 3])
 
 
-def test_streaks_of_a_tilted_plane_run_where_it_is_projected():
+def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
     # One direction on a plane seen at 60 degrees: autocorrelation is highest along the image of it.
     surface = plane(2, 2, 4.0)
     direction = np.array([0.6, 0.8, 0.0])
     field = RosyField(1, np.tile(direction, (surface.face_count, 1)))
     eye = (0, -4 * np.sin(np.pi / 3), 4 * np.cos(np.pi / 3))
-    gbuffer = seen(surface, field, 256, eye, 1.6, (0, 0, 1))
+    gbuffer = project_surface(surface, field, 256, eye, 1.6, (0, 0, 1))
     tone = np.zeros(256 * 256)
     tone[gbuffer.pixel] = compose(gbuffer, PLAIN).layers[0].tone[:, 0] - 0.5
     power = np.abs(np.fft.fft2(tone.reshape(256, 256))) ** 2
@@ -108,14 +112,14 @@ def test_streaks_of_a_tilted_plane_run_where_it_is_projected():
     assert angles[np.argmax(along)] == pytest.approx(expected % 180, abs=1.5)
 
 
-def test_without_the_view_plane_breaking_points_show_on_a_tilted_surface():
+def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane():
     """Figures 7 and 8 of the paper, measured against brute force."""
     surface = plane(128, 128, 4.0)
     angle = 1.5 * surface.face_center[:, 0] + 0.8 * surface.face_center[:, 1]
     field = RosyField(4, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
     tilt = np.radians(65)
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
-    gbuffer = seen(surface, field, 300, eye, 1.5, (0, 0, 1))
+    gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
     brute = compose(gbuffer, plain(method="brute")).layers[0].tone
     error = [
         1
@@ -132,7 +136,7 @@ def test_silhouettes_end_streamlines():
     """A torus' tube before its far side: what is drawn on one does not depend on the other."""
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
-    gbuffer = seen(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
+    gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
     flow = surface_pixel_field(gbuffer, 1, 0.7, False)
     linked = flow.neighbors[:, :-1].T
     valid = linked < len(gbuffer.pixel)
@@ -142,12 +146,12 @@ def test_silhouettes_end_streamlines():
     assert np.mean(gap[valid] > 0.3) < 0.001
 
 
-def test_supersampling_keeps_size_contrast_and_covers_edges_in_part():
+def test_supersampling_keeps_size_and_contrast_and_smooths_edges():
     sphere = icosphere(4)
     field = axis_field(sphere, 2, (0.2, 1, 0))
     spread = {}
     for s in (1, 2, 3):
-        gbuffer = seen(sphere, field, 180 * s)
+        gbuffer = project_surface(sphere, field, 180 * s)
         picture = compose(gbuffer, plain(supersampling=s, gain=2.0))
         assert picture.rgba.shape == (180, 180, 4)
         y, x = np.mgrid[0:180, 0:180] - 89.5
@@ -160,13 +164,13 @@ def test_supersampling_keeps_size_contrast_and_covers_edges_in_part():
     assert spread[3] == pytest.approx(spread[1], rel=0.08)
 
 
-def test_borders_do_not_glare():
+def test_contrast_at_borders_is_that_of_the_center():
     sphere = icosphere(4)
     y, x = np.mgrid[0:256, 0:256] - 127.5
     radius = np.hypot(x, y) / (256 / 2.4)
     rim, middle = [], []
     for seed in range(4):
-        gbuffer = seen(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
+        gbuffer = project_surface(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
         image = np.full(256 * 256, np.nan)
         image[gbuffer.pixel] = compose(gbuffer, plain(seed=seed)).layers[0].tone[:, 0]
         image = image.reshape(256, 256)
@@ -175,11 +179,11 @@ def test_borders_do_not_glare():
     assert np.mean(rim) == pytest.approx(np.mean(middle), rel=0.15)
 
 
-def test_undefined_faces_are_grey_and_not_followed():
+def test_undefined_faces_have_no_excess_contrast():
     surface = plane(8, 8)
     vectors = np.tile([1.0, 0, 0], (surface.face_count, 1))
     vectors[surface.face_center[:, 0] > 0] = 0
-    gbuffer = seen(surface, RosyField(4, vectors), 96, display="flat")
+    gbuffer = project_surface(surface, RosyField(4, vectors), 96, display="flat")
     picture = compose(gbuffer, Look(shading=0.0))
     assert np.isfinite(picture.rgba).all()
     undefined = gbuffer.representation == 0
@@ -191,7 +195,7 @@ def test_undefined_faces_are_grey_and_not_followed():
 
 def test_headlight_is_lamberts_law():
     sphere = icosphere(5)
-    gbuffer = seen(sphere, axis_field(sphere, 1))
+    gbuffer = project_surface(sphere, axis_field(sphere, 1))
     full = diffuse(gbuffer, plain(shading=1.0))
     radius = np.hypot(*(gbuffer.position[:, :2].T))
     inner = radius < 0.9
@@ -217,11 +221,11 @@ def test_lights_of_the_scene():
     assert not diffuse(gbuffer, look).any()
 
 
-def test_magnitude_is_coloured():
+def test_magnitude_is_colored():
     surface = plane(32, 2)
     rho = (surface.face_center[:, :1] + 1) / 2
     field = RosyField(1, rho * [1.0, 0, 0])
-    gbuffer = seen(surface, field, 128)
+    gbuffer = project_surface(surface, field, 128)
     picture = compose(gbuffer, plain(magnitude="colour", magnitude_range=1.0, gain=0.0))
     x = gbuffer.position[:, 0]
     found = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])

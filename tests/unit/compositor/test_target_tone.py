@@ -34,27 +34,27 @@ HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
 BALL = icosphere(5)
 
 
-def moved(x, y, z, scale=1.0):
+def moved_and_scaled(x, y, z, scale=1.0):
     matrix = np.diag([scale, scale, scale, 1.0])
     matrix[:3, 3] = x, y, z
     return matrix
 
 
-def instance(surface, matrix=None, tone=None):
+def make_instance(surface, matrix=None, tone=None):
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
-def eye(size=SIZE, place=(0.0, -4.0, 1.2), at=(0.0, 0.0, 0.0), fov=0.56):
+def make_camera(size=SIZE, place=(0.0, -4.0, 1.2), at=(0.0, 0.0, 0.0), fov=0.56):
     return perspective_camera(look_at(place, at), size, size, fov=fov)
 
 
-def at_corners(surface, values):
+def tone_from_vertices(surface, values):
     """A tone of the values of vertices."""
     return SurfaceTone(np.asarray(values, dtype=np.float32)[surface.corner_vertex, None])
 
 
-def places(gbuffer):
+def world_positions(gbuffer):
     """(P, 3) world space."""
     view = gbuffer.camera.view
     return (gbuffer.position - view[:3, 3]) @ view[:3, :3]
@@ -63,7 +63,7 @@ def places(gbuffer):
 # --- attributes -----------------------------------------------------------------------------------
 
 
-def left_of(rgba, look):
+def relative_lightness(rgba, look):
     """(H, W) how much of the light from the darker of ink and paper to the lighter there is."""
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
     channel = int(np.argmax(np.abs(paper - ink)))
@@ -90,18 +90,18 @@ def test_presets_reproduce_a_ramp_on_the_surface(name):
     they have in common that is smaller still.
     """
     ramp = np.clip(BALL.vertices[:, 0] * 0.62 + 0.5, 0, 1)
-    thing = instance(BALL, tone=at_corners(BALL, ramp))
-    camera = eye()
+    thing = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
+    camera = make_camera()
     gbuffer = project([thing], camera)
     wanted = np.zeros(SIZE * SIZE)
-    wanted[gbuffer.pixel] = np.clip(places(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
+    wanted[gbuffer.pixel] = np.clip(world_positions(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
     wanted = blurred(gbuffer, wanted.reshape(SIZE, SIZE))
     assert wanted.min() < 0.15 and wanted.max() > 0.85
     fine = project([thing], camera.scaled(PRESETS[name].supersampling))
     off = []
     for seed in range(3):
         look = replace(PRESETS[name], tone="attribute", seed=seed)
-        off.append(blurred(gbuffer, left_of(compose(fine, look).rgba, look)) - wanted)
+        off.append(blurred(gbuffer, relative_lightness(compose(fine, look).rgba, look)) - wanted)
     assert np.abs(off).mean() <= 0.04
     assert abs(np.mean(off)) <= 0.02
 
@@ -111,18 +111,18 @@ def contrast(look, tone):
     surface = plane(1, 1, 4.0)
     own = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
     thing = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), own)
-    camera = above(128, scale=3.0).scaled(look.supersampling)
+    camera = camera_above(128, scale=3.0).scaled(look.supersampling)
     rgba = compose(project([thing], camera), replace(look, tone="attribute")).rgba
     left = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
     return to_display(left).std()
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::4], HATCHED))
-def test_lines_are_as_legible_in_the_dark_as_in_the_light(name):
+def test_lines_have_contrast_in_dark_tones(name):
     assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.08
 
 
-def test_soft_streaks_lose_contrast_in_the_dark():
+def test_soft_streaks_lose_contrast_in_dark_tones():
     """What lines are compared with: light is multiplied with them."""
     soft = Look(gain=1.5)
     assert contrast(soft, 0.1) < 0.6 * contrast(soft, 0.9)
@@ -132,26 +132,32 @@ def test_attributes_are_interpolated_over_triangles():
     """A number that is linear in space is so at the pixels, whatever the perspective."""
     surface = plane(3, 3, 4.0)
     linear = 0.3 * surface.vertices[:, 0] - 0.2 * surface.vertices[:, 1] + 0.5
-    matrix = moved(0.3, 0.2, -0.4, 1.5)
-    gbuffer = project([instance(surface, matrix, at_corners(surface, linear))], eye(fov=0.9))
-    x, y, _ = ((places(gbuffer) - matrix[:3, 3]) / 1.5).T
+    matrix = moved_and_scaled(0.3, 0.2, -0.4, 1.5)
+    gbuffer = project(
+        [make_instance(surface, matrix, tone_from_vertices(surface, linear))], make_camera(fov=0.9)
+    )
+    x, y, _ = ((world_positions(gbuffer) - matrix[:3, 3]) / 1.5).T
     np.testing.assert_allclose(surface_tones(gbuffer), 0.3 * x - 0.2 * y + 0.5, atol=2e-5)
 
 
-def test_numbers_of_corners_may_jump_between_faces():
+def test_corner_values_may_differ_between_faces():
     surface = plane(2, 1, 2.0)
     values = np.repeat([0.2, 0.9], 4)[:, None].astype(np.float32)
-    gbuffer = project([instance(surface, tone=SurfaceTone(values))], eye(place=(0, -0.5, 5)))
+    gbuffer = project(
+        [make_instance(surface, tone=SurfaceTone(values))], make_camera(place=(0, -0.5, 5))
+    )
     tones = surface_tones(gbuffer)
     np.testing.assert_allclose(tones, np.where(gbuffer.face == 0, 0.2, 0.9), atol=1e-6)
 
 
-def test_bodies_without_a_tone_have_the_light():
-    other = instance(BALL, moved(1.2, 0, 0, 0.5))
-    painted = instance(
-        BALL, moved(-1.2, 0, 0, 0.5), at_corners(BALL, np.full(len(BALL.vertices), 0.7))
+def test_instances_without_a_tone_use_the_light():
+    other = make_instance(BALL, moved_and_scaled(1.2, 0, 0, 0.5))
+    painted = make_instance(
+        BALL,
+        moved_and_scaled(-1.2, 0, 0, 0.5),
+        tone_from_vertices(BALL, np.full(len(BALL.vertices), 0.7)),
     )
-    gbuffer = project([painted, other], eye(fov=1.2))
+    gbuffer = project([painted, other], make_camera(fov=1.2))
     look = Look(tone="attribute", light="lamp")
     tone = target_tone(gbuffer, look)
     light = diffuse(gbuffer, look)
@@ -165,14 +171,16 @@ def test_bodies_without_a_tone_have_the_light():
 
 
 @pytest.mark.parametrize("tone", ["attribute", "image", "picture"])
-def test_tones_that_are_not_there(tone, error_of):
-    gbuffer = project([instance(BALL)], eye(64))
+def test_missing_tones_are_refused(tone, error_of):
+    gbuffer = project([make_instance(BALL)], make_camera(64))
     assert tone in error_of(target_tone, gbuffer, Look(tone=tone))
 
 
-def test_other_tones_do_not_make_other_streaks():
+def test_lic_images_do_not_depend_on_the_tone():
     """What a look's tone is has no say in the LIC: it is not done again."""
-    gbuffer = project([instance(BALL, tone=at_corners(BALL, BALL.vertices[:, 0]))], eye(96))
+    gbuffer = project(
+        [make_instance(BALL, tone=tone_from_vertices(BALL, BALL.vertices[:, 0]))], make_camera(96)
+    )
     cache = Cache()
     first = compose(gbuffer, Look(), cache=cache).layers[0].images
     for other in ({"tone": "attribute"}, {"tone_gamma": 2.0}, {"shadows": True, "light": "lamp"}):
@@ -182,7 +190,7 @@ def test_other_tones_do_not_make_other_streaks():
 # --- the curve -------------------------------------------------------------------------------------
 
 
-def test_the_curve_is_nothing_by_default():
+def test_the_default_tone_curve_is_the_identity():
     tone = np.array([0.0, 0.3, 1.0, 1.7], dtype=np.float32)
     np.testing.assert_array_equal(apply_tone_curve(tone, Look()), tone)
 
@@ -195,13 +203,13 @@ def test_black_white_and_gamma():
     )
 
 
-def test_black_above_white_turns_tones_over():
+def test_black_above_white_inverts_tones():
     look = Look(tone_black=1.0, tone_white=0.0)
     tones = np.array([0.0, 0.25, 1.0], dtype=np.float32)
     np.testing.assert_allclose(apply_tone_curve(tones, look), [1, 0.75, 0], atol=1e-6)
 
 
-def test_black_and_white_in_one_place_part_light_from_dark():
+def test_equal_black_and_white_are_a_threshold():
     look = Look(tone_black=0.5, tone_white=0.5)
     found = apply_tone_curve(np.array([0.2, 0.49, 0.51, 0.9], dtype=np.float32), look)
     assert (found[:2] == 0).all() and (found[2:] >= 1).all()
@@ -214,24 +222,24 @@ def mapped_plane(image, repeat=1.0, cells=4):
     """A square whose UV map lays an image over it, so many times."""
     surface = plane(cells, cells, 2.0)
     uv = (surface.vertices[surface.corner_vertex, :2] * 0.5 + 0.5) * repeat
-    return instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
+    return make_instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
 
 
-def above(size, scale=2.0):
+def camera_above(size, scale=2.0):
     return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
-def test_images_lie_as_their_map_says():
+def test_images_follow_the_uv_map():
     """Pixel for pixel, where they are as wide as those of the picture, rows from the bottom."""
     image = np.random.default_rng(1).random((32, 32))
-    gbuffer = project([mapped_plane(image)], above(32))
+    gbuffer = project([mapped_plane(image)], camera_above(32))
     assert len(gbuffer.pixel) == 32 * 32
     np.testing.assert_allclose(surface_tones(gbuffer).reshape(32, 32), image, atol=2e-4)
 
 
-def test_images_between_their_pixels():
+def test_images_are_interpolated():
     ramp = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
-    tones = surface_tones(project([mapped_plane(ramp)], above(128))).reshape(128, 128)
+    tones = surface_tones(project([mapped_plane(ramp)], camera_above(128))).reshape(128, 128)
     wanted = (np.arange(128) + 0.5) / 128
     np.testing.assert_allclose(tones[:, 8:-8], np.tile(wanted[8:-8], (128, 1)), atol=1e-3)
 
@@ -239,17 +247,19 @@ def test_images_between_their_pixels():
 def test_images_finer_than_the_picture_are_averaged():
     """A board of single pixels, sixteen of them to one of the picture, is grey."""
     board = np.indices((256, 256)).sum(axis=0) % 2
-    tones = surface_tones(project([mapped_plane(board)], above(64)))
+    tones = surface_tones(project([mapped_plane(board)], camera_above(64)))
     np.testing.assert_allclose(tones, 0.5, atol=1e-3)
     # Odd sides, too, and one that is repeated.
     odd = np.random.default_rng(2).random((255, 131))
-    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], above(8)))
+    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
 
 
-def test_images_begin_anew_at_their_borders():
+def test_images_repeat():
     image = np.random.default_rng(3).random((16, 16))
-    tones = surface_tones(project([mapped_plane(image, repeat=2.0)], above(32))).reshape(32, 32)
+    tones = surface_tones(project([mapped_plane(image, repeat=2.0)], camera_above(32))).reshape(
+        32, 32
+    )
     np.testing.assert_allclose(tones, np.tile(image, (2, 2)), atol=2e-4)
 
 
@@ -257,12 +267,12 @@ def test_images_begin_anew_at_their_borders():
 
 
 @pytest.mark.parametrize("perspective", [True, False])
-def test_pictures_are_taken_at_the_pixel(perspective):
-    camera = eye(96)
+def test_reference_renders_are_sampled_at_the_pixel(perspective):
+    camera = make_camera(96)
     if not perspective:
         camera = orthographic_camera(look_at((0, -4, 1), (0, 0, 0)), 96, 96, scale=2.6)
     shown = np.random.default_rng(4).random((96, 96)).astype(np.float32)
-    gbuffer = project([instance(BALL)], camera)
+    gbuffer = project([make_instance(BALL)], camera)
     found = ReferenceRender(shown, camera).sample(gbuffer)
     np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
     # Twice as fine: the mean of the four.
@@ -271,42 +281,44 @@ def test_pictures_are_taken_at_the_pixel(perspective):
     np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
 
 
-def test_pictures_stay_on_what_they_show():
+def test_reference_renders_are_reprojected():
     """From elsewhere, the surface has the tone that the camera of the picture saw there."""
-    camera = eye(256)
-    gbuffer = project([instance(BALL)], camera)
+    camera = make_camera(256)
+    gbuffer = project([make_instance(BALL)], camera)
     shown = np.zeros(256 * 256, dtype=np.float32)
-    shown[gbuffer.pixel] = places(gbuffer)[:, 2] * 0.5 + 0.5
+    shown[gbuffer.pixel] = world_positions(gbuffer)[:, 2] * 0.5 + 0.5
     rendered = ReferenceRender(shown.reshape(256, 256), camera)
-    other = project([instance(BALL)], eye(256, place=(1.5, -3.8, 0.6)))
-    point = places(other)
+    other = project([make_instance(BALL)], make_camera(256, place=(1.5, -3.8, 0.6)))
+    point = world_positions(other)
     seen = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
     facing = -np.einsum("pi,pi->p", seen, point @ camera.view[:3, :3].T) > 0.8
     found = rendered.sample(other)[facing]
     np.testing.assert_allclose(found, point[facing, 2] * 0.5 + 0.5, atol=0.01)
 
 
-def test_pictures_of_another_shape_are_refused(error_of):
-    said = error_of(ReferenceRender, np.zeros((90, 160), dtype=np.float32), eye(64), "shot.png")
+def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
+    said = error_of(
+        ReferenceRender, np.zeros((90, 160), dtype=np.float32), make_camera(64), "shot.png"
+    )
     assert "shot.png" in said and "160 x 90" in said and "64 x 64" in said
 
 
 # --- shadows ------------------------------------------------------------------------------------------
 
 
-def light_at(camera, place, strength=1.0):
+def point_light(camera, place, strength=1.0):
     """A point, in the space of a camera."""
     vector = camera.view[:3, :3] @ np.asarray(place, dtype=float) + camera.view[:3, 3]
     return Light("point", vector, np.ones(3), strength)
 
 
-def sun_from(camera, direction, strength=1.0):
+def sun_light(camera, direction, strength=1.0):
     direction = np.asarray(direction, dtype=float)
     direction = camera.view[:3, :3] @ (direction / np.linalg.norm(direction))
     return Light("sun", direction, np.ones(3), strength)
 
 
-def behind_ball(points, toward, centre, radius, most=np.inf):
+def clearance_from_ball(points, toward, centre, radius, most=np.inf):
     """By how much rays from points pass inside a ball (below 0) or outside; `toward` is unit."""
     way = centre - points
     along = np.einsum("pi,pi->p", way, toward)
@@ -326,13 +338,16 @@ LIGHTS = {
 def test_the_shadow_of_a_ball_on_a_plane(name):
     """In closed form: what a ray to the light meets. Only at the very border may it differ."""
     kind, where = LIGHTS[name]
-    ground, ball = instance(plane(8, 8, 8.0)), instance(icosphere(6), moved(0, 0, 1.0, 0.8))
-    camera = eye(256, place=(3, -6, 4), at=(0, 0, 0.6), fov=0.7)
-    light = (sun_from if kind == "sun" else light_at)(camera, where)
+    ground, ball = (
+        make_instance(plane(8, 8, 8.0)),
+        make_instance(icosphere(6), moved_and_scaled(0, 0, 1.0, 0.8)),
+    )
+    camera = make_camera(256, place=(3, -6, 4), at=(0, 0, 0.6), fov=0.7)
+    light = (sun_light if kind == "sun" else point_light)(camera, where)
     gbuffer = project([ground, ball], camera)
     share = shadow_visibility(gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector))
     on_ground = gbuffer.instance_id == 0
-    point = places(gbuffer)[on_ground].astype(float)
+    point = world_positions(gbuffer)[on_ground].astype(float)
     if kind == "sun":
         toward = np.broadcast_to(np.divide(where, np.linalg.norm(where)), point.shape)
         reach = np.inf
@@ -340,7 +355,7 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
         way = where - point
         reach = np.linalg.norm(way, axis=1)
         toward = way / reach[:, None]
-    beside = behind_ball(point, toward, np.array([0, 0, 1.0]), 0.8, reach)
+    beside = clearance_from_ball(point, toward, np.array([0, 0, 1.0]), 0.8, reach)
     sure = np.abs(beside) > 0.04
     assert sure.mean() > 0.9 and (beside < 0).mean() > 0.02
     np.testing.assert_allclose(share[on_ground][sure], (beside > 0)[sure], atol=1e-6)
@@ -349,12 +364,12 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
 
 
 @pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
-def test_surfaces_do_not_shade_themselves_where_they_face_the_light(name):
+def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
     kind, where = LIGHTS[name]
     for surface in (icosphere(3), BALL, plane(3, 3, 2.0)):
-        camera = eye(256, place=(1.0, -4, 1.8))
-        gbuffer = project([instance(surface)], camera)
-        light = (sun_from if kind == "sun" else light_at)(camera, where)
+        camera = make_camera(256, place=(1.0, -4, 1.8))
+        gbuffer = project([make_instance(surface)], camera)
+        light = (sun_light if kind == "sun" else point_light)(camera, where)
         share = shadow_visibility(
             gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
         )
@@ -369,11 +384,14 @@ def test_surfaces_do_not_shade_themselves_where_they_face_the_light(name):
             assert share[facing < -0.3].max() < 1e-6
 
 
-def test_what_has_no_field_casts_shadows_too():
-    ground, ball = instance(plane(2, 2, 4.0)), MeshInstance(BALL, moved(0, 0, 2.0, 0.5))
+def test_instances_without_a_field_cast_shadows():
+    ground, ball = (
+        make_instance(plane(2, 2, 4.0)),
+        MeshInstance(BALL, moved_and_scaled(0, 0, 2.0, 0.5)),
+    )
     camera = perspective_camera(look_at((0, -5, 5), (0, 0, 0)), 128, 128, fov=0.9)
     look = Look(light="scene", shading=1.0)
-    sun = sun_from(camera, (0, 0.01, 1))
+    sun = sun_light(camera, (0, 0.01, 1))
     bare, both = project([ground], camera), project([ground, ball], camera)
     shadows = replace(look, shadows=True)
     assert diffuse(bare, shadows, [sun]).min() > 0.9
@@ -382,14 +400,14 @@ def test_what_has_no_field_casts_shadows_too():
     assert diffuse(both, look, [sun]).min() > 0.9
 
 
-def test_the_eye_casts_no_shadows():
-    gbuffer = project([instance(BALL)], eye(64))
+def test_the_headlight_casts_no_shadows():
+    gbuffer = project([make_instance(BALL)], make_camera(64))
     np.testing.assert_array_equal(
         diffuse(gbuffer, Look(shadows=True)), diffuse(gbuffer, Look(shadows=False))
     )
 
 
-def meets(origin, direction, corners):
+def rays_hit_triangles(origin, direction, corners):
     """(n,) whether rays from (n, 3) points meet one of (T, 3, 3) triangles."""
     a, b, c = corners.transpose(1, 0, 2)
     p = np.cross(direction, c - a)
@@ -405,7 +423,7 @@ def meets(origin, direction, corners):
     return met
 
 
-def test_shadows_of_rays():
+def test_shadows_match_ray_casting():
     """Of a ring that stands on the ground and shades itself, against rays one by one."""
     quads, count = grid_of_quads(48, 24, True, True)
     u, v = np.divmod(np.arange(count), 24)
@@ -413,15 +431,18 @@ def test_shadows_of_rays():
     out = 1.0 + 0.35 * np.cos(v)
     points = np.stack([out * np.cos(u), -0.35 * np.sin(v), out * np.sin(u)], axis=1)
     ring = from_quads(points, quads, name="ring")
-    instances = [instance(plane(2, 2, 6.0), moved(0, 0, -1.5)), instance(ring)]
-    camera = eye(128, place=(2.5, -6, 2.5), at=(0, 0, -0.4), fov=0.75)
+    instances = [make_instance(plane(2, 2, 6.0), moved_and_scaled(0, 0, -1.5)), make_instance(ring)]
+    camera = make_camera(128, place=(2.5, -6, 2.5), at=(0, 0, -0.4), fov=0.75)
     gbuffer = project(instances, camera)
     assert gbuffer.front_facing.all()
     direction = np.array([0.6, 0.3, 0.7]) / np.linalg.norm([0.6, 0.3, 0.7])
-    light = sun_from(camera, direction)
+    light = sun_light(camera, direction)
     share = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
-    origin = places(gbuffer).astype(float) + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
-    met = meets(origin, direction, points[ring.triangle_vertex])
+    origin = (
+        world_positions(gbuffer).astype(float)
+        + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
+    )
+    met = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
     assert 0.1 < met.mean() < 0.7
     # Light that grazes gives none, and borders are soft.
     sure = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1

@@ -13,20 +13,20 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 
 
-def spin(surface, degree, rate):
+def rotating_field(surface, degree, rate):
     """A field on a plane that turns by `rate` radians for each unit of x."""
     angle = rate * surface.face_center[:, 0]
     return RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
-def test_the_energy_of_a_field_that_turns_evenly(degree):
+def test_energy_of_a_field_that_rotates_evenly(degree):
     """|grad z|^2 is (N rate)^2: over the plane, but for the outer half rows, 4 of them."""
     surface = plane(80, 80)
     rate = 0.7
-    energy = dirichlet_energy(surface, spin(surface, degree, rate))
+    energy = dirichlet_energy(surface, rotating_field(surface, degree, rate))
     assert np.isclose(energy, 4 * (degree * rate) ** 2, rtol=0.02)
-    assert dirichlet_energy(surface, spin(surface, degree, 0.0)) < 1e-12
+    assert dirichlet_energy(surface, rotating_field(surface, degree, 0.0)) < 1e-12
 
 
 def test_energy_does_not_depend_on_size_member_or_length():

@@ -22,7 +22,7 @@ from rosy_addon.field.singularities import find_singularities
 BALL = icosphere(3)
 
 
-def scrambled(surface, field, seed=0):
+def with_random_members(surface, field, seed=0):
     """The same RoSys, another member of each stored."""
     random = np.random.default_rng(seed)
     number = random.integers(0, field.degree, surface.face_count)
@@ -45,7 +45,7 @@ def test_a_multiple_has_the_member_and_the_power_of_z(degree, multiple):
 
 
 @pytest.mark.parametrize(("degree", "divisor"), [(4, 2), (4, 1), (6, 2), (6, 3), (12, 1)])
-def test_a_divisor_is_one_field_all_over_where_there_is_one(degree, divisor):
+def test_a_divisor_is_consistent_without_singularities(degree, divisor):
     """A torus' field without singularities that goes round the way of the torus."""
     surface = torus(48, 24)
     line = axis_field(surface, divisor, (0.0, 0.0, 1.0))
@@ -53,7 +53,9 @@ def test_a_divisor_is_one_field_all_over_where_there_is_one(degree, divisor):
     line = RosyField(
         divisor, normalize(around - dot(around, surface.face_normal)[:, None] * surface.face_normal)
     )
-    less = change_degree(surface, scrambled(surface, RosyField(degree, line.vectors)), divisor)
+    less = change_degree(
+        surface, with_random_members(surface, RosyField(degree, line.vectors)), divisor
+    )
     assert less.degree == divisor
     # One of the fields that the members make up, the same everywhere.
     turn = face_representation(surface, less) * face_representation(surface, line).conj()
@@ -61,9 +63,9 @@ def test_a_divisor_is_one_field_all_over_where_there_is_one(degree, divisor):
     np.testing.assert_allclose(turn[0] ** (degree // divisor), 1, atol=1e-6)
 
 
-def test_seams_stay_where_the_field_is_singular():
+def test_a_divisor_has_seams_between_singularities():
     field = generate(BALL, "smoothest", 4)
-    less = change_degree(BALL, scrambled(BALL, field), 1)
+    less = change_degree(BALL, with_random_members(BALL, field), 1)
     _, slip = field_matching(BALL, RosyField(4, less.vectors))
     seam = slip != 0
     assert 0 < seam.sum() < 0.2 * len(slip)
@@ -72,7 +74,7 @@ def test_seams_stay_where_the_field_is_singular():
 
 
 @pytest.mark.parametrize("degree", [3, 8])
-def test_what_is_neither_is_refused(degree, error_of):
+def test_other_degrees_are_refused(degree, error_of):
     field = axis_field(BALL, 6 if degree == 8 else 4)
     assert "neither a multiple nor a divisor" in error_of(change_degree, BALL, field, degree)
 
@@ -82,7 +84,7 @@ def test_what_is_neither_is_refused(degree, error_of):
 
 @settings(max_examples=50)
 @given(st.integers(1, 12), st.floats(-7, 7))
-def test_a_turn_multiplies_z(degree, angle):
+def test_rotation_multiplies_z(degree, angle):
     surface = plane(3, 3)
     field = axis_field(surface, degree, (1.0, 0.5, 0.3))
     z = face_representation(surface, rotate_field(surface, field, angle))
@@ -95,7 +97,7 @@ def test_a_turn_multiplies_z(degree, angle):
 
 @pytest.mark.parametrize("degree", [1, 4])
 def test_diffusion_against_scipy(degree):
-    field = scrambled(BALL, axis_field(BALL, degree, (0.3, 0.2, 1.0)))
+    field = with_random_members(BALL, axis_field(BALL, degree, (0.3, 0.2, 1.0)))
     noise = np.random.default_rng(0).normal(0, 0.4, BALL.face_count)
     field = rotate_field(BALL, field, noise)
     found = diffuse_field(BALL, field, 0.02)
@@ -117,7 +119,7 @@ def test_diffusion_against_scipy(degree):
     np.testing.assert_allclose(face_representation(BALL, found), wanted, atol=1e-7)
 
 
-def test_diffusion_takes_noise_away_and_leaves_what_is_constant():
+def test_diffusion_removes_noise_and_keeps_constant_fields():
     surface = plane(40, 40)
     straight = RosyField(4, np.tile((1.0, 0.0, 0.0), (surface.face_count, 1)))
     same = diffuse_field(surface, straight, 1.0)
@@ -130,7 +132,7 @@ def test_diffusion_takes_noise_away_and_leaves_what_is_constant():
     assert calm.magnitude.mean() < 0.9
 
 
-def test_a_time_must_be_positive(error_of):
+def test_the_diffusion_time_must_be_positive(error_of):
     assert "the diffusion time must be above 0" in error_of(
         diffuse_field, BALL, axis_field(BALL, 4), 0.0
     )
@@ -139,7 +141,7 @@ def test_a_time_must_be_positive(error_of):
 # --- magnitudes ----------------------------------------------------------------------------------
 
 
-def test_magnitudes_leave_directions_and_what_is_undefined():
+def test_magnitudes_keep_directions_and_undefined_faces():
     vectors = np.array(axis_field(BALL, 4).vectors)
     vectors[::7] = 0
     field = with_magnitude(RosyField(4, vectors), np.arange(BALL.face_count))

@@ -37,16 +37,16 @@ from tools.gallery.measure import orientation_spectrum, peaks
 WEAVE = Look(shading=0.0, grain=1.5, length=30)
 
 
-def turned(vectors, normal, angle):
+def rotate(vectors, normal, angle):
     return np.cos(angle) * vectors + np.sin(angle) * np.cross(normal, vectors)
 
 
-def fan_of(surface, angles, lengths):
+def directions_at_angles(surface, angles, lengths):
     """(F, N, 3): on each face the same angles from its first edge."""
     x, _ = face_frames(surface)
     return np.stack(
         [
-            length * turned(x, surface.face_normal, angle)
+            length * rotate(x, surface.face_normal, angle)
             for angle, length in zip(angles, lengths, strict=True)
         ],
         axis=1,
@@ -58,7 +58,7 @@ def fan_of(surface, angles, lengths):
 
 @settings(max_examples=200)
 @given(st.integers(2, 7), st.integers(0, 10**6), st.integers(0, 6))
-def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
+def test_harmonics_do_not_depend_on_the_first_direction(degree, seed, shift):
     random = np.random.default_rng(seed)
     w = np.exp(2j * np.pi * random.random((1, degree))) * (0.2 + random.random((1, degree)))
     first, rho, deviations = closest_rosy(w)
@@ -78,11 +78,11 @@ def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
 
 @settings(max_examples=200)
 @given(st.integers(1, 7), st.integers(0, 10**6))
-def test_what_is_taken_apart_comes_together(degree, seed):
+def test_directions_are_restored_from_the_field(degree, seed):
     surface = icosphere(1)
     random = np.random.default_rng(seed)
     angles, lengths = 6.28 * random.random(degree), 0.2 + random.random(degree)
-    given_ones = fan_of(surface, angles, lengths)
+    given_ones = directions_at_angles(surface, angles, lengths)
     field = field_from_directions(surface, given_ones)
     found = field_directions(surface, field)
     order = np.argsort((angles - angles[0]) % (2 * np.pi))
@@ -100,22 +100,22 @@ def test_the_representation_is_the_product_of_the_directions():
         assert np.allclose(np.exp(1j * degree * first), (-1) ** (degree - 1) * w.prod(axis=1))
 
 
-def test_a_rosy_stays_one():
+def test_a_rosy_has_no_direction_ratios():
     surface = icosphere(2)
     angles = 0.3 + 2 * np.pi * np.arange(6) / 6
-    field = field_from_directions(surface, fan_of(surface, angles, np.full(6, 2.0)))
+    field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
     assert field.direction_ratios is None
     assert np.allclose(field.magnitude, 2)
 
 
-def test_opposite_directions_are_paired():
+def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
-    even = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 2)))
+    even = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 2)))
     assert field_symmetry(even).has_opposites
-    uneven = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 3)))
+    uneven = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 3)))
     assert not field_symmetry(uneven).has_opposites
-    odd = field_from_directions(surface, fan_of(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
+    odd = field_from_directions(surface, directions_at_angles(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
     assert not field_symmetry(odd).has_opposites
 
 
@@ -140,7 +140,7 @@ def test_matching_follows_the_stored_members():
     surface = plane(5, 5)
     random = np.random.default_rng(3)
     number = random.integers(0, 4, surface.face_count)
-    vectors = turned(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
+    vectors = rotate(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
     angle = number * np.pi / 2
     vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     faces, slip = field_matching(surface, RosyField(4, vectors))
@@ -164,10 +164,10 @@ def test_eigenvectors_of_a_tensor():
         assert np.isclose(np.linalg.norm(minor), abs(values[0]), rtol=1e-2)
 
 
-def test_lines_are_told_apart_where_their_numbers_are_consistent():
+def test_families_need_a_consistent_order_of_directions():
     surface = plane(8, 8)
     angles, lengths = (0.0, 1.0, np.pi, np.pi + 1.0), (1, 1, 1, 1)
-    given_ones = fan_of(surface, angles, lengths)
+    given_ones = directions_at_angles(surface, angles, lengths)
     assert field_from_directions(surface, given_ones).family_count == 2
     given_ones[::2] = np.roll(given_ones[::2], 1, axis=1)
     assert field_from_directions(surface, given_ones).family_count == 1
@@ -176,7 +176,7 @@ def test_lines_are_told_apart_where_their_numbers_are_consistent():
 # --- drawing -------------------------------------------------------------------------------------
 
 
-def from_above(surface, field, size, display="smooth"):
+def project_from_above(surface, field, size, display="smooth"):
     camera = orthographic_camera(np.eye(4), size, size, scale=2.0, clip=(-10, 10))
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
@@ -195,7 +195,9 @@ def test_streaks_run_along_free_directions(method, angles):
     for face in range(surface.face_count):  # no order may matter
         directions[face] = np.roll(directions[face], face, axis=0)
     field = field_from_directions(surface, directions)
-    picture = compose(from_above(surface, field, 256), WEAVE.with_settings({"method": method}))
+    picture = compose(
+        project_from_above(surface, field, 256), WEAVE.with_settings({"method": method})
+    )
     tone = picture.layers[0].tone.reshape(256, 256)[32:-32, 32:-32]
     found = np.array(peaks(orientation_spectrum(tone)))
     wanted = np.unique(np.mod(angles, 180))
@@ -213,13 +215,13 @@ def test_a_conjugate_field_of_another_library(method, shared_data):
         and field_symmetry(field).has_opposites
         and field.direction_ratios is not None
     )
-    for face in calm_faces(surface, field, 10):
-        found, wanted = drawn_and_stored(surface, field, face, method)
+    for face in nearly_constant_faces(surface, field, 10):
+        found, wanted = drawn_and_stored_angles(surface, field, face, method)
         assert len(found) == len(wanted), face
         assert np.abs((found - wanted + 90) % 180 - 90).max() < 2, face
 
 
-def calm_faces(surface, field, count):
+def nearly_constant_faces(surface, field, count):
     """Faces around which the field is the same within a degree and a half, all over the mesh."""
     from rosy_addon.field.surface import build_edges
 
@@ -237,7 +239,7 @@ def calm_faces(surface, field, count):
     return np.random.default_rng(4).choice(calm, count, replace=False)
 
 
-def drawn_and_stored(surface, field, face, method):
+def drawn_and_stored_angles(surface, field, face, method):
     """Orientations, in degrees, of the streaks on a face and of its stored vectors, as projected."""
     normal = surface.face_normal[face]
     centre = surface.face_center[face]
@@ -264,11 +266,11 @@ def drawn_and_stored(surface, field, face, method):
 # --- hues ----------------------------------------------------------------------------------------
 
 
-def test_hues_tell_families_apart_and_leave_the_brightness_alone():
+def test_family_hues_keep_the_brightness():
     surface = plane(7, 7, 2.2)
     tensor = np.diag([3.0, -1.0, 0.0])
     field = tensor_field(surface, np.tile(tensor, (surface.face_count, 1, 1)))
-    seen = from_above(surface, field, 256)
+    seen = project_from_above(surface, field, 256)
     grey = compose(seen, WEAVE).rgba[..., :3]
     hues = compose(seen, WEAVE.with_settings({"hue": "families"}))
     luminance = [
@@ -289,9 +291,9 @@ def test_hues_tell_families_apart_and_leave_the_brightness_alone():
     assert min(shares) > 0.3
 
 
-def test_one_family_stays_grey():
+def test_a_single_family_is_gray():
     surface = plane(7, 7, 2.2)
     field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
-    seen = from_above(surface, field, 64)
+    seen = project_from_above(surface, field, 64)
     colours = compose(seen, WEAVE.with_settings({"hue": "families"})).rgba
     assert np.array_equal(colours, compose(seen, WEAVE).rgba)

@@ -27,7 +27,7 @@ coordinate = st.floats(-1, 1, allow_nan=False)
 vector = st.tuples(coordinate, coordinate, coordinate).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
-def rotated(field: RosyField, surface, turns) -> RosyField:
+def with_other_members(field: RosyField, surface, turns) -> RosyField:
     """The same field, another member stored on each face."""
     normal = surface.face_normal
     angle = (2 * np.pi / field.degree * turns)[:, None]
@@ -45,7 +45,7 @@ def random_field(surface, degree, seed=0) -> RosyField:
 
 
 @given(vector, vector, coordinate)
-def test_carrying_is_the_shortest_rotation(a, b, angle):
+def test_transport_is_the_minimal_rotation(a, b, angle):
     s, t = normalize(np.array(a)), normalize(np.array(b))
     if s @ t < -0.9:
         return
@@ -68,7 +68,7 @@ def test_tangent_frames_are_right_handed(a):
 
 
 @given(vector.filter(lambda v: v[2] / np.linalg.norm(v) > -0.5))
-def test_view_frames_are_the_cameras_axes_carried(a):
+def test_view_frames_are_the_transported_camera_axes(a):
     w = normalize(np.array(a))
     x, y = view_frame(w)
     camera = np.array([0.0, 0.0, 1.0])
@@ -88,12 +88,12 @@ def test_all_members_have_one_representation(angle, rho, degree, k):
 
 
 @given(st.integers(1, 40))
-def test_powers_are_powers(degree):
+def test_power(degree):
     number = np.exp(0.7j) * np.ones(1)
     assert power(number, degree) == pytest.approx(number**degree)
 
 
-def test_corner_turns_are_what_carrying_does():
+def test_corner_rotations_match_transport():
     surface = torus(12, 8)
     x, y = face_frames(surface)
     face = surface.corner_face
@@ -105,7 +105,7 @@ def test_corner_turns_are_what_carrying_does():
     assert np.allclose(w[face] * turn, dot(moved, cx) + 1j * dot(moved, cy))
 
 
-def test_fans_mix_within_themselves_only():
+def test_values_are_averaged_only_within_fans():
     box = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
     quads = np.array(
         [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -120,7 +120,7 @@ def test_fans_mix_within_themselves_only():
         assert np.allclose(mixed[at], values[at].mean())
 
 
-def test_sharp_edges_and_flat_faces_part_the_fans():
+def test_sharp_edges_and_flat_faces_separate_fans():
     quads = plane(2, 1)
     ends = quads.corner_vertex
     arrays = (quads.vertices, ends, quads.face_start)
@@ -159,11 +159,11 @@ def test_a_planar_singularity_has_its_index(degree, sign):
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 7])
-def test_the_stored_member_makes_no_difference(degree):
+def test_results_do_not_depend_on_the_stored_member(degree):
     surface = torus(20, 12)
     field = random_field(surface, degree)
     turns = np.random.default_rng(3).integers(0, degree, surface.face_count)
-    other = rotated(field, surface, turns)
+    other = with_other_members(field, surface, turns)
     assert np.allclose(face_representation(surface, field), face_representation(surface, other))
     for a, b in zip(
         find_singularities(surface, field), find_singularities(surface, other), strict=True
@@ -227,7 +227,7 @@ def test_an_axis_without_a_direction_is_refused(axis):
         axis_field(plane(), 4, axis)
 
 
-def test_generators_are_refused_by_name():
+def test_unknown_generators_and_odd_degrees_are_refused():
     with pytest.raises(RosyError, match="even degree, not 3"):
         generate(plane(), "curvature", 3)
     with pytest.raises(RosyError, match="magic"):

@@ -24,7 +24,7 @@ from rosy_addon.field.smoothest import corner_frame_angles
 BUNNY = MESHES / "stanford-bunny.obj"
 
 
-def some_guides(surface, count, seed=0):
+def random_guides(surface, count, seed=0):
     """Unit tangents on a few faces that are far from each other."""
     random = np.random.default_rng(seed)
     chosen = random.choice(surface.face_count, count, replace=False)
@@ -38,7 +38,7 @@ def some_guides(surface, count, seed=0):
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 def test_hard_guides_are_met_exactly(degree):
     for surface in (bumpy(icosphere(4)), torus(40, 20)):
-        guides = some_guides(surface, 12)
+        guides = random_guides(surface, 12)
         hard = guides.any(axis=1)
         field = guided_field(surface, degree, guides, 0.0, hard)
         assert angles_apart(surface, field.vectors, guides, degree)[hard].max() < 1e-9
@@ -47,9 +47,9 @@ def test_hard_guides_are_met_exactly(degree):
 
 
 @pytest.mark.parametrize("degree", [1, 4])
-def test_soft_guides_are_a_linear_system(degree):
+def test_soft_guides_match_a_direct_solver(degree):
     surface = bumpy(icosphere(4))
-    guides, weight = some_guides(surface, 30), 40.0
+    guides, weight = random_guides(surface, 30), 40.0
     x, y = face_frames(surface)
     connection = build_connection(surface)
     turn = corner_frame_angles(surface, connection, x, y)
@@ -123,9 +123,9 @@ def test_ten_strokes_on_the_bunny():
 
 @pytest.mark.parametrize("degree", [2, 5])
 @pytest.mark.parametrize("hard", [False, True])
-def test_the_field_does_not_depend_on_numbers_or_place(degree, hard):
+def test_the_field_does_not_depend_on_numbering_or_position(degree, hard):
     surface = bumpy(icosphere(3))
-    guides = some_guides(surface, 10)
+    guides = random_guides(surface, 10)
     chosen = guides.any(axis=1) if hard else None
 
     def found(other, turned=None):
@@ -144,7 +144,7 @@ def test_the_field_does_not_depend_on_numbers_or_place(degree, hard):
     assert angles_apart(surface, found(moved, turn) @ turn, expected, degree).max() < 1e-5
 
 
-def test_a_piece_without_guides_has_no_field():
+def test_a_component_without_guides_has_no_field():
     ball = icosphere(2)
     points = np.concatenate([ball.vertices, ball.vertices + 5])
     triangles = ball.corner_vertex.reshape(-1, 3)
@@ -193,7 +193,7 @@ def test_guides_lie_in_their_faces():
     assert guides[0] @ [1, 0, 0] > 0.9
 
 
-def test_curvature_reaches_into_what_is_flat():
+def test_curvature_spreads_into_flat_regions():
     """A cylinder between two flat caps' worth of plane: the flat parts take its directions."""
     count, turns = 60, np.linspace(0, np.pi / 2, 13)
     # A quarter of a tube along y, with flat flaps on both sides, three units long.

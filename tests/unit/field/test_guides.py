@@ -32,7 +32,7 @@ def great_circles(count, seed=2, tremble=0.0):
     return strokes
 
 
-def off_stroke(surface, field, stroke):
+def stroke_error(surface, field, stroke):
     """Mean angle, degrees, between a stroke and the field along it."""
     middle, way = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
     face = surface.triangle_face[closest_triangles(surface, middle)[0]]
@@ -46,11 +46,11 @@ def off_stroke(surface, field, stroke):
 def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
     field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)
-    assert max(off_stroke(BALL, field, stroke) for stroke in strokes) < 2
+    assert max(stroke_error(BALL, field, stroke) for stroke in strokes) < 2
     soft = generate(
         BALL, GeneratorSettings("guided", strokes=strokes, smoothing_length=0.005), degree
     )
-    assert max(off_stroke(BALL, soft, stroke) for stroke in strokes) < 2
+    assert max(stroke_error(BALL, soft, stroke) for stroke in strokes) < 2
 
 
 @pytest.mark.parametrize("reach", long(0.0, 0.003))
@@ -71,11 +71,11 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
         corner = bunny.vertices[bunny.triangle_vertex[triangle, 0]]
         strokes.append(line - dot(line - corner, normal)[:, None] * normal)
     field = generate(bunny, GeneratorSettings("guided", strokes=strokes, smoothing_length=reach), 4)
-    off = [off_stroke(bunny, field, stroke) for stroke in strokes]
+    off = [stroke_error(bunny, field, stroke) for stroke in strokes]
     assert max(off) < 2, off
 
 
-def test_a_trembling_hand_is_smoothed():
+def test_jitter_of_strokes_is_smoothed():
     strokes, trembling = great_circles(1), great_circles(1, tremble=0.004)
     straight, shaken = (guides_from_strokes(BALL, some, 2) for some in (strokes, trembling))
     both = straight.any(axis=1) & shaken.any(axis=1)
@@ -83,7 +83,7 @@ def test_a_trembling_hand_is_smoothed():
     assert both.sum() > 5 and np.median(off) < 8
 
 
-def test_pieces_without_a_guide_are_smooth():
+def test_components_without_a_guide_get_the_smoothest_field():
     points = np.concatenate([BALL.vertices, BALL.vertices + 5])
     triangles = np.concatenate([BALL.triangle_vertex, BALL.triangle_vertex + len(BALL.vertices)])
     both = from_triangles(points, triangles)
@@ -96,7 +96,7 @@ def test_pieces_without_a_guide_are_smooth():
     )  # several are
 
 
-def test_strokes_elsewhere_are_refused(error_of):
+def test_strokes_far_from_the_surface_are_refused(error_of):
     assert "no stroke is near the surface" in error_of(
         guides_from_strokes, BALL, [np.ones((4, 3)) * 9], 4
     )
@@ -105,7 +105,7 @@ def test_strokes_elsewhere_are_refused(error_of):
     )
 
 
-def test_handles_guide_around_them():
+def test_axes_guide_the_faces_around_them():
     place, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
     guides = guides_from_axes(BALL, place, axis, np.array([0.3, 0.0]), 2)
     near = np.linalg.norm(BALL.face_center - place[0], axis=1) < 0.3
@@ -135,7 +135,7 @@ def test_a_uv_map_is_followed(degree, mirrored):
     np.testing.assert_allclose(np.exp(1j * degree * angle), np.exp(1j * degree * 0.4), atol=1e-9)
 
 
-def test_a_skewed_map_is_followed_on_both_axes_alike():
+def test_a_skewed_map_is_followed_equally_along_both_axes():
     surface = plane(3, 3)
     # dP/du = (1, 0), dP/dv = (1, 1): the nearest cross halves the difference.
     guides = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 4)
@@ -155,7 +155,7 @@ def test_maps_without_area_are_undefined():
     assert guides.any(axis=1).tolist() == [False] * 3 + [True] * 6
 
 
-def test_guides_of_several_kinds_go_together(error_of):
+def test_guides_of_several_kinds_are_combined(error_of):
     surface = torus(48, 24)
     vectors = np.zeros((surface.face_count, 3))
     vectors[5] = 3 * face_frames(surface)[0][5]
@@ -196,7 +196,7 @@ def test_a_moebius_strip_is_named():
     assert not orientation_warning(BALL)
 
 
-def test_flipped_faces_are_told_too():
+def test_flipped_faces_are_counted():
     corners = BALL.corner_vertex.reshape(-1, 3).copy()
     corners[7] = corners[7][::-1]
     surface = build_surface(BALL.vertices, corners, BALL.face_start)

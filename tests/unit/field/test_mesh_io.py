@@ -133,7 +133,7 @@ def text_stl() -> bytes:
 
 
 @pytest.mark.parametrize("data", [binary_stl(), text_stl()], ids=["binary", "text"])
-def test_stl_corners_at_one_place_are_one_vertex(data, tmp_path):
+def test_stl_corners_at_the_same_position_are_one_vertex(data, tmp_path):
     (tmp_path / "a.stl").write_bytes(data)
     surface = read_mesh(tmp_path / "a.stl")
     assert len(surface.vertices) == 5
@@ -142,7 +142,7 @@ def test_stl_corners_at_one_place_are_one_vertex(data, tmp_path):
 
 
 @given(st.lists(st.tuples(*3 * [st.sampled_from([-1.0, -0.0, 0.0, 1e-300, 2.5])]), max_size=40))
-def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
+def test_weld_keeps_positions_and_removes_duplicates(points):
     points = np.array(points, dtype=float).reshape(-1, 3)
     vertices, index = weld(points)
     assert np.array_equal(vertices[index], points)
@@ -152,7 +152,7 @@ def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
 
 
 @pytest.mark.slow
-def test_meshes_of_others(shared_data):
+def test_meshes_of_other_programs(shared_data):
     found = {
         path.name: (len(surface.vertices), surface.face_count)
         for path in sorted((shared_data / "meshes").iterdir())
@@ -225,7 +225,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     data, wanted = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
     tracemalloc.start()
@@ -244,7 +244,7 @@ def test_missing_files_and_folders(tmp_path, error_of):
 
 
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
-def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, name, place):
+def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, place):
     from rosy_addon.errors import RosyError
 
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
@@ -257,7 +257,7 @@ def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, nam
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9))
-def test_off_coordinates_are_read_to_the_last_bit(tmp_path_factory, numbers):
+def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path = tmp_path_factory.getbasetemp() / "exact.off"
     rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))

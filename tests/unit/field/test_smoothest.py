@@ -38,7 +38,7 @@ def random_sphere(count, seed=1):
 # --- matrices --------------------------------------------------------------------------------------
 
 
-def random_rows(rows, columns, seed):
+def random_matrix(rows, columns, seed):
     random = np.random.default_rng(seed)
     count = 4 * rows
     row = np.concatenate([np.arange(rows), random.integers(rows, size=count)])
@@ -48,7 +48,7 @@ def random_rows(rows, columns, seed):
 
 
 def test_products_of_sparse_matrices():
-    a, b = random_rows(60, 40, 0), random_rows(40, 25, 1)
+    a, b = random_matrix(60, 40, 0), random_matrix(40, 25, 1)
     dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
     np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
     vector = np.arange(40) * (1 + 2j)
@@ -56,12 +56,12 @@ def test_products_of_sparse_matrices():
 
 
 def test_the_adjoint():
-    a = random_rows(60, 20, 2)
+    a = random_matrix(60, 20, 2)
     np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
 @pytest.mark.parametrize("degree", [4, *long(1, 6)])
-def test_cycles_of_multigrid_approach_the_solution(degree):
+def test_multigrid_cycles_converge(degree):
     connection = build_connection(bumpy(icosphere(5)))
     matrix = laplacian(connection, degree, 0.1)
     levels = run_to_completion(hierarchy_task(matrix))
@@ -80,7 +80,7 @@ def test_cycles_of_multigrid_approach_the_solution(degree):
 
 
 @pytest.mark.parametrize("degree", [1, 4, 7])
-def test_a_constant_direction_in_the_plane_costs_nothing(degree):
+def test_a_constant_direction_in_the_plane_has_no_energy(degree):
     surface = plane(6)
     random = np.random.default_rng(3)
     inside = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
@@ -97,7 +97,7 @@ def test_a_constant_direction_in_the_plane_costs_nothing(degree):
     np.testing.assert_allclose(laplacian(connection, degree) @ z, 0, atol=1e-9)
 
 
-def test_vertices_where_umbrellas_meet_are_cut():
+def test_each_umbrella_of_a_vertex_is_a_node():
     bowtie = from_triangles(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]]
     )
@@ -121,7 +121,7 @@ def simple_shapes():
     yield "torus", bumpy(torus(60, 30))
 
 
-def shapes_of_others():
+def shapes_of_other_programs():
     for name in ("spot.obj", "vase.off", "dome.off", "cheburashka.off", "stanford-bunny.obj"):
         if (MESHES / name).exists():
             yield name, read_mesh(MESHES / name)
@@ -129,8 +129,8 @@ def shapes_of_others():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 4])
-@pytest.mark.parametrize("shapes", [simple_shapes, *long(shapes_of_others)])
-def test_the_eigenvector_is_that_of_scipy(shapes, degree):
+@pytest.mark.parametrize("shapes", [simple_shapes, *long(shapes_of_other_programs)])
+def test_the_eigenvector_matches_scipy(shapes, degree):
     for name, surface in shapes():
         connection = build_connection(surface)
         z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
@@ -150,7 +150,7 @@ def test_the_eigenvector_is_that_of_scipy(shapes, degree):
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
-def test_the_field_of_another_library(degree):
+def test_the_field_matches_another_library(degree):
     """geometry-central's connection Laplacian, raised to N; it shares no code with this one.
 
     It flips edges to be Delaunay, and lays out borders differently: so a closed Delaunay mesh.
@@ -209,21 +209,21 @@ def test_the_field_of_another_library(degree):
 
 
 @pytest.mark.parametrize("degree", range(1, 13))
-def test_indices_add_up_to_the_euler_characteristic(degree):
+def test_indices_sum_to_the_euler_characteristic(degree):
     for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
         _, index = find_singularities(surface, smoothest_field(surface, degree))
         assert index.sum() == degree * euler_characteristic(surface)
 
 
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_a_sphere_has_no_more_singularities_than_it_must(degree):
+def test_a_sphere_has_the_fewest_possible_singularities(degree):
     _, index = find_singularities(icosphere(4), smoothest_field(icosphere(4), degree))
     assert (index == 1).all()
     assert len(index) == 2 * degree
 
 
 @pytest.mark.parametrize("degree", [2, 4, 5])
-def test_the_field_does_not_depend_on_numbers_or_place(degree):
+def test_the_field_does_not_depend_on_numbering_or_position(degree):
     surface = bumpy(icosphere(3))
     expected = smoothest_field(surface, degree).vectors
     triangles = surface.corner_vertex.reshape(-1, 3)
@@ -244,7 +244,7 @@ def test_the_field_does_not_depend_on_numbers_or_place(degree):
     assert angles_apart(surface, found, expected, degree).max() < 1e-5
 
 
-def test_each_piece_has_its_own():
+def test_each_component_has_its_own_field():
     one, other = bumpy(icosphere(3)), bumpy(torus(24, 12))
     points = np.concatenate([one.vertices, 0.3 * other.vertices + 5])
     corners = np.concatenate([one.corner_vertex, other.corner_vertex + len(one.vertices)])
@@ -277,7 +277,7 @@ def test_no_area_at_all_is_an_error():
         smoothest_field(flat, 4)
 
 
-def test_progress_never_steps_back():
+def test_progress_never_decreases():
     fractions = [step.fraction for step in smoothest_task(icosphere(4), 4)]
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1

@@ -14,13 +14,13 @@ from rosy_addon.projection.gbuffer import MeshInstance
 pytestmark = pytest.mark.slow
 
 
-def at(surface, *shift):
+def instance_at(surface, *shift):
     matrix = np.eye(4)
     matrix[:3, 3] = shift or (0, 0, 0)
     return MeshInstance(surface, matrix)
 
 
-def of_vertices(surface, values):
+def values_at_vertices(surface, values):
     """A value of each vertex, one of those of its corners."""
     found = np.empty(len(surface.vertices))
     found[surface.corner_vertex] = values
@@ -41,7 +41,7 @@ def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
     return surface, np.tile(along, len(x))
 
 
-def test_directions_are_even():
+def test_directions_are_evenly_spread():
     """They have the moments of the sphere: mean 0, and 1/3 of the identity."""
     found = fibonacci_sphere(256)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1)
@@ -50,15 +50,15 @@ def test_directions_are_even():
 
 
 @pytest.mark.parametrize("scale", [0.01, 1.0, 300.0])
-def test_nothing_hides_the_sky_from_a_ball(scale):
+def test_a_sphere_is_fully_open(scale):
     instance = MeshInstance(icosphere(3), np.diag([scale, scale, scale, 1.0]))
     np.testing.assert_allclose(ambient_occlusion([instance], 0, 64, 256), 1, atol=0.005)
 
 
-def test_a_corner_of_two_planes():
+def test_a_floor_beside_a_wall():
     """A wall of height h at distance d leaves 1/2 + cos(atan(h/d))/2 of the sky: in the edge, half."""
     surface, along = trough()
-    found = of_vertices(surface, ambient_occlusion([at(surface)], 0))
+    found = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     middle = np.abs(surface.vertices[:, 0]) < 1
     for distance, tolerance in ((0.0, 0.02), (0.5, 0.02), (1.0, 0.015), (2.0, 0.015)):
         own = middle & (np.abs(np.abs(along) - distance) < 0.05)
@@ -68,29 +68,29 @@ def test_a_corner_of_two_planes():
 
 
 @pytest.mark.parametrize("degrees", [60, 150, *long(90, 135)])
-def test_in_the_edge_of_two_planes(degrees):
+def test_the_edge_of_two_planes(degrees):
     """They leave each other 1/2 - cos(angle)/2, also where the point is on both of them."""
     angle = np.radians(degrees)
     surface, along = trough(2, angle=angle)
-    found = ambient_occlusion([at(surface)], 0)
+    found = ambient_occlusion([instance_at(surface)], 0)
     edge = (np.abs(surface.vertices[:, 0]) < 5) & (along == 0)
     own = found[edge[surface.corner_vertex]]
     assert own.mean() == pytest.approx(0.5 - 0.5 * np.cos(angle), abs=0.05)
 
 
-def test_a_smooth_corner_looks_out_of_it():
+def test_the_smooth_edge_of_two_planes():
     """Where the two mix, normals are between: a wedge of a right angle around one leaves sin 45."""
     surface, along = trough(sharp=False)
-    found = of_vertices(surface, ambient_occlusion([at(surface)], 0))
+    found = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     own = (np.abs(surface.vertices[:, 0]) < 1) & (along == 0)
     assert found[own].mean() == pytest.approx(np.sqrt(0.5), abs=0.02)
 
 
-def test_a_plane_beneath_a_ball():
+def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
     ground, ball = plane(24, 24, 6.0), icosphere(4)
-    instances = [at(ground), at(ball, 0, 0, 1.6)]
-    found = of_vertices(ground, ambient_occlusion(instances, 0, 600, 400))
+    instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
+    found = values_at_vertices(ground, ambient_occlusion(instances, 0, 600, 400))
     away = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
     wanted = 1 - 1.6 / away**3
     assert wanted.min() < 0.65
@@ -99,13 +99,13 @@ def test_a_plane_beneath_a_ball():
 
 
 @pytest.mark.long
-def test_turned_and_moved_it_is_the_same():
+def test_occlusion_does_not_depend_on_rotation_and_translation():
     surface, _ = trough(8)
     turned = np.array([[0, 0, 1.0, 5], [1, 0, 0, -3], [0, 1, 0, 9], [0, 0, 0, 1]])
-    here = ambient_occlusion([at(surface)], 0, 512, 256)
+    here = ambient_occlusion([instance_at(surface)], 0, 512, 256)
     there = ambient_occlusion([MeshInstance(surface, turned)], 0, 512, 256)
     assert np.abs(here - there).mean() < 0.01
 
 
-def test_no_directions(error_of):
-    assert "directions" in error_of(ambient_occlusion, [at(icosphere(1))], 0, 0)
+def test_zero_directions_are_refused(error_of):
+    assert "directions" in error_of(ambient_occlusion, [instance_at(icosphere(1))], 0, 0)

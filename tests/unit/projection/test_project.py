@@ -47,7 +47,7 @@ def tangent_field(surface, degree, seed=0):
     return RosyField(degree, vectors - dot(vectors, normal)[:, None] * normal)
 
 
-def turned_about_normals(surface, field, turns):
+def with_other_members(surface, field, turns):
     """The same field by other members: each vector turned by `turns` times 2 pi / N."""
     angle = turns * 2 * np.pi / field.degree
     sideways = np.cross(surface.face_normal, field.vectors)
@@ -119,7 +119,7 @@ def explicit_values(surface, field, buffer, chosen, linear):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("inside", [False, True])
-def test_values_are_what_explicit_transport_gives(degree, inside):
+def test_values_match_explicit_transport(degree, inside):
     """On a very coarse sphere, where the ways of transport differ by many degrees."""
     surface = icosphere(1)
     field = tangent_field(surface, degree)
@@ -155,7 +155,7 @@ def test_values_are_continuous_across_edges_of_triangles():
 
 @settings(max_examples=20)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
-def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, display):
+def test_values_do_not_depend_on_the_stored_member(seed, degree, deformed, display):
     random = np.random.default_rng(seed)
     surface = torus(12, 7)
     if deformed:
@@ -171,7 +171,7 @@ def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, displ
         surface.face_start,
     )
     field = tangent_field(rest, degree, seed)
-    other = turned_about_normals(rest, field, random.integers(0, degree, surface.face_count))
+    other = with_other_members(rest, field, random.integers(0, degree, surface.face_count))
     one = project([MeshInstance(surface, matrix, field)], camera, display)
     two = project([MeshInstance(surface, matrix, other)], camera, display)
     z = one.representation
@@ -181,7 +181,7 @@ def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, displ
 
 @settings(max_examples=15)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
-def test_turning_everything_together_changes_nothing(seed, degree, perspective, display):
+def test_moving_mesh_and_camera_together_changes_nothing(seed, degree, perspective, display):
     random = np.random.default_rng(seed)
     surface = torus(16, 9)
     field = tangent_field(surface, degree, seed)
@@ -236,7 +236,7 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
     np.testing.assert_allclose(np.abs(found), length, rtol=1e-3)
 
 
-def test_directions_on_a_sphere_are_those_of_projected_members():
+def test_directions_on_a_sphere_match_projected_members():
     """N = 4, against finite differences of the members in space."""
     surface = icosphere(3)
     camera = lens(look_at((2.5, 1, 1), (0, 0, 0)), 200, 200, fov=1.2)
@@ -306,7 +306,7 @@ def test_mirrored_objects(display, degree):
 
 
 @pytest.mark.parametrize("cells", [(4, 4), (9, 2), (1, 6)])
-def test_stretching_turns_members_by_its_rotation_alone(cells):
+def test_stretching_rotates_members_by_its_polar_rotation(cells):
     """A stretch along the axes turns nothing; a shear by s turns by -atan(s / 2).
 
     Whatever the shape of the faces that the map is read from.
@@ -327,7 +327,7 @@ def test_stretching_turns_members_by_its_rotation_alone(cells):
 
 
 @pytest.mark.parametrize("columns", [4, 40])
-def test_a_bent_sheet_carries_its_field(columns):
+def test_the_field_of_a_sheet_bends_with_it(columns):
     """A strip rolled to a half tube: the members roll with it."""
     sheet = plane(columns, columns)
     x, y, _ = sheet.vertices.T
@@ -350,7 +350,7 @@ def test_a_bent_sheet_carries_its_field(columns):
     assert np.median(off) < 8 / columns
 
 
-def test_instances_are_seen_as_if_each_were_alone():
+def test_instances_are_projected_independently():
     surface = torus(20, 10)
     field = tangent_field(surface, 6)
     places = [matrix_of(np.eye(3), (0, -2, 0)), matrix_of(0.5 * np.diag([1, -1, 1]), (0, 1.5, 0))]
@@ -366,7 +366,7 @@ def test_instances_are_seen_as_if_each_were_alone():
             assert (getattr(both, name)[mine] == getattr(alone, name)).all()
 
 
-def test_bodies_of_different_degrees_and_one_that_hides():
+def test_instances_of_different_degrees_and_an_occluder():
     ball, wall = icosphere(2), plane(1, 1)
     camera = lens(look_at((0, -6, 0), (0, 0, 0)), 120, 60)
     stand = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -447,7 +447,7 @@ def test_custom_normals_within_a_fan():
     assert 0 < np.abs(one.representation - two.representation)[facing].max() < 0.5
 
 
-def test_the_eye_inside_a_mesh_sees_all_around():
+def test_an_eye_inside_a_mesh_sees_it_at_all_pixels():
     surface = icosphere(2)
     camera = lens(look_at((0, 0, 0), (1, 0, 0)), 40, 30, fov=1.6, clip=(0.01, 10))
     buffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
@@ -456,7 +456,7 @@ def test_the_eye_inside_a_mesh_sees_all_around():
     assert (dot(buffer.normal, buffer.view_direction) > 0.8).all()
 
 
-def test_what_cannot_be_seen_is_said():
+def test_errors_of_projection():
     ball, wall = icosphere(1), plane(1, 1, size=20)
     field = tangent_field(ball, 4)
     camera = lens(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, name="Camera.001")
@@ -481,7 +481,7 @@ def test_what_cannot_be_seen_is_said():
         project([MeshInstance(ball, np.full((4, 4), np.inf), field)], camera)
 
 
-def test_progress_grows_and_work_can_be_dropped():
+def test_progress_grows_and_the_task_can_be_closed():
     surface = torus()
     instances = [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))] * 2
     camera = orbit_camera(surface, 0, 40, 300, 300)

@@ -30,13 +30,13 @@ def flat_clip(x, y, z=0.0, width=WIDTH, height=HEIGHT):
     )
 
 
-def a_camera(perspective, width=WIDTH, height=HEIGHT):
+def make_camera(perspective, width=WIDTH, height=HEIGHT):
     if perspective:
         return perspective_camera(np.eye(4), width, height, fov=1.2, clip=CLIP)
     return orthographic_camera(np.eye(4), width, height, scale=5.0, clip=CLIP)
 
 
-def cast(points, triangles, camera):
+def cast_rays(points, triangles, camera):
     """For each pixel the nearest triangle, its barycentrics and depth along -z, ray by ray.
 
     Also whether the answer hangs on less than 1e-9, so that rounding may decide it.
@@ -71,13 +71,13 @@ def cast(points, triangles, camera):
 
 @settings(max_examples=15)
 @given(seeds, st.booleans())
-def test_sees_what_a_ray_caster_sees(seed, perspective):
+def test_visible_triangles_match_a_ray_caster(seed, perspective):
     """Triangles anywhere: before, behind and around the eye, across both clip planes."""
     random = np.random.default_rng(seed)
-    camera = a_camera(perspective, 19, 13)
+    camera = make_camera(perspective, 19, 13)
     points = random.normal(size=(24, 3)) * (2, 2, 4) + (0, 0, -2)
     triangles = np.arange(24).reshape(8, 3)
-    owner, weights, depth, doubtful = cast(points, triangles, camera)
+    owner, weights, depth, doubtful = cast_rays(points, triangles, camera)
     seen = rasterize(to_clip(points, camera), triangles, camera.width, camera.height)
     found = np.full(len(owner), -1)
     found[seen.pixel] = seen.triangle
@@ -141,7 +141,7 @@ def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
 def test_no_cracks_where_the_near_plane_cuts(seed):
     """A floor that passes under the eye, cut at random: below the horizon all is covered once."""
     random = np.random.default_rng(seed)
-    camera = a_camera(True)
+    camera = make_camera(True)
     x, y, triangles = jittered_grid(random, 5, 0)
     points = np.stack([(x - 14.5) * 30, np.full(x.shape, -0.1), (y - 14.5) * 0.7], axis=1)
     clip = to_clip(points, camera)
@@ -158,7 +158,7 @@ def test_no_cracks_where_the_near_plane_cuts(seed):
 
 def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
     """Two triangles, most of each behind the eye."""
-    camera = a_camera(True, 200, 150)
+    camera = make_camera(True, 200, 150)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     seen = rasterize(to_clip(points, camera), triangles, 200, 150)
@@ -178,7 +178,7 @@ def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
 @given(seeds)
 def test_order_of_triangles_and_corners_does_not_matter(seed):
     random = np.random.default_rng(seed)
-    camera = a_camera(True)
+    camera = make_camera(True)
     points = random.normal(size=(40, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = random.permuted(np.tile(np.arange(40), (60, 1)), axis=1)[:, :3]
     _, distinct = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
@@ -201,7 +201,7 @@ def test_order_of_triangles_and_corners_does_not_matter(seed):
     assert (mirrored.front_facing == ~seen.front_facing).all()
 
 
-def test_the_first_of_equal_depths_is_seen():
+def test_the_first_of_equal_depths_is_visible():
     x, y = np.array([1.0, 30, 8]), np.array([2.0, 5, 28])
     triangles = np.array([[0, 1, 2]] * 5)
     assert (rasterize(flat_clip(x, y), triangles, WIDTH, HEIGHT).triangle == 0).all()
@@ -213,7 +213,7 @@ def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
     points = random.normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = np.arange(60).reshape(20, 3)
     triangles = np.concatenate([triangles, triangles])
-    clip = to_clip(points, a_camera(True))
+    clip = to_clip(points, make_camera(True))
     expected = rasterize(clip, triangles, WIDTH, HEIGHT)
     monkeypatch.setattr(rasterizer, "BLOCK_SIZE", block)
     monkeypatch.setattr(rasterizer, "MAX_BAND_PIXELS", band)
@@ -222,7 +222,7 @@ def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
 
 
 @pytest.mark.parametrize("z", [-1.0, 1.0])
-def test_clip_planes_themselves_are_seen_and_beyond_is_not(z):
+def test_clip_planes_are_inclusive(z):
     x, y = np.array([0.0, 37, 0]), np.array([0.0, 0, 29])
     assert len(rasterize(flat_clip(x, y, z), np.array([[0, 1, 2]]), WIDTH, HEIGHT).pixel) > 400
     assert not len(
@@ -230,7 +230,7 @@ def test_clip_planes_themselves_are_seen_and_beyond_is_not(z):
     )
 
 
-def test_what_has_no_area_or_is_elsewhere_covers_nothing():
+def test_triangles_without_area_or_outside_the_frame_cover_nothing():
     x = np.array([3.0, 20, 11.5, 3, 3, -50, -90, -60])
     y = np.array([3.0, 20, 11.5, 3, 3, 10, 12, 20])
     triangles = np.array([[0, 1, 2], [0, 3, 4], [0, 0, 1], [5, 6, 7]])
@@ -238,7 +238,7 @@ def test_what_has_no_area_or_is_elsewhere_covers_nothing():
     assert not len(rasterize(flat_clip(x, y), triangles[:0], WIDTH, HEIGHT).pixel)
 
 
-def test_vertices_far_outside_the_frame_do_no_harm():
+def test_vertices_far_outside_the_frame():
     """A triangle of 10^12 pixels, whose one edge runs through the picture."""
     x, y = np.array([18.5, 18.5, 1e12]), np.array([-1e12, 1e12, 0.0])
     seen = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
@@ -258,7 +258,7 @@ def test_two_million_tiny_triangles_leave_no_hole():
     assert len(rasterize(clip, triangles, 256, 256).pixel) == 256 * 256
 
 
-def test_edges_meet_the_near_plane_in_the_same_point_from_both_sides():
+def test_near_plane_intersections_do_not_depend_on_the_edge_direction():
     """Bit for bit: else the two triangles of an edge would be cut apart by rounding."""
     vertices = np.random.default_rng(3).normal(size=(2000, 4))
     first, second = np.arange(1000), np.arange(1000, 2000)
@@ -266,8 +266,8 @@ def test_edges_meet_the_near_plane_in_the_same_point_from_both_sides():
     assert (one == rasterizer._intersect_near(vertices, second, first)).all()
 
 
-def test_the_first_of_equal_depths_is_seen_among_cut_triangles_too():
-    camera = a_camera(True)
+def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():
+    camera = make_camera(True)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
     # A floor four times, cut in different shapes, and a wall that is whole.
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])

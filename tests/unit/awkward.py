@@ -13,9 +13,9 @@ def cube():
 
 def moebius(count=24):
     angle = np.repeat(np.arange(count) * (2 * np.pi / count), 2)
-    out = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
-    up = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
-    points = np.stack([out * np.cos(angle), out * np.sin(angle), up], axis=1)
+    radius = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
+    height = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
     triangles = []
     for step in range(count):
         a, b = 2 * step, 2 * step + 1
@@ -27,8 +27,8 @@ def moebius(count=24):
 def grid(count=4):
     points = [(x, y, 0) for y in range(count + 1) for x in range(count + 1)]
     row = count + 1
-    here = [y * row + x for y in range(count) for x in range(count)]
-    return points, [(a, a + 1, a + row + 1, a + row) for a in here]
+    first_corners = [y * row + x for y in range(count) for x in range(count)]
+    return points, [(a, a + 1, a + row + 1, a + row) for a in first_corners]
 
 
 def octahedron():
@@ -40,9 +40,9 @@ def octahedron():
 def pieces():
     """A cube, an octahedron beside it, and a grid above them."""
     points, faces = [], []
-    for number, (more, others) in enumerate((cube(), octahedron(), grid())):
-        faces += [tuple(vertex + len(points) for vertex in face) for face in others]
-        points += [(x + 3 * number, y, z + number) for x, y, z in more]
+    for index, (part_points, part_faces) in enumerate((cube(), octahedron(), grid())):
+        faces += [tuple(vertex + len(points) for vertex in face) for face in part_faces]
+        points += [(x + 3 * index, y, z + index) for x, y, z in part_points]
     return points, faces
 
 
@@ -55,8 +55,8 @@ def fan():
 def faces_without_area(count=1000):
     """An octahedron, and a thousand triangles without area."""
     points, faces = octahedron()
-    points += [(0.1 * number, 0.0, 2.0) for number in range(count + 2)]
-    return points, faces + [(6 + number, 7 + number, 8 + number) for number in range(count)]
+    points += [(0.1 * index, 0.0, 2.0) for index in range(count + 2)]
+    return points, faces + [(6 + index, 7 + index, 8 + index) for index in range(count)]
 
 
 def triangle():

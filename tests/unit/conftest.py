@@ -24,10 +24,13 @@ def long(*cases):
     ]
 
 
-def mainly(kept, cases):
+def mainly(common, cases):
     """All cases, of which `make test` runs those kept and `make test-long` the others."""
-    kept, cases = set(kept), list(cases)
-    return [*(case for case in cases if case in kept), *long(*(c for c in cases if c not in kept))]
+    common, cases = set(common), list(cases)
+    return [
+        *(case for case in cases if case in common),
+        *long(*(c for c in cases if c not in common)),
+    ]
 
 
 def pytest_collection_modifyitems(items):
@@ -50,9 +53,9 @@ def shared_data() -> Path:
 def error_of():
     """The text of the RosyError that a call raises; it must be one line."""
 
-    def catch(function, *arguments, **more) -> str:
+    def catch(function, *arguments, **keywords) -> str:
         with pytest.raises(RosyError) as caught:
-            function(*arguments, **more)
+            function(*arguments, **keywords)
         message = str(caught.value)
         assert "\n" not in message
         return message

@@ -26,8 +26,8 @@ def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
     return build_surface(points, surface.corner_vertex, surface.face_start)
 
 
-def angles_apart(surface, one, other, degree):
+def angle_differences(surface, first, second, degree):
     """(F,) radians between members of two arrays of vectors on the faces."""
     x, y = face_frames(surface)
-    z, w = (to_representation(vectors, x, y, degree) for vectors in (one, other))
+    z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def pixel_centres(size: int) -> tuple[np.ndarray, np.ndarray]:
+def pixel_centers(size: int) -> tuple[np.ndarray, np.ndarray]:
     """(size, size) x and y of pixel centres, rows from the bottom."""
     y, x = np.mgrid[0:size, 0:size] + 0.5
     return x, y

@@ -25,12 +25,12 @@ QUICK = Look(length=8)
 
 
 def decode_frames(data):
-    film = Image.open(io.BytesIO(data))
-    found = []
-    for number in range(film.n_frames):
-        film.seek(number)
-        found.append(np.asarray(film.convert("RGB")))
-    return film, found
+    gif = Image.open(io.BytesIO(data))
+    frames = []
+    for index in range(gif.n_frames):
+        gif.seek(index)
+        frames.append(np.asarray(gif.convert("RGB")))
+    return gif, frames
 
 
 @settings(max_examples=40)
@@ -42,32 +42,32 @@ def test_gray_frames_are_stored_exactly(count, width, height, seed):
         np.repeat(random.integers(0, top, (height, width, 1), dtype=np.uint8), 3, axis=2)
         for _ in range(count)
     ]
-    _, found = decode_frames(gif_bytes(frames, 25))
-    assert len(found) == count or all((a == frames[0]).all() for a in frames)
-    for one, other in zip(found, frames, strict=False):
-        assert np.array_equal(one, other)
+    _, actual = decode_frames(gif_bytes(frames, 25))
+    assert len(actual) == count or all((a == frames[0]).all() for a in frames)
+    for decoded, original in zip(actual, frames, strict=False):
+        assert np.array_equal(decoded, original)
 
 
 def test_the_table_of_codes_is_reset_when_full(tmp_path):
     """Past 4096 codes the table is begun anew."""
     noise = np.random.default_rng(0).integers(0, 256, (300, 400, 1), dtype=np.uint8)
-    ((_, (found,)),) = [decode_frames(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
-    assert np.array_equal(found[..., :1], noise)
+    ((_, (actual,)),) = [decode_frames(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
+    assert np.array_equal(actual[..., :1], noise)
     assert len(lzw_compress(bytes(100_000))) < 1500
 
 
 def test_dithered_colors_are_right_on_average():
     ramp = np.zeros((64, 64, 3), dtype=np.uint8)
     ramp[...] = (200, 90, 30)
-    _, (found,) = decode_frames(gif_bytes([ramp], 10))
-    assert np.abs(found.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
+    _, (actual,) = decode_frames(gif_bytes([ramp], 10))
+    assert np.abs(actual.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
     assert BAYER_MATRIX.shape == (4, 4) and np.prod(PALETTE_LEVELS) <= 256
 
 
 def test_rate_and_repetition():
     frames = [np.full((4, 4, 3), value, dtype=np.uint8) for value in (0, 90, 200)]
-    film, _ = decode_frames(gif_bytes(frames, 20))
-    assert film.info["duration"] == 50 and film.info["loop"] == 0
+    gif, _ = decode_frames(gif_bytes(frames, 20))
+    assert gif.info["duration"] == 50 and gif.info["loop"] == 0
 
 
 def test_the_object_stays_in_the_frame_in_all_views():
@@ -79,9 +79,11 @@ def test_the_object_stays_in_the_frame_in_all_views():
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
         rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
         assert rgba.shape == (60, 80, 4)
-        seen = rgba[..., 3] > 0
-        assert not (seen[0].any() or seen[-1].any() or seen[:, 0].any() or seen[:, -1].any())
-        covered.append(seen.mean())
+        visible = rgba[..., 3] > 0
+        assert not (
+            visible[0].any() or visible[-1].any() or visible[:, 0].any() or visible[:, -1].any()
+        )
+        covered.append(visible.mean())
     assert min(covered) > 0.1
 
 
@@ -91,9 +93,9 @@ def test_a_video_has_all_frames(tmp_path):
     path = tmp_path / "film.gif"
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
     assert run_to_completion(turntable_task(CpuRenderer(), views, 3, path, 12)) == path
-    film, found = decode_frames(path.read_bytes())
-    assert len(found) == 3 and film.size == (32, 32)
-    assert (found[0][0, 0] == 255).all(), "on white paper"
+    gif, actual = decode_frames(path.read_bytes())
+    assert len(actual) == 3 and gif.size == (32, 32)
+    assert (actual[0][0, 0] == 255).all(), "on white paper"
     with pytest.raises(RosyError, match=r"must end in .mp4 or .gif"):
         check_video_path(tmp_path / "film.avi")
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long, mainly
-from planar_fields import pair_angle, pixel_centres, swirl_angle
+from planar_fields import pair_angle, pixel_centers, swirl_angle
 from scipy import ndimage
 
 from rosy_addon.compositor.compose import compose_planar
@@ -53,7 +53,7 @@ def kernel_window(length, taper):
 
 def runge_kutta_lic(angle, noise, size, length, step, taper=False):
     """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
-    x, y = pixel_centres(size)
+    x, y = pixel_centers(size)
     start = x + 1j * y
 
     def direction(p):
@@ -89,31 +89,31 @@ def crop_margin(image, margin=50):
 
 @pytest.mark.parametrize("taper", [False, True])
 def test_one_direction_agrees_with_a_runge_kutta_integrator(taper):
-    x, y = pixel_centres(SIZE)
+    x, y = pixel_centers(SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
     look = plain(method="members", taper=taper)
-    found = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
-    assert correlation(crop_margin(found), crop_margin(expected)) > 0.99
+    actual = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
+    assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
 
 
 @pytest.mark.parametrize("taper", [False, True])
 def test_one_direction_resembles_another_library(taper):
     rlic = pytest.importorskip("rlic")
-    x, y = pixel_centres(SIZE)
+    x, y = pixel_centers(SIZE)
     angles = swirl_angle(x, y, SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     length = PLAIN.length
     expected = rlic.convolve(
         noise, np.cos(angles), np.sin(angles), kernel=kernel_window(length, taper), iterations=1
     )
-    found = tone(angles, 1, plain(taper=taper), noise=noise)
-    assert correlation(crop_margin(found), crop_margin(expected)) > 0.7
+    actual = tone(angles, 1, plain(taper=taper), noise=noise)
+    assert correlation(crop_margin(actual), crop_margin(expected)) > 0.7
 
 
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
 def test_the_decomposition_agrees_with_brute_force(degree):
-    angles = pair_angle(*pixel_centres(SIZE), SIZE, degree)
+    angles = pair_angle(*pixel_centers(SIZE), SIZE, degree)
     members = tone(angles, degree, plain(method="members"))
     brute = tone(angles, degree, plain(method="brute"))
     assert correlation(members, brute) > 0.98
@@ -123,11 +123,11 @@ def test_the_decomposition_agrees_with_brute_force(degree):
 @pytest.mark.parametrize("degree", range(1, 13))
 def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     size = 64
-    angles = pair_angle(*pixel_centres(size), size, degree)
-    turns = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
+    angles = pair_angle(*pixel_centers(size), size, degree)
+    rotation = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
     look = plain(method=method, length=10)
     # A float that rounds to the other side of a pixel's border moves one sample of twenty-one.
-    difference = np.abs(tone(angles, degree, look) - tone(angles + turns, degree, look))
+    difference = np.abs(tone(angles, degree, look) - tone(angles + rotation, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
 
 
@@ -139,8 +139,8 @@ def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
     angles = np.full((size, size), 0.2)
     layers = compose_planar(angles, degree, plain(method=method, **noise)).layers[0]
     inner = crop_margin(np.arange(size * size).reshape(size, size)).ravel()
-    one = np.mean([member[inner].std() for member in layers.images.members])
-    assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
+    member_std = np.mean([member[inner].std() for member in layers.images.members])
+    assert layers.tone[inner].std() == pytest.approx(member_std, rel=0.03)
     assert layers.tone[inner].mean() == pytest.approx(0.5, abs=0.01)
 
 
@@ -170,23 +170,23 @@ def test_the_blend_gain_of_seven_lines_includes_correlations():
 def test_the_standard_deviation_of_one_member_matches_theory(taper, grain, length, high_pass):
     size = 512
     look = plain(grain=grain, length=length, high_pass=high_pass, taper=taper)
-    spread = []
+    stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)
-        spread.append(crop_margin(image, length + 5).std())
-    assert np.mean(spread) == pytest.approx(expected_std(look), rel=0.05)
+        stds.append(crop_margin(image, length + 5).std())
+    assert np.mean(stds) == pytest.approx(expected_std(look), rel=0.05)
 
 
 def along_field_autocorrelation(image, angles, chosen, lag):
     """Correlation of pixels with the points `lag` pixels away along the first member."""
     row, column = np.nonzero(chosen)
     r, c = row + lag * np.sin(angles[chosen]), column + lag * np.cos(angles[chosen])
-    there = ndimage.map_coordinates(image, [r, c], order=1, mode="nearest")
-    return correlation(image[row, column], there)
+    shifted = ndimage.map_coordinates(image, [r, c], order=1, mode="nearest")
+    return correlation(image[row, column], shifted)
 
 
 @pytest.mark.parametrize(
-    "way",
+    "settings",
     [
         {"method": "members", "weights": "cosine"},
         {"method": "members", "weights": "binary"},
@@ -194,27 +194,29 @@ def along_field_autocorrelation(image, angles, chosen, lag):
     ],
 )
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_breaking_points_are_not_visible(degree, way):
+def test_breaking_points_are_not_visible(degree, settings):
     size, guides = 384, 4
-    x, _ = pixel_centres(size)
+    x, _ = pixel_centers(size)
     # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
     angles = 3 * 2 * np.pi / degree * x / size
-    spread, alike = np.zeros(2), np.zeros(2)
+    stds, similarity = np.zeros(2), np.zeros(2)
     # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
     for guide in np.arange(guides) * 2 * np.pi / degree / guides:
-        image = tone(angles, degree, plain(guiding_angle=guide, **way))
-        turn = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
+        image = tone(angles, degree, plain(guiding_angle=guide, **settings))
+        angle_offset = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
         inner = np.zeros_like(x, dtype=bool)
         inner[50:-50, 50:-50] = True
-        for place, chosen in enumerate((inner & (turn > 2.7), inner & (turn < 2.2))):
-            spread[place] += image[chosen].std()
-            alike[place] += along_field_autocorrelation(image, angles, chosen, 4)
-    assert spread[0] == pytest.approx(spread[1], rel=0.05)
-    assert alike[0] == pytest.approx(alike[1], rel=0.05)
+        for group, chosen in enumerate(
+            (inner & (angle_offset > 2.7), inner & (angle_offset < 2.2))
+        ):
+            stds[group] += image[chosen].std()
+            similarity[group] += along_field_autocorrelation(image, angles, chosen, 4)
+    assert stds[0] == pytest.approx(stds[1], rel=0.05)
+    assert similarity[0] == pytest.approx(similarity[1], rel=0.05)
 
 
 def test_breaking_points_are_visible_in_one_set_alone():
-    angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
+    angles = pair_angle(*pixel_centers(SIZE), SIZE, 4)
     brute = tone(angles, 4, plain(method="brute"))
     both = tone(angles, 4, plain(method="members"))
     one = tone(angles, 4, plain(method="members", weights="none"))
@@ -229,8 +231,8 @@ def test_short_streamlines_have_the_contrast_of_full_ones(method):
     angles[:, 100:112] = np.nan
     image = tone(angles, 1, look)
     # Ten pixels from a gap half of a streamline is missing.
-    beside, away = image[:, 112:122], image[:, 170:200]
-    assert beside.std() == pytest.approx(away.std(), rel=0.1)
+    near_gap, far_from_gap = image[:, 112:122], image[:, 170:200]
+    assert near_gap.std() == pytest.approx(far_from_gap.std(), rel=0.1)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -267,7 +269,7 @@ def test_magnitude_drives_the_length_of_streaks(method):
 
 
 def test_color_noise_has_three_channels():
-    angles = pair_angle(*pixel_centres(128), 128, 4)
+    angles = pair_angle(*pixel_centers(128), 128, 4)
     picture = compose_planar(angles, 4, plain(noise="colour"))
     channels = picture.layers[0].tone
     assert channels.shape == (128 * 128, 3)
@@ -277,7 +279,7 @@ def test_color_noise_has_three_channels():
 
 
 def test_the_same_settings_give_the_same_bytes():
-    angles = pair_angle(*pixel_centres(128), 128, 4)
+    angles = pair_angle(*pixel_centers(128), 128, 4)
     first, second = (compose_planar(angles, 4, Look()).rgba.tobytes() for _ in range(2))
     assert first == second
     assert compose_planar(angles, 4, Look(seed=1)).rgba.tobytes() != first
@@ -313,8 +315,8 @@ def test_the_spectrum_peaks_at_the_members(degree):
         peak = int(remaining.argmax())
         peaks.append(peak)
         remaining[np.arange(peak - 12, peak + 13) % bins] = 0
-    apart = np.abs((np.sort(peaks) - np.sort(expected) + bins // 2) % bins - bins // 2)
-    assert apart.max() <= 4  # 2 degrees
+    offset = np.abs((np.sort(peaks) - np.sort(expected) + bins // 2) % bins - bins // 2)
+    assert offset.max() <= 4  # 2 degrees
     assert remaining.max() < 0.2 * spectrum.max()
 
 

@@ -44,10 +44,10 @@ def project_surface(
 
 def with_other_members(surface, field, seed):
     """The same field with another member stored on each face."""
-    turns = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
-    angle = (2 * np.pi / field.degree * turns)[:, None]
-    across = np.cross(surface.face_normal, field.vectors)
-    return RosyField(field.degree, np.cos(angle) * field.vectors + np.sin(angle) * across)
+    member_index = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
+    angle = (2 * np.pi / field.degree * member_index)[:, None]
+    perpendicular = np.cross(surface.face_normal, field.vectors)
+    return RosyField(field.degree, np.cos(angle) * field.vectors + np.sin(angle) * perpendicular)
 
 
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 5, 6)])
@@ -65,11 +65,11 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
 def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     surface, look = torus(48, 24), plain(method=method)
     field = axis_field(surface, degree, (0.2, 0.3, 1.0))
-    one = compose(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
-    other = compose(
+    first = compose(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
+    second = compose(
         project_surface(surface, with_other_members(surface, field, 1), 96, (2, 1, 4), 3.2), look
     )
-    difference = np.abs(one.layers[0].tone - other.layers[0].tone)
+    difference = np.abs(first.layers[0].tone - second.layers[0].tone)
     assert np.mean(difference > 1e-5) < 0.005
 
 
@@ -98,7 +98,7 @@ def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
     tone = np.zeros(256 * 256)
     tone[gbuffer.pixel] = compose(gbuffer, PLAIN).layers[0].tone[:, 0] - 0.5
     power = np.abs(np.fft.fft2(tone.reshape(256, 256))) ** 2
-    alike = np.fft.fftshift(np.fft.ifft2(power).real)
+    autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
     on_screen = gbuffer.camera.view[:2, :3] @ direction
     expected = np.degrees(np.arctan2(on_screen[1], on_screen[0]))
     angles = np.arange(0, 180, 0.25)
@@ -107,8 +107,8 @@ def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
     y = 128 + lag * np.sin(np.radians(angles))
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - x0, y - y0
-    along = (alike[y0, x0] * (1 - fx) + alike[y0, x0 + 1] * fx) * (1 - fy)
-    along += (alike[y0 + 1, x0] * (1 - fx) + alike[y0 + 1, x0 + 1] * fx) * fy
+    along = (autocorrelation[y0, x0] * (1 - fx) + autocorrelation[y0, x0 + 1] * fx) * (1 - fy)
+    along += (autocorrelation[y0 + 1, x0] * (1 - fx) + autocorrelation[y0 + 1, x0 + 1] * fx) * fy
     assert angles[np.argmax(along)] == pytest.approx(expected % 180, abs=1.5)
 
 
@@ -137,8 +137,8 @@ def test_silhouettes_end_streamlines():
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
-    flow = surface_pixel_field(gbuffer, 1, 0.7, False)
-    linked = flow.neighbors[:, :-1].T
+    pixel_field = surface_pixel_field(gbuffer, 1, 0.7, False)
+    linked = pixel_field.neighbors[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
     # The tube is 0.8 across; at the two cusps, where a silhouette begins, a pixel can span half.
@@ -149,34 +149,34 @@ def test_silhouettes_end_streamlines():
 def test_supersampling_keeps_size_and_contrast_and_smooths_edges():
     sphere = icosphere(4)
     field = axis_field(sphere, 2, (0.2, 1, 0))
-    spread = {}
+    std = {}
     for s in (1, 2, 3):
         gbuffer = project_surface(sphere, field, 180 * s)
         picture = compose(gbuffer, plain(supersampling=s, gain=2.0))
         assert picture.rgba.shape == (180, 180, 4)
         y, x = np.mgrid[0:180, 0:180] - 89.5
         inner = np.hypot(x, y) < 45
-        spread[s] = to_display(picture.rgba[inner, 0]).std()
-        part = (picture.rgba[..., 3] > 0) & (picture.rgba[..., 3] < 1)
-        assert part.any() == (s > 1)
+        std[s] = to_display(picture.rgba[inner, 0]).std()
+        partly_covered = (picture.rgba[..., 3] > 0) & (picture.rgba[..., 3] < 1)
+        assert partly_covered.any() == (s > 1)
         assert np.isfinite(picture.rgba).all()
-    assert spread[2] == pytest.approx(spread[1], rel=0.08)
-    assert spread[3] == pytest.approx(spread[1], rel=0.08)
+    assert std[2] == pytest.approx(std[1], rel=0.08)
+    assert std[3] == pytest.approx(std[1], rel=0.08)
 
 
 def test_contrast_at_borders_is_that_of_the_center():
     sphere = icosphere(4)
     y, x = np.mgrid[0:256, 0:256] - 127.5
     radius = np.hypot(x, y) / (256 / 2.4)
-    rim, middle = [], []
+    rim, inner = [], []
     for seed in range(4):
         gbuffer = project_surface(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
         image = np.full(256 * 256, np.nan)
         image[gbuffer.pixel] = compose(gbuffer, plain(seed=seed)).layers[0].tone[:, 0]
         image = image.reshape(256, 256)
         rim.append(np.nanstd(image[(radius > 0.93) & (radius < 0.99)]))
-        middle.append(np.nanstd(image[radius < 0.5]))
-    assert np.mean(rim) == pytest.approx(np.mean(middle), rel=0.15)
+        inner.append(np.nanstd(image[radius < 0.5]))
+    assert np.mean(rim) == pytest.approx(np.mean(inner), rel=0.15)
 
 
 def test_undefined_faces_have_no_excess_contrast():
@@ -213,11 +213,11 @@ def test_lights_of_the_scene():
     assert np.allclose(diffuse(gbuffer, look, [sun]), np.sqrt(2), atol=1e-5)
     # A point two units above the middle of the plane: 1 / r^2 and the cosine.
     lamp = Light("point", np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.5, 0.0]), 4.0)
-    shown = diffuse(gbuffer, look, [lamp])
+    lighting = diffuse(gbuffer, look, [lamp])
     across = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1])
     expected = 4 / (4 + across**2) * 2 / np.sqrt(4 + across**2)
-    assert np.allclose(shown[:, 0], expected, atol=1e-4)
-    assert np.allclose(shown[:, 1], expected / 2, atol=1e-4)
+    assert np.allclose(lighting[:, 0], expected, atol=1e-4)
+    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4)
     assert not diffuse(gbuffer, look).any()
 
 
@@ -228,10 +228,10 @@ def test_magnitude_is_colored():
     gbuffer = project_surface(surface, field, 128)
     picture = compose(gbuffer, plain(magnitude="colour", magnitude_range=1.0, gain=0.0))
     x = gbuffer.position[:, 0]
-    found = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
+    actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
     expected = map_colors((x + 1) / 2, "viridis")
-    middle = np.abs(x) < 0.9
-    assert np.abs(found - expected)[middle].max() < 0.03
+    inner = np.abs(x) < 0.9
+    assert np.abs(actual - expected)[inner].max() < 0.03
 
 
 def test_display_curve_is_its_own_inverse():

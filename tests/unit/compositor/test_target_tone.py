@@ -45,8 +45,8 @@ def make_instance(surface, matrix=None, tone=None):
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
-def make_camera(size=SIZE, place=(0.0, -4.0, 1.2), at=(0.0, 0.0, 0.0), fov=0.56):
-    return perspective_camera(look_at(place, at), size, size, fov=fov)
+def make_camera(size=SIZE, position=(0.0, -4.0, 1.2), target=(0.0, 0.0, 0.0), fov=0.56):
+    return perspective_camera(look_at(position, target), size, size, fov=fov)
 
 
 def tone_from_vertices(surface, values):
@@ -74,12 +74,12 @@ def relative_lightness(rgba, look):
 def blurred(gbuffer, values, sigma=16):
     """(H, W) means over the pixels that see something, and which of them see hardly anything else."""
     size = gbuffer.camera.height, gbuffer.camera.width
-    seen = np.zeros(size[0] * size[1])
-    seen[gbuffer.pixel] = 1
-    seen = seen.reshape(size)
-    share = gaussian_filter(seen, sigma)
-    inner = share > 0.98
-    return gaussian_filter(np.where(seen > 0, values, 0), sigma)[inner] / share[inner]
+    visible = np.zeros(size[0] * size[1])
+    visible[gbuffer.pixel] = 1
+    visible = visible.reshape(size)
+    fraction = gaussian_filter(visible, sigma)
+    inner = fraction > 0.98
+    return gaussian_filter(np.where(visible > 0, values, 0), sigma)[inner] / fraction[inner]
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[2:3], HATCHED))
@@ -90,31 +90,35 @@ def test_presets_reproduce_a_ramp_on_the_surface(name):
     they have in common that is smaller still.
     """
     ramp = np.clip(BALL.vertices[:, 0] * 0.62 + 0.5, 0, 1)
-    thing = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
+    instance = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
     camera = make_camera()
-    gbuffer = project([thing], camera)
-    wanted = np.zeros(SIZE * SIZE)
-    wanted[gbuffer.pixel] = np.clip(world_positions(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
-    wanted = blurred(gbuffer, wanted.reshape(SIZE, SIZE))
-    assert wanted.min() < 0.15 and wanted.max() > 0.85
-    fine = project([thing], camera.scaled(PRESETS[name].supersampling))
-    off = []
+    gbuffer = project([instance], camera)
+    expected = np.zeros(SIZE * SIZE)
+    expected[gbuffer.pixel] = np.clip(world_positions(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
+    expected = blurred(gbuffer, expected.reshape(SIZE, SIZE))
+    assert expected.min() < 0.15 and expected.max() > 0.85
+    fine = project([instance], camera.scaled(PRESETS[name].supersampling))
+    errors = []
     for seed in range(3):
         look = replace(PRESETS[name], tone="attribute", seed=seed)
-        off.append(blurred(gbuffer, relative_lightness(compose(fine, look).rgba, look)) - wanted)
-    assert np.abs(off).mean() <= 0.04
-    assert abs(np.mean(off)) <= 0.02
+        errors.append(
+            blurred(gbuffer, relative_lightness(compose(fine, look).rgba, look)) - expected
+        )
+    assert np.abs(errors).mean() <= 0.04
+    assert abs(np.mean(errors)) <= 0.02
 
 
 def contrast(look, tone):
     """The deviation of what is on screen of a wall of one tone."""
     surface = plane(1, 1, 4.0)
-    own = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
-    thing = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), own)
+    surface_tone = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
+    instance = MeshInstance(
+        surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), surface_tone
+    )
     camera = camera_above(128, scale=3.0).scaled(look.supersampling)
-    rgba = compose(project([thing], camera), replace(look, tone="attribute")).rgba
-    left = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
-    return to_display(left).std()
+    rgba = compose(project([instance], camera), replace(look, tone="attribute")).rgba
+    luminance = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
+    return to_display(luminance).std()
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::4], HATCHED))
@@ -144,7 +148,7 @@ def test_corner_values_may_differ_between_faces():
     surface = plane(2, 1, 2.0)
     values = np.repeat([0.2, 0.9], 4)[:, None].astype(np.float32)
     gbuffer = project(
-        [make_instance(surface, tone=SurfaceTone(values))], make_camera(place=(0, -0.5, 5))
+        [make_instance(surface, tone=SurfaceTone(values))], make_camera(position=(0, -0.5, 5))
     )
     tones = surface_tones(gbuffer)
     np.testing.assert_allclose(tones, np.where(gbuffer.face == 0, 0.2, 0.9), atol=1e-6)
@@ -211,8 +215,8 @@ def test_black_above_white_inverts_tones():
 
 def test_equal_black_and_white_are_a_threshold():
     look = Look(tone_black=0.5, tone_white=0.5)
-    found = apply_tone_curve(np.array([0.2, 0.49, 0.51, 0.9], dtype=np.float32), look)
-    assert (found[:2] == 0).all() and (found[2:] >= 1).all()
+    actual = apply_tone_curve(np.array([0.2, 0.49, 0.51, 0.9], dtype=np.float32), look)
+    assert (actual[:2] == 0).all() and (actual[2:] >= 1).all()
 
 
 # --- images -----------------------------------------------------------------------------------------
@@ -240,8 +244,8 @@ def test_images_follow_the_uv_map():
 def test_images_are_interpolated():
     ramp = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
     tones = surface_tones(project([mapped_plane(ramp)], camera_above(128))).reshape(128, 128)
-    wanted = (np.arange(128) + 0.5) / 128
-    np.testing.assert_allclose(tones[:, 8:-8], np.tile(wanted[8:-8], (128, 1)), atol=1e-3)
+    expected = (np.arange(128) + 0.5) / 128
+    np.testing.assert_allclose(tones[:, 8:-8], np.tile(expected[8:-8], (128, 1)), atol=1e-3)
 
 
 def test_images_finer_than_the_picture_are_averaged():
@@ -271,44 +275,44 @@ def test_reference_renders_are_sampled_at_the_pixel(perspective):
     camera = make_camera(96)
     if not perspective:
         camera = orthographic_camera(look_at((0, -4, 1), (0, 0, 0)), 96, 96, scale=2.6)
-    shown = np.random.default_rng(4).random((96, 96)).astype(np.float32)
+    luminance = np.random.default_rng(4).random((96, 96)).astype(np.float32)
     gbuffer = project([make_instance(BALL)], camera)
-    found = ReferenceRender(shown, camera).sample(gbuffer)
-    np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
+    actual = ReferenceRender(luminance, camera).sample(gbuffer)
+    np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
     # Twice as fine: the mean of the four.
-    fine = np.repeat(np.repeat(shown, 2, axis=0), 2, axis=1)
-    found = ReferenceRender(fine, camera).sample(gbuffer)
-    np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
+    fine = np.repeat(np.repeat(luminance, 2, axis=0), 2, axis=1)
+    actual = ReferenceRender(fine, camera).sample(gbuffer)
+    np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
 
 
 def test_reference_renders_are_reprojected():
     """From elsewhere, the surface has the tone that the camera of the picture saw there."""
     camera = make_camera(256)
     gbuffer = project([make_instance(BALL)], camera)
-    shown = np.zeros(256 * 256, dtype=np.float32)
-    shown[gbuffer.pixel] = world_positions(gbuffer)[:, 2] * 0.5 + 0.5
-    rendered = ReferenceRender(shown.reshape(256, 256), camera)
-    other = project([make_instance(BALL)], make_camera(256, place=(1.5, -3.8, 0.6)))
+    luminance = np.zeros(256 * 256, dtype=np.float32)
+    luminance[gbuffer.pixel] = world_positions(gbuffer)[:, 2] * 0.5 + 0.5
+    rendered = ReferenceRender(luminance.reshape(256, 256), camera)
+    other = project([make_instance(BALL)], make_camera(256, position=(1.5, -3.8, 0.6)))
     point = world_positions(other)
-    seen = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
-    facing = -np.einsum("pi,pi->p", seen, point @ camera.view[:3, :3].T) > 0.8
-    found = rendered.sample(other)[facing]
-    np.testing.assert_allclose(found, point[facing, 2] * 0.5 + 0.5, atol=0.01)
+    in_reference_camera = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
+    facing = -np.einsum("pi,pi->p", in_reference_camera, point @ camera.view[:3, :3].T) > 0.8
+    actual = rendered.sample(other)[facing]
+    np.testing.assert_allclose(actual, point[facing, 2] * 0.5 + 0.5, atol=0.01)
 
 
 def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
-    said = error_of(
+    message = error_of(
         ReferenceRender, np.zeros((90, 160), dtype=np.float32), make_camera(64), "shot.png"
     )
-    assert "shot.png" in said and "160 x 90" in said and "64 x 64" in said
+    assert "shot.png" in message and "160 x 90" in message and "64 x 64" in message
 
 
 # --- shadows ------------------------------------------------------------------------------------------
 
 
-def point_light(camera, place, strength=1.0):
+def point_light(camera, position, strength=1.0):
     """A point, in the space of a camera."""
-    vector = camera.view[:3, :3] @ np.asarray(place, dtype=float) + camera.view[:3, 3]
+    vector = camera.view[:3, :3] @ np.asarray(position, dtype=float) + camera.view[:3, 3]
     return Light("point", vector, np.ones(3), strength)
 
 
@@ -318,12 +322,14 @@ def sun_light(camera, direction, strength=1.0):
     return Light("sun", direction, np.ones(3), strength)
 
 
-def clearance_from_ball(points, toward, centre, radius, most=np.inf):
+def clearance_from_ball(points, toward, center, radius, max_distance=np.inf):
     """By how much rays from points pass inside a ball (below 0) or outside; `toward` is unit."""
-    way = centre - points
-    along = np.einsum("pi,pi->p", way, toward)
-    beside = np.sqrt(np.maximum(np.einsum("pi,pi->p", way, way) - along**2, 0)) - radius
-    return np.where((along > 0) & (along < most), beside, np.inf)
+    to_center = center - points
+    along = np.einsum("pi,pi->p", to_center, toward)
+    clearance = (
+        np.sqrt(np.maximum(np.einsum("pi,pi->p", to_center, to_center) - along**2, 0)) - radius
+    )
+    return np.where((along > 0) & (along < max_distance), clearance, np.inf)
 
 
 LIGHTS = {
@@ -342,46 +348,48 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
         make_instance(plane(8, 8, 8.0)),
         make_instance(icosphere(6), moved_and_scaled(0, 0, 1.0, 0.8)),
     )
-    camera = make_camera(256, place=(3, -6, 4), at=(0, 0, 0.6), fov=0.7)
+    camera = make_camera(256, position=(3, -6, 4), target=(0, 0, 0.6), fov=0.7)
     light = (sun_light if kind == "sun" else point_light)(camera, where)
     gbuffer = project([ground, ball], camera)
-    share = shadow_visibility(gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector))
+    visibility = shadow_visibility(
+        gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
+    )
     on_ground = gbuffer.instance_id == 0
     point = world_positions(gbuffer)[on_ground].astype(float)
     if kind == "sun":
         toward = np.broadcast_to(np.divide(where, np.linalg.norm(where)), point.shape)
-        reach = np.inf
+        light_distance = np.inf
     else:
-        way = where - point
-        reach = np.linalg.norm(way, axis=1)
-        toward = way / reach[:, None]
-    beside = clearance_from_ball(point, toward, np.array([0, 0, 1.0]), 0.8, reach)
-    sure = np.abs(beside) > 0.04
-    assert sure.mean() > 0.9 and (beside < 0).mean() > 0.02
-    np.testing.assert_allclose(share[on_ground][sure], (beside > 0)[sure], atol=1e-6)
+        to_light = where - point
+        light_distance = np.linalg.norm(to_light, axis=1)
+        toward = to_light / light_distance[:, None]
+    clearance = clearance_from_ball(point, toward, np.array([0, 0, 1.0]), 0.8, light_distance)
+    certain = np.abs(clearance) > 0.04
+    assert certain.mean() > 0.9 and (clearance < 0).mean() > 0.02
+    np.testing.assert_allclose(visibility[on_ground][certain], (clearance > 0)[certain], atol=1e-6)
     # On the border of what is lit there is everything from 0 to 1.
-    assert ((share > 0.1) & (share < 0.9)).any()
+    assert ((visibility > 0.1) & (visibility < 0.9)).any()
 
 
 @pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
 def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
     kind, where = LIGHTS[name]
     for surface in (icosphere(3), BALL, plane(3, 3, 2.0)):
-        camera = make_camera(256, place=(1.0, -4, 1.8))
+        camera = make_camera(256, position=(1.0, -4, 1.8))
         gbuffer = project([make_instance(surface)], camera)
         light = (sun_light if kind == "sun" else point_light)(camera, where)
-        share = shadow_visibility(
+        visibility = shadow_visibility(
             gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
         )
-        way = light.vector - gbuffer.position if kind == "point" else light.vector
-        way = way / np.linalg.norm(way, axis=-1, keepdims=True)
+        to_light = light.vector - gbuffer.position if kind == "point" else light.vector
+        to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
         # The triangles themselves: a smooth normal may face what they do not.
         facing = np.einsum(
-            "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(way, gbuffer.normal.shape)
+            "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(to_light, gbuffer.normal.shape)
         )
-        assert (share[facing > 0.05] == 1).mean() > 0.999
+        assert (visibility[facing > 0.05] == 1).mean() > 0.999
         if surface is BALL:
-            assert share[facing < -0.3].max() < 1e-6
+            assert visibility[facing < -0.3].max() < 1e-6
 
 
 def test_instances_without_a_field_cast_shadows():
@@ -412,15 +420,15 @@ def rays_hit_triangles(origin, direction, corners):
     a, b, c = corners.transpose(1, 0, 2)
     p = np.cross(direction, c - a)
     divisor = np.einsum("ti,ti->t", b - a, p)
-    met = np.zeros(len(origin), dtype=bool)
+    hit = np.zeros(len(origin), dtype=bool)
     for start in range(0, len(origin), 512):
-        way = origin[start : start + 512, None] - a
-        u = np.einsum("nti,ti->nt", way, p) / divisor
-        q = np.cross(way, b - a)
+        offset = origin[start : start + 512, None] - a
+        u = np.einsum("nti,ti->nt", offset, p) / divisor
+        q = np.cross(offset, b - a)
         v = q @ direction / divisor
         t = np.einsum("nti,ti->nt", q, c - a) / divisor
-        met[start : start + 512] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any(axis=1)
-    return met
+        hit[start : start + 512] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any(axis=1)
+    return hit
 
 
 def test_shadows_match_ray_casting():
@@ -432,20 +440,20 @@ def test_shadows_match_ray_casting():
     points = np.stack([out * np.cos(u), -0.35 * np.sin(v), out * np.sin(u)], axis=1)
     ring = from_quads(points, quads, name="ring")
     instances = [make_instance(plane(2, 2, 6.0), moved_and_scaled(0, 0, -1.5)), make_instance(ring)]
-    camera = make_camera(128, place=(2.5, -6, 2.5), at=(0, 0, -0.4), fov=0.75)
+    camera = make_camera(128, position=(2.5, -6, 2.5), target=(0, 0, -0.4), fov=0.75)
     gbuffer = project(instances, camera)
     assert gbuffer.front_facing.all()
     direction = np.array([0.6, 0.3, 0.7]) / np.linalg.norm([0.6, 0.3, 0.7])
     light = sun_light(camera, direction)
-    share = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
+    visibility = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
     origin = (
         world_positions(gbuffer).astype(float)
         + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
     )
-    met = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
-    assert 0.1 < met.mean() < 0.7
+    hit = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
+    assert 0.1 < hit.mean() < 0.7
     # Light that grazes gives none, and borders are soft.
-    sure = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
-    sure &= (share < 0.01) | (share > 0.99)
-    assert sure.mean() > 0.9
-    assert ((share > 0.5) == ~met)[sure].mean() > 0.995
+    certain = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
+    certain &= (visibility < 0.01) | (visibility > 0.99)
+    assert certain.mean() > 0.9
+    assert ((visibility > 0.5) == ~hit)[certain].mean() > 0.995

@@ -23,10 +23,10 @@ def distances_to_all_triangles(surface, points):
 def test_the_result_matches_an_exhaustive_search(surface, far):
     points = np.random.default_rng(1).standard_normal((200, 3)) * far + (0.9, 0.1, 0.2)
     triangle, distance = closest_triangles(surface, points)
-    every = distances_to_all_triangles(surface, points)
-    assert np.allclose(distance, every.min(axis=1))
-    assert np.array_equal(triangle, np.argmin(every, axis=1)) or np.allclose(
-        every[np.arange(200), triangle], distance
+    distances = distances_to_all_triangles(surface, points)
+    assert np.allclose(distance, distances.min(axis=1))
+    assert np.array_equal(triangle, np.argmin(distances, axis=1)) or np.allclose(
+        distances[np.arange(200), triangle], distance
     )
 
 
@@ -53,7 +53,7 @@ def test_distances_match_dense_samples_of_the_triangle(numbers):
         corners[0] + u[:, None] * (corners[1] - corners[0]) + v[:, None] * (corners[2] - corners[0])
     )
     nearest = np.linalg.norm(net - point, axis=1).min()
-    found = point_triangle_distances(point[None], corners[None])[0]
+    actual = point_triangle_distances(point[None], corners[None])[0]
     size = np.abs(corners - corners[0]).max()
-    assert found <= nearest + 1e-9
-    assert found >= nearest - size / 10
+    assert actual <= nearest + 1e-9
+    assert actual >= nearest - size / 10

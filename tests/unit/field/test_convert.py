@@ -25,8 +25,8 @@ BALL = icosphere(3)
 def with_random_members(surface, field, seed=0):
     """The same RoSys, another member of each stored."""
     random = np.random.default_rng(seed)
-    number = random.integers(0, field.degree, surface.face_count)
-    return rotate_field(surface, field, 2 * np.pi * number / field.degree)
+    member_index = random.integers(0, field.degree, surface.face_count)
+    return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
 
 
 # --- degrees -------------------------------------------------------------------------------------
@@ -35,13 +35,13 @@ def with_random_members(surface, field, seed=0):
 @pytest.mark.parametrize(("degree", "multiple"), [(1, 6), (2, 4), (3, 12), (4, 4)])
 def test_a_multiple_has_the_member_and_the_power_of_z(degree, multiple):
     field = axis_field(BALL, degree, (0.2, 0.1, 1.0))
-    more = change_degree(BALL, field, multiple)
-    assert more.degree == multiple
+    converted = change_degree(BALL, field, multiple)
+    assert converted.degree == multiple
     z = power(
         face_representation(BALL, RosyField(degree, normalize(field.vectors))), multiple // degree
     )
-    wanted = z * field.magnitude
-    np.testing.assert_allclose(face_representation(BALL, more), wanted, atol=1e-9)
+    expected = z * field.magnitude
+    np.testing.assert_allclose(face_representation(BALL, converted), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("degree", "divisor"), [(4, 2), (4, 1), (6, 2), (6, 3), (12, 1)])
@@ -53,22 +53,22 @@ def test_a_divisor_is_consistent_without_singularities(degree, divisor):
     line = RosyField(
         divisor, normalize(around - dot(around, surface.face_normal)[:, None] * surface.face_normal)
     )
-    less = change_degree(
+    converted = change_degree(
         surface, with_random_members(surface, RosyField(degree, line.vectors)), divisor
     )
-    assert less.degree == divisor
+    assert converted.degree == divisor
     # One of the fields that the members make up, the same everywhere.
-    turn = face_representation(surface, less) * face_representation(surface, line).conj()
-    np.testing.assert_allclose(turn, turn[0], atol=1e-6)
-    np.testing.assert_allclose(turn[0] ** (degree // divisor), 1, atol=1e-6)
+    ratio = face_representation(surface, converted) * face_representation(surface, line).conj()
+    np.testing.assert_allclose(ratio, ratio[0], atol=1e-6)
+    np.testing.assert_allclose(ratio[0] ** (degree // divisor), 1, atol=1e-6)
 
 
 def test_a_divisor_has_seams_between_singularities():
     field = generate(BALL, "smoothest", 4)
-    less = change_degree(BALL, with_random_members(BALL, field), 1)
-    _, slip = field_matching(BALL, RosyField(4, less.vectors))
-    seam = slip != 0
-    assert 0 < seam.sum() < 0.2 * len(slip)
+    converted = change_degree(BALL, with_random_members(BALL, field), 1)
+    _, matching = field_matching(BALL, RosyField(4, converted.vectors))
+    seam = matching != 0
+    assert 0 < seam.sum() < 0.2 * len(matching)
     # Eight singularities of index 1/4: around each an odd seam comes to an end.
     assert len(find_singularities(BALL, field)[0]) == 8
 
@@ -88,8 +88,8 @@ def test_rotation_multiplies_z(degree, angle):
     surface = plane(3, 3)
     field = axis_field(surface, degree, (1.0, 0.5, 0.3))
     z = face_representation(surface, rotate_field(surface, field, angle))
-    wanted = face_representation(surface, field) * np.exp(1j * degree * angle)
-    np.testing.assert_allclose(z, wanted, atol=1e-9)
+    expected = face_representation(surface, field) * np.exp(1j * degree * angle)
+    np.testing.assert_allclose(z, expected, atol=1e-9)
 
 
 # --- diffusion -----------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ def test_diffusion_against_scipy(degree):
     field = with_random_members(BALL, axis_field(BALL, degree, (0.3, 0.2, 1.0)))
     noise = np.random.default_rng(0).normal(0, 0.4, BALL.face_count)
     field = rotate_field(BALL, field, noise)
-    found = diffuse_field(BALL, field, 0.02)
+    actual = diffuse_field(BALL, field, 0.02)
     # The same step, put together and solved by others.
     connection = build_connection(BALL)
     rows = laplacian(connection, degree)
@@ -109,14 +109,20 @@ def test_diffusion_against_scipy(degree):
     triangles = BALL.triangle_vertex
     corner = np.roll(BALL.vertices[triangles], -1, axis=1) - BALL.vertices[triangles]
     direction = np.arctan2(dot(corner, y[:, None]), dot(corner, x[:, None])).ravel()
-    turn = direction + connection.corner_angle / 2 - connection.bisector_direction
-    share = np.repeat(connection.area / 3, 3)
-    on_corner = np.repeat(face_representation(BALL, field), 3) * np.exp(-1j * degree * turn) * share
-    right = np.zeros(connection.node_count, dtype=complex)
-    np.add.at(right, connection.corner_node, on_corner)
-    z = spsolve((diags(connection.mass) + 0.02 * matrix).tocsc(), right)
-    wanted = (z[connection.corner_node] * np.exp(1j * degree * turn)).reshape(-1, 3).mean(axis=1)
-    np.testing.assert_allclose(face_representation(BALL, found), wanted, atol=1e-7)
+    frame_angle = direction + connection.corner_angle / 2 - connection.bisector_direction
+    corner_area = np.repeat(connection.area / 3, 3)
+    corner_z = (
+        np.repeat(face_representation(BALL, field), 3)
+        * np.exp(-1j * degree * frame_angle)
+        * corner_area
+    )
+    rhs = np.zeros(connection.node_count, dtype=complex)
+    np.add.at(rhs, connection.corner_node, corner_z)
+    z = spsolve((diags(connection.mass) + 0.02 * matrix).tocsc(), rhs)
+    expected = (
+        (z[connection.corner_node] * np.exp(1j * degree * frame_angle)).reshape(-1, 3).mean(axis=1)
+    )
+    np.testing.assert_allclose(face_representation(BALL, actual), expected, atol=1e-7)
 
 
 def test_diffusion_removes_noise_and_keeps_constant_fields():
@@ -126,10 +132,10 @@ def test_diffusion_removes_noise_and_keeps_constant_fields():
     np.testing.assert_allclose(face_representation(surface, same), 1, atol=1e-7)
     noise = np.random.default_rng(0).normal(0, 0.2, surface.face_count)
     rough = rotate_field(surface, straight, noise)
-    calm = diffuse_field(surface, rough, 0.05)
-    off = np.abs(np.angle(face_representation(surface, calm))) / 4
-    assert np.sqrt(np.mean(off**2)) < 0.25 * 0.2
-    assert calm.magnitude.mean() < 0.9
+    smooth = diffuse_field(surface, rough, 0.05)
+    error = np.abs(np.angle(face_representation(surface, smooth))) / 4
+    assert np.sqrt(np.mean(error**2)) < 0.25 * 0.2
+    assert smooth.magnitude.mean() < 0.9
 
 
 def test_the_diffusion_time_must_be_positive(error_of):
@@ -145,8 +151,8 @@ def test_magnitudes_keep_directions_and_undefined_faces():
     vectors = np.array(axis_field(BALL, 4).vectors)
     vectors[::7] = 0
     field = with_magnitude(RosyField(4, vectors), np.arange(BALL.face_count))
-    wanted = np.arange(BALL.face_count) * vectors.any(axis=1)
-    np.testing.assert_allclose(field.magnitude, wanted)
+    expected = np.arange(BALL.face_count) * vectors.any(axis=1)
+    np.testing.assert_allclose(field.magnitude, expected)
     np.testing.assert_allclose(
         dot(normalize(field.vectors), normalize(vectors))[field.magnitude > 0], 1
     )

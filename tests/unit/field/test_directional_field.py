@@ -82,14 +82,14 @@ def test_directions_are_restored_from_the_field(degree, seed):
     surface = icosphere(1)
     random = np.random.default_rng(seed)
     angles, lengths = 6.28 * random.random(degree), 0.2 + random.random(degree)
-    given_ones = directions_at_angles(surface, angles, lengths)
-    field = field_from_directions(surface, given_ones)
-    found = field_directions(surface, field)
+    directions = directions_at_angles(surface, angles, lengths)
+    field = field_from_directions(surface, directions)
+    actual = field_directions(surface, field)
     order = np.argsort((angles - angles[0]) % (2 * np.pi))
-    assert np.allclose(found, given_ones[:, order], atol=1e-9)
+    assert np.allclose(actual, directions[:, order], atol=1e-9)
     if field.direction_ratios is not None:
-        again = ratios_from_harmonics(field_harmonics(field), degree)
-        assert np.abs(again - field.direction_ratios).max() < 1e-3
+        restored = ratios_from_harmonics(field_harmonics(field), degree)
+        assert np.abs(restored - field.direction_ratios).max() < 1e-3
 
 
 def test_the_representation_is_the_product_of_the_directions():
@@ -122,14 +122,14 @@ def test_opposite_directions_are_detected():
 def test_directions_on_vertices_are_averaged_onto_faces():
     surface = plane(6, 6)
     angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
-    here = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
-    given_ones = np.tile(here, (len(surface.vertices), 1, 1))
+    directions = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
+    vertex_directions = np.tile(directions, (len(surface.vertices), 1, 1))
     # Whichever is listed first.
-    for vertex in range(len(given_ones)):
-        given_ones[vertex] = np.roll(given_ones[vertex], vertex, axis=0)
-    field = validated_directions(surface, given_ones, "test", domain="vertex")
-    for found in field_directions(surface, field):
-        nearest = np.abs(found[:, None] - here).max(axis=2).min(axis=1)
+    for vertex in range(len(vertex_directions)):
+        vertex_directions[vertex] = np.roll(vertex_directions[vertex], vertex, axis=0)
+    field = validated_directions(surface, vertex_directions, "test", domain="vertex")
+    for actual in field_directions(surface, field):
+        nearest = np.abs(actual[:, None] - directions).max(axis=2).min(axis=1)
         assert nearest.max() < 1e-9
 
 
@@ -139,12 +139,12 @@ def test_directions_on_vertices_are_averaged_onto_faces():
 def test_matching_follows_the_stored_members():
     surface = plane(5, 5)
     random = np.random.default_rng(3)
-    number = random.integers(0, 4, surface.face_count)
+    member_index = random.integers(0, 4, surface.face_count)
     vectors = rotate(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
-    angle = number * np.pi / 2
+    angle = member_index * np.pi / 2
     vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    faces, slip = field_matching(surface, RosyField(4, vectors))
-    assert np.array_equal(slip, (number[faces[:, 0]] - number[faces[:, 1]]) % 4)
+    faces, matching = field_matching(surface, RosyField(4, vectors))
+    assert np.array_equal(matching, (member_index[faces[:, 0]] - member_index[faces[:, 1]]) % 4)
 
 
 def test_eigenvectors_of_a_tensor():
@@ -167,10 +167,10 @@ def test_eigenvectors_of_a_tensor():
 def test_families_need_a_consistent_order_of_directions():
     surface = plane(8, 8)
     angles, lengths = (0.0, 1.0, np.pi, np.pi + 1.0), (1, 1, 1, 1)
-    given_ones = directions_at_angles(surface, angles, lengths)
-    assert field_from_directions(surface, given_ones).family_count == 2
-    given_ones[::2] = np.roll(given_ones[::2], 1, axis=1)
-    assert field_from_directions(surface, given_ones).family_count == 1
+    directions = directions_at_angles(surface, angles, lengths)
+    assert field_from_directions(surface, directions).family_count == 2
+    directions[::2] = np.roll(directions[::2], 1, axis=1)
+    assert field_from_directions(surface, directions).family_count == 1
 
 
 # --- drawing -------------------------------------------------------------------------------------
@@ -199,10 +199,10 @@ def test_streaks_run_along_free_directions(method, angles):
         project_from_above(surface, field, 256), WEAVE.with_settings({"method": method})
     )
     tone = picture.layers[0].tone.reshape(256, 256)[32:-32, 32:-32]
-    found = np.array(peaks(orientation_spectrum(tone)))
-    wanted = np.unique(np.mod(angles, 180))
-    assert len(found) == len(wanted)
-    assert np.abs((found - wanted + 90) % 180 - 90).max() < 2
+    actual = np.array(peaks(orientation_spectrum(tone)))
+    expected = np.unique(np.mod(angles, 180))
+    assert len(actual) == len(expected)
+    assert np.abs((actual - expected + 90) % 180 - 90).max() < 2
 
 
 @pytest.mark.slow
@@ -216,9 +216,9 @@ def test_a_conjugate_field_of_another_library(method, shared_data):
         and field.direction_ratios is not None
     )
     for face in nearly_constant_faces(surface, field, 10):
-        found, wanted = drawn_and_stored_angles(surface, field, face, method)
-        assert len(found) == len(wanted), face
-        assert np.abs((found - wanted + 90) % 180 - 90).max() < 2, face
+        actual, expected = drawn_and_stored_angles(surface, field, face, method)
+        assert len(actual) == len(expected), face
+        assert np.abs((actual - expected + 90) % 180 - 90).max() < 2, face
 
 
 def nearly_constant_faces(surface, field, count):
@@ -226,27 +226,29 @@ def nearly_constant_faces(surface, field, count):
     from rosy_addon.field.surface import build_edges
 
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    one, other = surface.corner_face[edges.halfedges].T
+    first, second = surface.corner_face[edges.halfedges].T
     stored = normalize(field_directions(surface, field))
-    across = np.abs(np.einsum("ika,ila->ikl", stored[one], stored[other])).max(axis=2).min(axis=1)
-    turn = np.degrees(np.arccos(np.minimum(across, 1)))
+    cosine = (
+        np.abs(np.einsum("ika,ila->ikl", stored[first], stored[second])).max(axis=2).min(axis=1)
+    )
+    change = np.degrees(np.arccos(np.minimum(cosine, 1)))
     worst = np.zeros(surface.face_count)
-    np.maximum.at(worst, one, turn)
-    np.maximum.at(worst, other, turn)
-    between = np.degrees(np.arccos(np.clip(np.abs(dot(stored[:, 0], stored[:, 1])), 0, 1)))
-    calm = np.flatnonzero((worst < 1.5) & (between > 25))
-    assert len(calm) >= count
-    return np.random.default_rng(4).choice(calm, count, replace=False)
+    np.maximum.at(worst, first, change)
+    np.maximum.at(worst, second, change)
+    line_angle = np.degrees(np.arccos(np.clip(np.abs(dot(stored[:, 0], stored[:, 1])), 0, 1)))
+    selected = np.flatnonzero((worst < 1.5) & (line_angle > 25))
+    assert len(selected) >= count
+    return np.random.default_rng(4).choice(selected, count, replace=False)
 
 
 def drawn_and_stored_angles(surface, field, face, method):
     """Orientations, in degrees, of the streaks on a face and of its stored vectors, as projected."""
     normal = surface.face_normal[face]
-    centre = surface.face_center[face]
+    center = surface.face_center[face]
     x, _ = face_frames(surface)
     back = normalize(normal + 0.4 * x[face])  # not straight from above
     size = np.ptp(surface.vertices[surface.corner_vertex[3 * face : 3 * face + 3]], axis=0).max()
-    view = look_at(centre + 10 * back, centre)
+    view = look_at(center + 10 * back, center)
     camera = orthographic_camera(view, 320, 320, scale=1.2 * size, clip=(0.1, 20))
     instance = MeshInstance(surface, np.eye(4), field)
     look = WEAVE.with_settings({"method": method})
@@ -255,12 +257,12 @@ def drawn_and_stored_angles(surface, field, face, method):
     frame[picture.layers[0].pixel] = picture.layers[0].tone[:, 0]
     tone = frame.reshape(320, 320)[96:-96, 96:-96]
     assert np.isfinite(tone).all()
-    found = np.array(peaks(orientation_spectrum(tone)))
+    actual = np.array(peaks(orientation_spectrum(tone)))
     screen = field_directions(surface, field)[face] @ view[:3, :3].T
-    wanted = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
+    expected = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
     # The two of each pair differ by rounding.
-    wanted = np.sort(wanted[:2])
-    return found, wanted
+    expected = np.sort(expected[:2])
+    return actual, expected
 
 
 # --- hues ----------------------------------------------------------------------------------------
@@ -270,30 +272,32 @@ def test_family_hues_keep_the_brightness():
     surface = plane(7, 7, 2.2)
     tensor = np.diag([3.0, -1.0, 0.0])
     field = tensor_field(surface, np.tile(tensor, (surface.face_count, 1, 1)))
-    seen = project_from_above(surface, field, 256)
-    grey = compose(seen, WEAVE).rgba[..., :3]
-    hues = compose(seen, WEAVE.with_settings({"hue": "families"}))
+    gbuffer = project_from_above(surface, field, 256)
+    grey = compose(gbuffer, WEAVE).rgba[..., :3]
+    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"}))
     luminance = [
-        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, hues.rgba[..., :3])
+        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, colored.rgba[..., :3])
     ]
     # Equation 6 for the grey picture; the hues leave it as it is.
     relative = [image.std() / image.mean() for image in luminance]
     assert 0.7 < relative[1] / relative[0] < 1.1
     assert np.corrcoef(luminance[0].ravel(), luminance[1].ravel())[0, 1] > 0.97
     # The major direction runs along x: its streaks are orange, those along y blue.
-    warm = (hues.rgba[..., 0] - hues.rgba[..., 2]).astype(float)
-    orange, blue = np.clip(warm, 0, None), np.clip(-warm, 0, None)
-    along = [peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)]
-    assert np.abs((np.array(along[0]) + 90) % 180 - 90).max() < 3
-    assert np.abs(np.array(along[1]) - 90).max() < 3
+    orange_minus_blue = (colored.rgba[..., 0] - colored.rgba[..., 2]).astype(float)
+    orange, blue = np.clip(orange_minus_blue, 0, None), np.clip(-orange_minus_blue, 0, None)
+    directions = [
+        peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)
+    ]
+    assert np.abs((np.array(directions[0]) + 90) % 180 - 90).max() < 3
+    assert np.abs(np.array(directions[1]) - 90).max() < 3
     # As much of the one as of the other, and clearly coloured.
-    shares = [np.mean(warm > 0.05), np.mean(warm < -0.05)]
-    assert min(shares) > 0.3
+    fractions = [np.mean(orange_minus_blue > 0.05), np.mean(orange_minus_blue < -0.05)]
+    assert min(fractions) > 0.3
 
 
 def test_a_single_family_is_gray():
     surface = plane(7, 7, 2.2)
     field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
-    seen = project_from_above(surface, field, 64)
-    colours = compose(seen, WEAVE.with_settings({"hue": "families"})).rgba
-    assert np.array_equal(colours, compose(seen, WEAVE).rgba)
+    gbuffer = project_from_above(surface, field, 64)
+    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"})).rgba
+    assert np.array_equal(colored, compose(gbuffer, WEAVE).rgba)

@@ -29,11 +29,11 @@ def free_directions(degree, seed=0):
     """(F, N, 3) on the ball, no RoSy."""
     random = np.random.default_rng(seed)
     field = axis_field(BALL, 1, (0.1, 0.2, 1.0))
-    across = np.cross(BALL.face_normal, field.vectors)
+    perpendicular = np.cross(BALL.face_normal, field.vectors)
     angle = np.sort(random.random(degree)) * 2 * np.pi
     length = 0.5 + random.random((BALL.face_count, degree))
-    turn = (np.exp(1j * angle) * length)[..., None]
-    return turn.real * field.vectors[:, None] + turn.imag * across[:, None]
+    factor = (np.exp(1j * angle) * length)[..., None]
+    return factor.real * field.vectors[:, None] + factor.imag * perpendicular[:, None]
 
 
 def write_off(path, surface):
@@ -79,13 +79,13 @@ def test_files_of_other_programs_round_trip_exactly(name, ending, shared_data, t
     surface = read_mesh(shared_data / "meshes" / f"{name.partition('-')[0]}.off")
     source = shared_data / "fields" / f"{name}.rawfield"
     write_field(tmp_path / f"a{ending}", read_field(source, surface), surface)
-    wanted = np.array(source.read_text().split(), dtype=float)[2:]
+    expected = np.array(source.read_text().split(), dtype=float)[2:]
     if ending == ".npy":
-        found = np.load(tmp_path / "a.npy").ravel()
+        actual = np.load(tmp_path / "a.npy").ravel()
     else:
         words = (tmp_path / f"a{ending}").read_text().split()
-        found = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
-    assert np.array_equal(found, wanted)
+        actual = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
+    assert np.array_equal(actual, expected)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -100,10 +100,10 @@ def test_fieldgen_files_hold_the_mesh_and_a_field_on_vertices(degree, tmp_path):
     assert np.array_equal(mesh.corner_vertex, surface.corner_vertex)
     again = read_field(path, mesh)
     assert again.degree == degree
-    z, wanted = face_representation(surface, again), face_representation(surface, field)
-    away = np.abs(surface.face_center[:, 2]) < 0.9  # of the poles, where it is singular
-    off = np.abs(np.angle(z[away] * wanted[away].conj())) / degree
-    assert np.degrees(off).max() < 1
+    z, expected = face_representation(surface, again), face_representation(surface, field)
+    away_from_poles = np.abs(surface.face_center[:, 2]) < 0.9  # of the poles, where it is singular
+    error = np.abs(np.angle(z[away_from_poles] * expected[away_from_poles].conj())) / degree
+    assert np.degrees(error).max() < 1
 
 
 def test_the_comment_header_of_fieldgen_is_ignored(tmp_path, error_of):
@@ -123,8 +123,10 @@ def test_singularities_round_trip(tmp_path, error_of):
     field = curvature_field(BALL, 4)
     write_field(tmp_path / "a.sings", field, BALL)
     degree, vertex, index = read_sings(tmp_path / "a.sings")
-    wanted = find_singularities(BALL, field)
-    assert degree == 4 and np.array_equal(vertex, wanted[0]) and np.array_equal(index, wanted[1])
+    expected = find_singularities(BALL, field)
+    assert (
+        degree == 4 and np.array_equal(vertex, expected[0]) and np.array_equal(index, expected[1])
+    )
     assert "contains singularities" in error_of(read_field, tmp_path / "a.sings", surface)
     (tmp_path / "b.sings").write_text("4 3\n1 1\n2 1\n")
     assert "declares 3 singularities, but contains 2" in error_of(read_sings, tmp_path / "b.sings")
@@ -155,19 +157,19 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    text, wanted = DAMAGED[name]
+    text, expected = DAMAGED[name]
     (tmp_path / name).write_text(text)
     message = error_of(read_field, tmp_path / name, BALL)
-    assert wanted in message and str(tmp_path / name) in message and "\n" not in message
+    assert expected in message and str(tmp_path / name) in message and "\n" not in message
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([".obj", ".txt", ".npy"]))
-def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, place, ending):
+def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):
     path = tmp_path / f"damaged{ending}"
     write_field(path, axis_field(BALL, 4), BALL)
     data = path.read_bytes()
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_field(path, BALL)
     except RosyError as error:
@@ -196,11 +198,11 @@ def test_a_field_is_transferred_by_position_with_a_note(degree, tmp_path):
     write_field(tmp_path / "a.rosy", field, quads)
     again, note = load_field(tmp_path / "a.rosy", triangles)
     assert "transferred by position from a.off" in note and "1,152" in note and "2,304" in note
-    wanted = axis_field(triangles, degree, (0.0, 0.0, 1.0))
-    z, right = (face_representation(triangles, one) for one in (again, wanted))
-    certain = wanted.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
-    assert np.degrees(np.abs(np.angle(z * right.conj()))[certain]).max() / degree < 8
-    assert np.median(np.abs(np.angle(z * right.conj()))[certain]) / degree < np.radians(1)
+    expected = axis_field(triangles, degree, (0.0, 0.0, 1.0))
+    z, expected_z = (face_representation(triangles, f) for f in (again, expected))
+    certain = expected.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
+    assert np.degrees(np.abs(np.angle(z * expected_z.conj()))[certain]).max() / degree < 8
+    assert np.median(np.abs(np.angle(z * expected_z.conj()))[certain]) / degree < np.radians(1)
 
 
 def test_reordered_faces_are_transferred_from_a_given_mesh(tmp_path):
@@ -219,9 +221,9 @@ def test_free_directions_are_transferred(tmp_path):
     np.save(tmp_path / "a.npy", free_directions(3))
     write_off(tmp_path / "a.off", BALL)
     again = read_field(tmp_path / "a.npy", mixed)
-    whole = read_field(tmp_path / "a.npy", BALL)
+    original = read_field(tmp_path / "a.npy", BALL)
     assert np.allclose(
-        field_directions(mixed, again), field_directions(BALL, whole)[order], atol=1e-9
+        field_directions(mixed, again), field_directions(BALL, original)[order], atol=1e-9
     )
 
 

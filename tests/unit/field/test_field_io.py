@@ -141,8 +141,8 @@ def test_free_directions_keep_their_angles_and_lengths(shared_data, tmp_path, er
     ("angle", "longer", "rosy"), [(0.9, 0.009, True), (1.2, 0.0, False), (0.0, 0.02, False)]
 )
 def test_tolerances_of_a_rosy(angle, longer, rosy, tmp_path):
-    turn = np.radians([0, 120 + angle, 240])
-    members = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    angles = np.radians([0, 120 + angle, 240])
+    members = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
     members[2] *= 1 + longer
     rows = np.tile(members.reshape(1, 9), (6, 1))
     (tmp_path / "a.rawfield").write_text(rosy_text(rows, degree=3, form="{degree} {count}\n"))
@@ -180,14 +180,14 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    data, wanted = DAMAGED[name]
+    data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
     SQUARES.face_normal  # noqa: B018  not to be counted below
     tracemalloc.start()
     message = error_of(read_field, tmp_path / name, SQUARES)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert wanted in message
+    assert expected in message
     assert str(tmp_path / name) in message
     assert peak < 1e6, "a claim in a header must not be believed"
 
@@ -209,11 +209,11 @@ def test_missing_file_and_conflicting_degree(tmp_path, error_of):
 
 
 @given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
-def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, place, ending):
+def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, offset, ending):
     path = tmp_path_factory.getbasetemp() / f"damaged{ending}"
     write_field(path, RosyField(4, WEST), SQUARES)
     data = path.read_bytes()
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_field(path, SQUARES)
     except RosyError as error:
@@ -301,8 +301,8 @@ def test_the_domain_decides_if_both_counts_agree(error_of):
     exact = np.cross((0, 0, 1.0), surface.face_center)
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     field = validated_field(surface, around, 4, "here", domain="vertex")
-    z, wanted = (face_representation(surface, some) for some in (field, RosyField(4, exact)))
-    assert np.abs(np.angle(z / wanted)).max() < 1e-9
+    z, expected = (face_representation(surface, f) for f in (field, RosyField(4, exact)))
+    assert np.abs(np.angle(z / expected)).max() < 1e-9
     assert "not tangent to the surface" in error_of(validated_field, surface, around, 4, "here")
 
 
@@ -312,8 +312,8 @@ def test_the_mean_does_not_depend_on_the_members_at_vertices():
     tangent = np.cross(normal, (0.2, 0.5, 1.0))
     generator = np.random.default_rng(1)
     for degree in (2, 3, 4, 5):
-        turn = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
-        others = np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent)
+        angle = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
+        others = np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent)
         first, second = (
             face_representation(surface, validated_field(surface, vectors, degree, "here"))
             for vectors in (tangent, others)

@@ -34,12 +34,12 @@ def great_circles(count, seed=2, tremble=0.0):
 
 def stroke_error(surface, field, stroke):
     """Mean angle, degrees, between a stroke and the field along it."""
-    middle, way = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
-    face = surface.triangle_face[closest_triangles(surface, middle)[0]]
+    midpoint, direction = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
+    face = surface.triangle_face[closest_triangles(surface, midpoint)[0]]
     x, y = face_frames(surface)
-    wish = to_representation(normalize(way), x[face], y[face], field.degree)
+    target = to_representation(normalize(direction), x[face], y[face], field.degree)
     z = to_representation(field.vectors[face], x[face], y[face], field.degree)
-    return abs(np.degrees(np.angle((z * wish.conj()).sum())) / field.degree)
+    return abs(np.degrees(np.angle((z * target.conj()).sum())) / field.degree)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -62,8 +62,8 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
     while len(strokes) < 10:
         face = random.integers(bunny.face_count)
         # Straight on, put down on the surface point by point, where it does not leave it.
-        way = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
-        line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * way
+        direction = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
+        line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * direction
         triangle, distance = closest_triangles(bunny, line)
         if distance.max() > 0.006 * size:
             continue
@@ -71,8 +71,8 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
         corner = bunny.vertices[bunny.triangle_vertex[triangle, 0]]
         strokes.append(line - dot(line - corner, normal)[:, None] * normal)
     field = generate(bunny, GeneratorSettings("guided", strokes=strokes, smoothing_length=reach), 4)
-    off = [stroke_error(bunny, field, stroke) for stroke in strokes]
-    assert max(off) < 2, off
+    errors = [stroke_error(bunny, field, stroke) for stroke in strokes]
+    assert max(errors) < 2, errors
 
 
 def test_jitter_of_strokes_is_smoothed():
@@ -106,15 +106,15 @@ def test_strokes_far_from_the_surface_are_refused(error_of):
 
 
 def test_axes_guide_the_faces_around_them():
-    place, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
-    guides = guides_from_axes(BALL, place, axis, np.array([0.3, 0.0]), 2)
-    near = np.linalg.norm(BALL.face_center - place[0], axis=1) < 0.3
+    position, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
+    guides = guides_from_axes(BALL, position, axis, np.array([0.3, 0.0]), 2)
+    near = np.linalg.norm(BALL.face_center - position[0], axis=1) < 0.3
     assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
     assert (np.abs(guides[near, 0]) > 0.9).all()
-    recipe = GeneratorSettings(
-        "guided", axis_guides=list(zip(place, axis, (0.3, 0.0), strict=True))
+    generator_settings = GeneratorSettings(
+        "guided", axis_guides=list(zip(position, axis, (0.3, 0.0), strict=True))
     )
-    field = generate(BALL, recipe, 2)
+    field = generate(BALL, generator_settings, 2)
     np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
 
 
@@ -127,8 +127,10 @@ def uv_of(surface, matrix):
 @pytest.mark.parametrize("degree", [1, 2, 4, 6, 8])
 def test_a_uv_map_is_followed(degree, mirrored):
     surface = plane(4, 3)
-    turn = np.array([(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))])  # u at 0.4 radians
-    matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ turn
+    rotation = np.array(
+        [(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))]
+    )  # u at 0.4 radians
+    matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ rotation
     guides = guides_from_uv(surface, uv_of(surface, matrix), degree)
     np.testing.assert_allclose(np.linalg.norm(guides, axis=1), 1)
     angle = np.arctan2(guides[:, 1], guides[:, 0])
@@ -160,8 +162,8 @@ def test_guides_of_several_kinds_are_combined(error_of):
     vectors = np.zeros((surface.face_count, 3))
     vectors[5] = 3 * face_frames(surface)[0][5]
     edges = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
-    recipe = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
-    field = generate(surface, recipe, 4)
+    generator_settings = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
+    field = generate(surface, generator_settings, 4)
     assert np.isclose(abs(dot(normalize(vectors[5]), field.vectors[5])), 1)
     assert (field.magnitude > 0.99).all()
     assert "no guides are given" in error_of(generate, surface, "guided", 4)
@@ -172,12 +174,16 @@ def test_guides_of_several_kinds_are_combined(error_of):
 
 
 def moebius(columns=60, rows=6):
-    turn = np.arange(columns) * (2 * np.pi / columns)
-    across = np.linspace(-0.3, 0.3, rows + 1)[:, None]
-    out = 1 + across * np.cos(turn / 2)
-    points = np.stack([out * np.cos(turn), out * np.sin(turn), across * np.sin(turn / 2)], axis=-1)
-    here = np.arange(rows)[:, None] * columns + np.arange(columns - 1)
-    quads = np.stack([here, here + 1, here + columns + 1, here + columns], axis=-1).reshape(-1, 4)
+    angle = np.arange(columns) * (2 * np.pi / columns)
+    offset = np.linspace(-0.3, 0.3, rows + 1)[:, None]
+    radius = 1 + offset * np.cos(angle / 2)
+    points = np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), offset * np.sin(angle / 2)], axis=-1
+    )
+    corner = np.arange(rows)[:, None] * columns + np.arange(columns - 1)
+    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=-1).reshape(
+        -1, 4
+    )
     # Where it comes round, bottom and top change places.
     last = np.arange(rows) * columns + columns - 1
     first = (rows - np.arange(rows)) * columns

@@ -153,16 +153,16 @@ def test_weld_keeps_positions_and_removes_duplicates(points):
 
 @pytest.mark.slow
 def test_meshes_of_other_programs(shared_data):
-    found = {
+    counts = {
         path.name: (len(surface.vertices), surface.face_count)
         for path in sorted((shared_data / "meshes").iterdir())
         for surface in [read_mesh(path)]
     }
-    assert found["stanford-bunny.obj"][1] == 69451
-    assert found["spot.obj"][1] == 5856
-    assert found["cheburashka.off"] == (6669, 13334)
-    assert found["vase.off"] == (1274, 2404)
-    assert found["dome.off"] == (5000, 9635)
+    assert counts["stanford-bunny.obj"][1] == 69451
+    assert counts["spot.obj"][1] == 5856
+    assert counts["cheburashka.off"] == (6669, 13334)
+    assert counts["vase.off"] == (1274, 2404)
+    assert counts["dome.off"] == (5000, 9635)
 
 
 def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
@@ -226,13 +226,13 @@ DAMAGED = {
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
-    data, wanted = DAMAGED[name]
+    data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
     tracemalloc.start()
     message = error_of(read_mesh, tmp_path / name)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert wanted in message
+    assert expected in message
     assert str(tmp_path / name) in message
     assert peak < 10e6, "a claim in a header must not be believed"
 
@@ -244,12 +244,12 @@ def test_missing_files_and_folders(tmp_path, error_of):
 
 
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
-def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, place):
+def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     from rosy_addon.errors import RosyError
 
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     data = FILES[name]
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_mesh(path)
     except RosyError as error:

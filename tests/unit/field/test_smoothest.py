@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sparse
 from awkward import AWKWARD
 from conftest import long
-from field_helpers import MESHES, angles_apart, as_scipy, bumpy
+from field_helpers import MESHES, angle_differences, as_scipy, bumpy
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import eigsh, spsolve
 from scipy.spatial import ConvexHull
@@ -68,11 +68,11 @@ def test_multigrid_cycles_converge(degree):
     assert len(levels) > 2
     right = np.random.default_rng(0).standard_normal(len(matrix)) + 0j
     expected = spsolve(as_scipy(matrix).tocsc(), right)
-    found = np.zeros_like(right)
+    actual = np.zeros_like(right)
     errors = []
     for _ in range(12):
-        found += w_cycle(levels, right - matrix @ found)
-        errors.append(np.linalg.norm(found - expected))
+        actual += w_cycle(levels, right - matrix @ actual)
+        errors.append(np.linalg.norm(actual - expected))
     assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
 
 
@@ -83,8 +83,10 @@ def test_multigrid_cycles_converge(degree):
 def test_a_constant_direction_in_the_plane_has_no_energy(degree):
     surface = plane(6)
     random = np.random.default_rng(3)
-    inside = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
-    moved = surface.vertices + inside[:, None] * (0.05, 0.05, 0) * random.standard_normal((1, 3))
+    is_interior = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
+    moved = surface.vertices + is_interior[:, None] * (0.05, 0.05, 0) * random.standard_normal(
+        (1, 3)
+    )
     surface = build_surface(moved, surface.corner_vertex, surface.face_start)
     connection = build_connection(surface)
     edge = np.roll(surface.vertices[surface.triangle_vertex], -1, axis=1)
@@ -135,16 +137,16 @@ def test_the_eigenvector_matches_scipy(shapes, degree):
         connection = build_connection(surface)
         z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
         below = -1e-6 / connection.mass.sum()
-        found, vectors = eigsh(
+        actual, vectors = eigsh(
             as_scipy(laplacian(connection, degree)),
             k=2,
             M=sparse.diags(connection.mass),
             sigma=below,
         )
-        order = np.argsort(found)  # of complex matrices they come in any
-        found, vectors = found[order], vectors[:, order]
-        assert energy[0] == pytest.approx(found[0], rel=1e-4), name
-        if found[1] > 1.03 * found[0]:
+        order = np.argsort(actual)  # of complex matrices they come in any
+        actual, vectors = actual[order], vectors[:, order]
+        assert energy[0] == pytest.approx(actual[0], rel=1e-4), name
+        if actual[1] > 1.03 * actual[0]:
             overlap = np.abs(np.vdot(vectors[:, 0], connection.mass * z))
             assert overlap / np.sqrt(connection.mass @ np.abs(z) ** 2) > 1 - 1e-5, name
 
@@ -163,18 +165,18 @@ def test_the_field_matches_another_library(degree):
     vertex = np.empty(connection.node_count, dtype=int)
     vertex[connection.corner_node] = triangles.ravel()
     solver = potpourri3d.MeshVectorHeatSolver(surface.vertices, triangles)
-    theirs = sparse.csr_matrix(solver.get_connection_laplacian())
-    here, there = vertex[connection.tail], vertex[connection.head]
-    entry = np.asarray(theirs[here, there]).ravel()
+    their_laplacian = sparse.csr_matrix(solver.get_connection_laplacian())
+    tail, head = vertex[connection.tail], vertex[connection.head]
+    entry = np.asarray(their_laplacian[tail, head]).ravel()
     np.testing.assert_allclose(np.abs(entry), connection.weight, rtol=1e-6)
 
     # Their frames differ from these by an angle at each vertex, found along a tree of edges.
     count = connection.node_count
-    ends = np.concatenate([here, there]), np.concatenate([there, here])
-    turn = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
-    between = sparse.csr_matrix((np.concatenate([turn, turn.conj()]), ends), (count, count))
+    ends = np.concatenate([tail, head]), np.concatenate([head, tail])
+    ratio = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
+    differences = sparse.csr_matrix((np.concatenate([ratio, ratio.conj()]), ends), (count, count))
     frames = np.ones(count, dtype=complex)
-    order, before = breadth_first_order(abs(between), 0, directed=False)
+    order, predecessor = breadth_first_order(abs(differences), 0, directed=False)
     ours = sparse.csr_matrix(
         (
             np.exp(1j * np.concatenate([connection.transport_angle, -connection.transport_angle])),
@@ -182,30 +184,32 @@ def test_the_field_matches_another_library(degree):
         ),
         (count, count),
     )
-    for one in order[1:]:
-        toward = ours[one, before[one]]
-        there_too = between[one, before[one]] * toward
-        frames[one] = there_too * frames[before[one]] * toward.conj()
-    carried = frames[here] * np.exp(1j * connection.transport_angle) * frames[there].conj()
-    np.testing.assert_allclose(-entry / np.abs(entry), carried, atol=1e-6)
+    for vertex_index in order[1:]:
+        our_transport = ours[vertex_index, predecessor[vertex_index]]
+        difference = differences[vertex_index, predecessor[vertex_index]] * our_transport
+        frames[vertex_index] = difference * frames[predecessor[vertex_index]] * our_transport.conj()
+    their_transport = frames[tail] * np.exp(1j * connection.transport_angle) * frames[head].conj()
+    np.testing.assert_allclose(-entry / np.abs(entry), their_transport, atol=1e-6)
 
-    turned = np.concatenate([carried**degree, carried.conj() ** degree])
+    raised_transport = np.concatenate([their_transport**degree, their_transport.conj() ** degree])
     weight = np.tile(np.abs(entry), 2)
-    raised = sparse.diags(theirs.diagonal()) - sparse.csr_matrix((weight * turned, ends))
+    raised = sparse.diags(their_laplacian.diagonal()) - sparse.csr_matrix(
+        (weight * raised_transport, ends)
+    )
     mass = np.empty(count)
     mass[vertex] = connection.mass
-    found, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
-    expected = vectors[:, np.argmin(found)]
+    actual, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
+    expected = vectors[:, np.argmin(actual)]
     z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
-    assert energy[0] == pytest.approx(found.min(), rel=1e-5)
-    mine = np.empty(count, dtype=complex)
-    mine[vertex] = z
-    apart = mine * frames**degree * expected.conj()
-    apart *= np.conj(apart.sum()) / abs(apart.sum())
+    assert energy[0] == pytest.approx(actual.min(), rel=1e-5)
+    our_z = np.empty(count, dtype=complex)
+    our_z[vertex] = z
+    z_ratio = our_z * frames**degree * expected.conj()
+    z_ratio *= np.conj(z_ratio.sum()) / abs(z_ratio.sum())
     # Close to singularities both are small, and their angles anything.
-    clear = np.abs(mine) > 0.02 * np.abs(mine).max()
+    clear = np.abs(our_z) > 0.02 * np.abs(our_z).max()
     assert clear.mean() > 0.9
-    assert np.degrees(np.abs(np.angle(apart[clear]))).max() / degree < 1
+    assert np.degrees(np.abs(np.angle(z_ratio[clear]))).max() / degree < 1
 
 
 @pytest.mark.parametrize("degree", range(1, 13))
@@ -229,33 +233,33 @@ def test_the_field_does_not_depend_on_numbering_or_position(degree):
     triangles = surface.corner_vertex.reshape(-1, 3)
 
     order = np.random.default_rng(5).permutation(len(surface.vertices))
-    place = np.argsort(order)
-    renumbered = from_triangles(surface.vertices[order], place[triangles])
-    found = smoothest_field(renumbered, degree).vectors
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    new_index = np.argsort(order)
+    renumbered = from_triangles(surface.vertices[order], new_index[triangles])
+    actual = smoothest_field(renumbered, degree).vectors
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
-    turned = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
-    found = smoothest_field(turned, degree).vectors
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    rolled = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
+    actual = smoothest_field(rolled, degree).vectors
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
     rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
     moved = from_triangles(3 * surface.vertices @ rotation.T + (1, 2, 3), triangles)
-    found = smoothest_field(moved, degree).vectors @ rotation
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    actual = smoothest_field(moved, degree).vectors @ rotation
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
 
 def test_each_component_has_its_own_field():
-    one, other = bumpy(icosphere(3)), bumpy(torus(24, 12))
-    points = np.concatenate([one.vertices, 0.3 * other.vertices + 5])
-    corners = np.concatenate([one.corner_vertex, other.corner_vertex + len(one.vertices)])
-    starts = np.concatenate([one.face_start, other.face_start[1:] + one.face_start[-1]])
+    first, second = bumpy(icosphere(3)), bumpy(torus(24, 12))
+    points = np.concatenate([first.vertices, 0.3 * second.vertices + 5])
+    corners = np.concatenate([first.corner_vertex, second.corner_vertex + len(first.vertices)])
+    starts = np.concatenate([first.face_start, second.face_start[1:] + first.face_start[-1]])
     both = build_connection(build_surface(points, corners, starts))
     _, energy = run_to_completion(smallest_eigenvectors_task(both, 4))
-    alone = [
+    separately = [
         run_to_completion(smallest_eigenvectors_task(build_connection(surface), 4))[1][0]
-        for surface in (one, other)
+        for surface in (first, second)
     ]
-    np.testing.assert_allclose(energy, [alone[0], alone[1] / 0.09], rtol=1e-4)
+    np.testing.assert_allclose(energy, [separately[0], separately[1] / 0.09], rtol=1e-4)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 12])

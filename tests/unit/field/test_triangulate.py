@@ -41,9 +41,9 @@ def assert_filled(polygon):
     """All triangles wind as the polygon does, and their areas add up: so none lies outside."""
     points, triangles, _ = triangulate_polygons(polygon)
     areas = signed_areas(points, triangles)
-    whole = polygon_area(np.asarray(polygon, dtype=float))
-    assert (areas * np.sign(whole) > 0).all()
-    assert areas.sum() == pytest.approx(whole)
+    area = polygon_area(np.asarray(polygon, dtype=float))
+    assert (areas * np.sign(area) > 0).all()
+    assert areas.sum() == pytest.approx(area)
 
 
 def star(random, corners):

@@ -74,8 +74,8 @@ def test_framing_ignores_loose_vertices():
             "vertices": np.concatenate([ball.vertices, [[100.0, 0, 0]]]),
         }
     )
-    one, two = (orbit_camera(s, 10, 20, 50, 50) for s in (ball, [loose, ball]))
-    assert (one.view == two.view).all()
+    first, second = (orbit_camera(s, 10, 20, 50, 50) for s in (ball, [loose, ball]))
+    assert (first.view == second.view).all()
 
 
 @pytest.mark.parametrize("perspective", [True, False])

@@ -1,4 +1,4 @@
-"""Meshes that are no closed smooth manifolds, as points and faces: for tests here and in Blender."""
+"""Meshes that are unusual or not closed manifolds, as points and faces; also for Blender."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def octahedron():
 
 
 def pieces():
-    """A cube, an octahedron beside it, and a grid above them."""
+    """A cube, an octahedron and a grid, which are not connected."""
     points, faces = [], []
     for index, (part_points, part_faces) in enumerate((cube(), octahedron(), grid())):
         faces += [tuple(vertex + len(points) for vertex in face) for face in part_faces]
@@ -47,13 +47,13 @@ def pieces():
 
 
 def fan():
-    """Three triangles on one edge."""
+    """Three triangles that share one edge, which is nonmanifold."""
     points = [(0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0.5, 0), (-1, -0.5, 0)]
     return points, [(0, 1, 2), (0, 1, 3), (1, 0, 4)]
 
 
 def faces_without_area(count=1000):
-    """An octahedron, and a thousand triangles without area."""
+    """An octahedron, and `count` triangles without area."""
     points, faces = octahedron()
     points += [(0.1 * index, 0.0, 2.0) for index in range(count + 2)]
     return points, faces + [(6 + index, 7 + index, 8 + index) for index in range(count)]

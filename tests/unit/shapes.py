@@ -1,4 +1,4 @@
-"""Meshes in closed form, for tests."""
+"""Surfaces in closed form, and a translation matrix, for tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosy_addon.field.surface import Surface, build_surface
 def grid_of_quads(
     columns: int, rows: int, wrap_columns: bool, wrap_rows: bool
 ) -> tuple[np.ndarray, int]:
-    """(F, 4) vertex indices of a lattice of quads, and how many vertices it has."""
+    """(F, 4) vertex indices of a lattice of quads, and its number of vertices."""
     nu = columns if wrap_columns else columns + 1
     nv = rows if wrap_rows else rows + 1
     i, j = (a.ravel() for a in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
@@ -97,7 +97,7 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
 
 
 def moved(x=0.0, y=0.0, z=0.0) -> np.ndarray:
-    """The matrix that shifts by so much."""
+    """The (4, 4) matrix of a translation."""
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix

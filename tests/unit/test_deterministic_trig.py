@@ -1,4 +1,4 @@
-"""Polynomials for angles, against double precision."""
+"""The polynomials of `deterministic_trig`, against numpy's functions in double precision."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from rosy_addon.frame_workers import parse_frames
 
 quickjs = pytest.importorskip("quickjs")
 
-#: What the manager gives to scripts, as its manual tells: `author`, `frameChunker`, and jobs.
+#: The functions that the manager offers to scripts, after its manual.
 MANAGER = """
 const author = {
     Task: (name, type) => ({name, type, commands: [], addCommand(c) { this.commands.push(c); }}),
@@ -72,7 +72,7 @@ def test_each_camera_has_its_own_sequence():
     assert [task["name"] for task in tasks] == [
         "Close 3,5,6", "Close 7-8", "Far 3,5,6", "Far 7-8",
     ]  # fmt: skip
-    # The command line takes what the manager makes of frames.
+    # The command line accepts the frames in the form that the manager writes.
     assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]
 
 

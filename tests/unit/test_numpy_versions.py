@@ -1,4 +1,4 @@
-"""The same pictures with another version of numpy, all but the last bit of a few pixels."""
+"""Pictures are the same with another version of numpy, except for the last bit of a few pixels."""
 
 from __future__ import annotations
 

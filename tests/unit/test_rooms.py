@@ -1,4 +1,4 @@
-"""Imports run one way, also inside rooms, and the numpy rooms do without Blender."""
+"""Imports run one way, also inside rooms, and the numpy rooms import without Blender."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from conftest import ROOT
 
 PACKAGE = ROOT / "rosy_addon"
 
-#: What each room may import besides itself. Modules at the top are rooms of their own.
+#: The modules that every room may import.
 BASE_ROOMS = {
     "errors",
     "progress",
@@ -85,7 +85,7 @@ MAY_IMPORT = {
 }
 NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
 
-#: What of the room `gpu` draws with Blender, and imports that when it does.
+#: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -95,7 +95,7 @@ def room_of(path: Path) -> str:
 
 
 def imports_of(path: Path) -> tuple[set[str], set[str]]:
-    """Modules of RoSy as paths from the package, and top-level names of all others."""
+    """Imported modules: dotted paths of those in RoSy, and top-level names of all others."""
     here = path.relative_to(PACKAGE).parent.parts
     inside, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text())):
@@ -124,12 +124,12 @@ def test_imports_run_one_way(path):
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room == "frame_workers":
-        allowed |= {"distributed"}  # asked for by name, and only then
+        allowed |= {"distributed"}  # optional, imported only if the user chooses it
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 
 def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
-    """The reader of imports finds what it is there to find."""
+    """All forms of imports, of RoSy and of others."""
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
     (tmp_path / "field").mkdir()
     path = tmp_path / "field" / "wrong.py"
@@ -140,7 +140,7 @@ def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
 
 
 def imported_files(path: Path) -> Iterator[Path]:
-    """Files of all modules that a file imports relatively, in functions as well."""
+    """Yield the files of all modules that a file imports relatively, in functions as well."""
     for node in ast.walk(ast.parse(path.read_text())):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue
@@ -157,7 +157,7 @@ def imported_files(path: Path) -> Iterator[Path]:
 
 
 def import_cycle(folder: Path) -> list[str]:
-    """Files of a folder that import each other in a circle, or an empty list."""
+    """Files of a folder that import each other in a cycle, or an empty list."""
     graph = {path: set(imported_files(path)) for path in sorted(folder.rglob("*.py"))}
     try:
         TopologicalSorter(graph).prepare()
@@ -168,7 +168,7 @@ def import_cycle(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("folder", ["rosy_addon", "operators"])
 def test_there_are_no_import_cycles(folder):
-    """Not inside a room either, and not by an import in a function."""
+    """Neither between rooms nor inside a room, nor by an import in a function."""
     assert import_cycle(ROOT / folder) == []
 
 

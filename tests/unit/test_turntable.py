@@ -1,4 +1,4 @@
-"""Films from all around, against another decoder."""
+"""Turntable videos, and GIF files against Pillow's decoder."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_gray_frames_are_stored_exactly(count, width, height, seed):
 
 
 def test_the_table_of_codes_is_reset_when_full(tmp_path):
-    """Past 4096 codes the table is begun anew."""
+    """After 4096 codes the table starts again."""
     noise = np.random.default_rng(0).integers(0, 256, (300, 400, 1), dtype=np.uint8)
     ((_, (actual,)),) = [decode_frames(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
     assert np.array_equal(actual[..., :1], noise)
@@ -101,7 +101,7 @@ def test_a_video_has_all_frames(tmp_path):
 
 
 def test_lights_stay_fixed_while_the_camera_orbits():
-    """A sun from +y lights the far side in the first picture and the near side in the second."""
+    """A sun from +y lights the far side in the first view and the near side in the second."""
     surface = icosphere(3)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     look = Look(length=8, shading=1.0, light="scene")

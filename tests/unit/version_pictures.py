@@ -1,4 +1,4 @@
-"""Pictures to be compared between versions of numpy: ``python version_pictures.py FILE.npz``."""
+"""Draw pictures to compare between versions of numpy: ``python version_pictures.py FILE.npz``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rosy_addon.projection.project import project
 
 
 def draw() -> dict[str, np.ndarray]:
-    """8 bit pictures by name."""
+    """Draw the pictures; return (H, W, 3) or (H, W, 4) uint8 arrays by name."""
     look = Look()
     pictures = {"plane": compose_planar(pair_angle(*pixel_centers(96), 96, 4), 4, look)}
     shapes = {

@@ -1,4 +1,4 @@
-"""The compositor that walks each streamline once, against brute force and closed forms."""
+"""Fast LIC on the covering surface, against brute force and closed forms."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def uniform_field(angle, degree, size=SIZE):
 
 
 def singular_field(degree, size=SIZE):
-    """Singularities of index 1 / N and -1 / N."""
+    """A field with singularities of index 1 / N and -1 / N."""
     x, y = pixel_centers(size)
     return planar_pixel_field(pair_angle(x, y, size, degree), degree)
 
@@ -107,7 +107,7 @@ def test_the_directions_of_states_are_the_members_and_their_opposites():
 
 
 def autocorrelations(image, angle, lags):
-    """At some distances along and across a direction, of the inner part of a picture."""
+    """Autocorrelations of the inner part of a picture at `lags` along and across a direction."""
     image = image.reshape(512, 512)[45:-45, 45:-45]
     power = np.abs(np.fft.fft2(image - image.mean())) ** 2
     autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
@@ -148,14 +148,14 @@ def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
         fast_images(field, look).blend[:, 0],
         brute_force_images(field, look).blend[:, 0],
     )
-    # Not the same: each streak is shifted by up to half a pixel.
+    # They are not equal, because each streak is shifted by up to half a pixel.
     assert np.corrcoef(actual, expected)[0, 1] > 0.85
     assert actual.std() == pytest.approx(expected.std(), rel=0.03)
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_the_surroundings_of_singularities_are_not_grainy(degree):
-    # Grain is what changes from each pixel to the next; breaking points would show as well.
+    # Grain is the change from pixel to pixel. Breaking points would increase it as well.
     field = singular_field(degree)
     x, y = (axis.ravel() for axis in pixel_centers(SIZE))
     near = np.zeros(SIZE * SIZE, dtype=bool)
@@ -212,7 +212,7 @@ def test_the_same_input_gives_the_same_bytes():
 
 
 def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
-    # A tall picture, in streaks that run up and down: a seam would show as a change of rows.
+    # A tall picture with vertical streaks: a seam would be a large change between two rows.
     field = planar_pixel_field(np.full((1024, 64), np.pi / 2 + 0.1), 2)
     in_one_strip = fast_images(field)
     monkeypatch.setattr(fast_lic, "MAX_STATES_PER_STRIP", 64 * 256 * 2)

@@ -1,4 +1,4 @@
-"""How the samples of streamlines are weighted, against sums written out."""
+"""Sums of the weights of samples along streamlines, against explicit sums."""
 
 from __future__ import annotations
 

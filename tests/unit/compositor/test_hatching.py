@@ -1,4 +1,4 @@
-"""Hatching: the tone that is asked for, lines along the field, and streaks that stay where they are."""
+"""Hatching: target tones, lines along the field, inks, outlines, and stability under motion."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ INK = Look(
 
 @lru_cache(maxsize=4)
 def tube(around=160, along=120, bend=0.0):
-    """A tube along z, of radius 0.5; bent, it remembers what it was."""
+    """A tube along z with radius 0.5; its rest shape is straight if it is bent."""
     angle = np.arange(around) * 2 * np.pi / around
     height = np.linspace(-1.5, 1.5, along + 1)
     rest = np.stack(
@@ -85,7 +85,7 @@ def tube(around=160, along=120, bend=0.0):
 
 
 def bent(points, angle):
-    """Turned about the x axis, the more the higher, as an armature with smooth weights does it."""
+    """Rotate points about the x axis by angles that grow with z, like an armature."""
     local_angle = angle * np.clip(0.5 + points[:, 2], 0, 1)
     cos, sin = np.cos(local_angle), np.sin(local_angle)
     y, z = points[:, 1], points[:, 2]
@@ -146,7 +146,7 @@ def render(instance, camera, look, lights=()):
 
 @pytest.mark.parametrize("name", mainly(HATCHED[1::3], HATCHED))
 def test_presets_reproduce_a_ramp(name):
-    """A ball under one light, from 0 to 1: blurred, ink on paper is as light as it was to be."""
+    """A ball under one light, with tones from 0 to 1: the blurred picture has the target tone."""
     look = PRESETS[name]
     instance, camera = make_instance(ball()), make_camera()
     rgba = render(instance, camera, look)
@@ -154,7 +154,7 @@ def test_presets_reproduce_a_ramp(name):
     target_tone = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     assert target_tone.min() < 1 - look.shading + 0.05 and target_tone.max() > 0.97
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
-    # From the darker of ink and paper to the lighter, by the channel in which they differ most.
+    # Lightness from the darker of ink and paper to the lighter, in the channel of largest contrast.
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
     lightness = (rgba[..., channel] - darker) / (lighter - darker)
@@ -172,18 +172,18 @@ def test_presets_reproduce_a_ramp(name):
 
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
-    """Of normal streaks, those of a threshold cover as much of the paper as it is for."""
+    """Higher coverages have lower thresholds, and half coverage is near the mean."""
     settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
     threshold, deviation, *_ = streak_statistics(settings)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
-    assert abs(middle) < 0.1  # half of the paper: streaks of dense noise are hardly skew
+    assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6, 7])
 @pytest.mark.parametrize("layers", [1, 2, 3])
 def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
-    """They sum to 1, and change places without a jump as the field turns under the guide."""
+    """Shares sum to 1, and have no jumps as the field rotates relative to the guiding angle."""
     angles = np.linspace(-1, 1, 40001)[None]
     field = planar_pixel_field(angles, degree)
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
@@ -191,17 +191,17 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
         transmittance = np.full((1, angles.size), tone, dtype=np.float32)
         shares = np.array(line_shares(field, look, transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
-        # The members jump where the guide lies between two; the directions that get ink do not.
+        # Members jump where two are equally near the guiding angle, but the sorted shares do not.
         ordered = np.sort(shares, axis=0)
         assert np.abs(np.diff(ordered, axis=1)).max() < 0.03
-        # Where two change places both are there, and so may be their neighbour on the other side.
+        # Where two families swap ranks, both are drawn, and possibly a third one.
         typical_count = np.median((shares > 0.02).sum(axis=0))
         assert typical_count <= min(layers, field.line_count)
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::3], HATCHED))
 def test_lines_run_along_the_field(name):
-    """The peak of the orientations on a wall that faces the eye is the field's, within 2 degrees."""
+    """The mean orientation on a wall that faces the eye is that of the field within 2 degrees."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     angle = np.radians(25)
@@ -227,7 +227,7 @@ UNEVEN_LINES = {
 
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
-    """Coverage of a field of one direction in the plane, under one tone."""
+    """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
     look = replace(look, anchor="picture", clear_paper=True)
     field = planar_pixel_field(np.full((side, side), angle), degree)
     noise = look_noise(field, look)
@@ -251,7 +251,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
 @pytest.mark.parametrize("kind", UNEVEN_LINES)
 @pytest.mark.parametrize("crispness", [0.1, 0.9])
 def test_uneven_lines_have_the_same_coverage(kind, crispness):
-    """The tone is that of even lines, from the darkest to the lightest."""
+    """The mean coverage is that of even lines, from dark to light tones."""
     look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
     for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
         assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
@@ -289,7 +289,7 @@ def test_paper_grain_breaks_lines():
 
 @pytest.mark.parametrize("grain", [1.5, 3.0, 8.0])
 def test_statistics_of_paper_grain(grain):
-    """Even all over, as deep everywhere, and no cloud in it."""
+    """Mean 0, standard deviation 1, no low frequencies, independent of other lines and streaks."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
     first_grain, second_grain = picture_paper_grain(pixel, side, grain, 0, line_count=2).reshape(
@@ -303,7 +303,7 @@ def test_statistics_of_paper_grain(grain):
 
 
 def test_paper_grain_depends_only_on_the_pixel():
-    """A height is that of the pixel, whatever else is seen, and that of all its subpixels."""
+    """A height does not depend on the other visible pixels, and is equal at all subpixels."""
     full_frame = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 3).reshape(
         300, 700
     )
@@ -322,7 +322,7 @@ def test_paper_grain_depends_only_on_the_pixel():
 @pytest.mark.parametrize("anchor", ["surface", "picture"])
 @pytest.mark.parametrize("distance", [4.0, 30.0])
 def test_statistics_of_the_wobble(anchor, distance):
-    """To both sides alike, slowly, and as far from afar as from near."""
+    """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
     actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
     assert abs(actual.mean()) < 0.25 * WOBBLE_STD
@@ -351,7 +351,7 @@ def test_wobble_rotates_all_directions(degree):
 
 
 def ramp_error(look):
-    """Mean difference, blurred, of the luminance of a ball from what its inks were to leave of it."""
+    """Mean error of the blurred luminance transmittance of a ball, relative to the target."""
     instance, camera = make_instance(ball(), degree=6), make_camera()
     rgba = render(instance, camera, look)
     gbuffer = project([instance], camera)
@@ -392,7 +392,7 @@ def test_a_third_ink_is_between_the_other_two():
     actual = inks_of(look).ink_at_tone(np.zeros(5), tones)
     expected = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
     np.testing.assert_allclose(actual, expected, atol=1e-6)
-    # Without one it is as light as both together half way.
+    # Without a third ink, colors are interpolated linearly.
     actual = inks_of(replace(look, ink_middle=0.0)).ink_at_tone(np.zeros(5), tones)
     np.testing.assert_allclose(actual, dark + tones[:, None] * (light - dark), atol=1e-6)
 
@@ -407,7 +407,7 @@ def test_colored_inks_reproduce_a_ramp(kind):
 
 @pytest.mark.parametrize("kind", COLORED_INKS)
 def test_required_coverage_has_the_target_luminance(kind):
-    """Paper and ink side by side have the luminance that is wanted."""
+    """Paper with the required coverage of ink has the target luminance."""
     look = replace(INK, **COLORED_INKS[kind])
     inks = inks_of(look, 4 if look.hue == "families" else 1)
     tone = np.linspace(0, 1, 101)
@@ -434,7 +434,7 @@ def test_inks_of_families_differ_visibly():
 
 @pytest.mark.parametrize("degree", [3, 4, 6, 7])
 def test_inks_swap_ranks_without_a_seam(degree):
-    """As the field turns under the guide, the inks in use go over from one to the next."""
+    """As the field rotates relative to the guiding angle, ink indices change without a jump."""
     field = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
     look = replace(INK, hue="families", guiding_angle=0.3)
     ink_indices = np.sort(np.array(line_ink_indices(field, look)), axis=0)
@@ -447,7 +447,7 @@ def test_inks_swap_ranks_without_a_seam(degree):
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
-    """Whatever the guiding angle: it says which is drawn first, not in which ink."""
+    """The guiding angle determines the order of the lines, not their inks."""
     field = planar_pixel_field(np.linspace(-1, 1, 101)[None], 4)
     field = replace(field, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
     for guide in (0.0, 0.6, -1.2):
@@ -458,7 +458,7 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 
 def test_ink_is_colored_by_magnitude():
-    """Pixels of nothing but ink have the colours of the map."""
+    """Pixels covered by ink have the colors of the color map."""
     look = replace(INK, magnitude="colour", colour_map="grey", clear_paper=True, shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
@@ -471,17 +471,14 @@ def test_ink_is_colored_by_magnitude():
     assert np.corrcoef(row, to_display(grey))[0, 1] > 0.95
 
 
-# --- over-shoot --------------------------------------------------------------------------------------
+# --- overshoot ---------------------------------------------------------------------------------------
 
-#: Half the side of a wall, Blender units.
+#: Half the side of the wall of `render_half_dark_wall`, Blender units.
 HALF = 4.0
 
 
 def render_half_dark_wall(method, overshoot):
-    """How light the columns and the single lines are of a wall whose left half is dark, the right white.
-
-    Lines run from left to right.
-    """
+    """(H, W - 1) lightness of a wall of horizontal lines, the left half dark, the right white."""
     points = HALF * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
@@ -492,13 +489,13 @@ def render_half_dark_wall(method, overshoot):
     look = replace(
         INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_colour="#000000"
     )
-    # Images repeat: at the last column it gets dark again.
+    # The image of tones repeats, so the last column is dark and is left out.
     return render(instance, camera, look)[..., :-1, 0]
 
 
 @pytest.mark.parametrize("method", ["sheets", *long("members", "brute")])
 def test_lines_overshoot_the_border_of_a_tone(method):
-    """So that each column has the mean tone of those as near: a ramp as wide as twice the over-shoot."""
+    """The mean of a column is a ramp across the border, twice as wide as the overshoot."""
     overshoot = 24.0
     light = render_half_dark_wall(method, overshoot)
     from_border = np.arange(SIZE - 1) + 0.5 - SIZE / 2
@@ -508,7 +505,7 @@ def test_lines_overshoot_the_border_of_a_tone(method):
     assert error[inner].mean() < 0.03 and error[inner].max() < 0.12
     beyond = (from_border > overshoot + 2) & (from_border < SIZE / 2 - overshoot - 4)
     assert (light[:, beyond] > 0.999).all()
-    # Some run on farther than others.
+    # Lines end at different distances from the border.
     dark_beyond_border = [
         row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()
     ]
@@ -530,7 +527,7 @@ def test_overshooting_lines_reproduce_a_ramp():
 
 
 def warped_correlation(instance, camera, other_instance, other_camera, look):
-    """Correlation of two pictures, the second one warped by the true motion."""
+    """Correlation of two pictures, after the second one is warped by the true motion."""
     first, second = render(instance, camera, look), render(other_instance, other_camera, look)
     gbuffer, other_gbuffer = project([instance], camera), project([other_instance], other_camera)
     corners = instance.surface.triangle_vertex[gbuffer.triangle]
@@ -595,7 +592,7 @@ MOTIONS = {
 @pytest.mark.parametrize("motion", mainly(["bent", "zoomed"], MOTIONS))
 @pytest.mark.parametrize("ink", ["hatch", *long("soft", "uneven")])
 def test_streaks_stay_on_the_surface(motion, ink):
-    # Even light: what moves with the lamp is not what is asked about.
+    # The light is even, because shading does not move with the surface.
     look = replace(INK, light="scene", shading=0.35, gain=1.2, crispness=0.5)
     if ink == "soft":
         look = replace(look, ink="soft", shading=0.0)
@@ -619,7 +616,7 @@ def test_presets_stay_on_the_surface(name, motion):
 
 @pytest.mark.parametrize("grain", [2.5, *long(4.0)])
 def test_lines_keep_their_width_through_a_zoom(grain):
-    """Of the lines across a wall, from one zoom to sixteen times as near."""
+    """Lines on a wall, at zooms from 1 to 16."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
@@ -634,7 +631,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
 
 
 def test_lines_in_blender_units_scale_with_the_zoom():
-    """In proportion, and as they are seen in the middle where a pixel is so many units wide."""
+    """The width is proportional to the zoom, and equals that in pixels at the scale of the unit."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
@@ -653,7 +650,7 @@ def test_lines_in_blender_units_scale_with_the_zoom():
 
 
 def test_lines_in_blender_units_scale_with_the_distance():
-    """Of two walls, one twice as far away; both are as dark as they are to be."""
+    """Two walls, one twice as far away as the other, both with the target tone."""
     points = np.array([[-1, 0, -2], [1, 0, -2], [1, 0, 2], [-1, 0, 2]], dtype=float)
     walls = []
     for index, (left, distance) in enumerate(((-1.0, 4.0), (2.0, 8.0))):
@@ -678,7 +675,7 @@ def test_lines_in_blender_units_stay_on_the_surface(motion):
 
 
 def line_width(picture):
-    """Where the autocorrelation across horizontal lines has fallen to a half, pixels."""
+    """The lag in pixels at which the autocorrelation across horizontal lines is 1/2."""
     columns = picture - picture.mean()
     spectrum = np.abs(np.fft.fft(columns, axis=0)) ** 2
     correlation = np.fft.ifft(spectrum.mean(axis=1)).real
@@ -717,7 +714,7 @@ def test_statistics_of_surface_noise(high_pass, distance):
 def test_instances_have_different_noise():
     names = ["a", "b", "a", "a", "c"]
     assert len(set(instance_hashes(names).tolist())) == 5
-    # A body that joins in does not change the others'.
+    # Another instance does not change the hashes of the others.
     assert instance_hashes(["z", *names])[1:].tolist() == instance_hashes(names).tolist()
     # A mesh file looks the same in every folder.
     assert instance_hashes(["some/ball.obj"]) == instance_hashes(["C:\\other\\ball.obj"])
@@ -743,7 +740,7 @@ def test_clear_paper_shows_only_ink():
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 3.5, 6.0])
 def test_the_width_of_outlines(width):
-    """Around a ball: of so much ink is a ring of that width, and it lies along the border."""
+    """The outline of a ball has the area of a ring of that width along the border."""
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
     gbuffer = project([make_instance(ball())], camera)
     covered = outline_coverage(gbuffer, Look(outline=width))
@@ -756,7 +753,7 @@ def test_the_width_of_outlines(width):
 
 
 def test_outlines_are_drawn_on_the_nearer_surface():
-    """Two walls, one before the other; the one behind has no line where the other hides it."""
+    """Two walls, one in front of the other: the far one has no line where it is occluded."""
     points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
     walls = []
     for index, (left, distance) in enumerate(((0.0, 0.0), (0.7, 1.0))):
@@ -776,7 +773,7 @@ def test_outlines_are_drawn_on_the_nearer_surface():
 
 
 def test_lines_of_creases_are_half_on_each_side():
-    """The edge of a cube that is seen at equal angles; none if streaks are to cross it."""
+    """The line at an edge of a cube, seen symmetrically; no line if streaks cross creases."""
     soft = cube()
     box = build_surface(soft.vertices, soft.corner_vertex, soft.face_start, sharp_angle=1.0)
     camera = orthographic_camera(look_at((4.5, -3.5, 0.5), (0.5, 0.5, 0.5)), 240, 240, scale=2.0)
@@ -790,7 +787,7 @@ def test_lines_of_creases_are_half_on_each_side():
 
 
 def test_outlines_are_drawn_in_ink():
-    plain = replace(INK, light="scene", shading=0.0)  # no light that would ask for lines
+    plain = replace(INK, light="scene", shading=0.0)  # white, so that there are no lines
     bare, lined = (
         render(make_instance(ball()), make_camera(), replace(plain, outline=width))
         for width in (0.0, 2.0)

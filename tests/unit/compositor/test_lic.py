@@ -1,4 +1,4 @@
-"""LIC images against integrators and statistics that were not written for them."""
+"""LIC images against independent integrators, theory and invariances."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def make_noise(size, grain=1.5, seed=0):
 
 
 def kernel_window(length, taper):
-    """What the samples of a streamline weigh, from end to end."""
+    """Weights of the samples of a streamline, from end to end."""
     offset = np.arange(-length, length + 1)
     return 1 - np.abs(offset) / (length + 1) if taper else np.ones(2 * length + 1)
 
 
 def runge_kutta_lic(angle, noise, size, length, step, taper=False):
-    """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
+    """One-member LIC in double precision, by the classic Runge-Kutta method of order 4."""
     x, y = pixel_centers(size)
     start = x + 1j * y
 
@@ -126,7 +126,7 @@ def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     angles = pair_angle(*pixel_centers(size), size, degree)
     rotation = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
     look = plain(method=method, length=10)
-    # A float that rounds to the other side of a pixel's border moves one sample of twenty-one.
+    # Where rounding moves a position across the border of a pixel, one sample of 21 differs.
     difference = np.abs(tone(angles, degree, look) - tone(angles + rotation, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
 
@@ -145,7 +145,7 @@ def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
 
 
 def test_the_blend_gain_of_seven_lines_includes_correlations():
-    # Equation 6 takes the images for independent; the correction for their crossing is a tenth.
+    # Equation 6 assumes independent images; the correction for correlations is about a tenth.
     gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
@@ -197,10 +197,10 @@ def along_field_autocorrelation(image, angles, chosen, lag):
 def test_breaking_points_are_not_visible(degree, settings):
     size, guides = 384, 4
     x, _ = pixel_centers(size)
-    # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
+    # The field rotates evenly from left to right, so breaking points form evenly spaced columns.
     angles = 3 * 2 * np.pi / degree * x / size
     stds, similarity = np.zeros(2), np.zeros(2)
-    # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
+    # Several guiding angles, so that breaking points occur at several directions.
     for guide in np.arange(guides) * 2 * np.pi / degree / guides:
         image = tone(angles, degree, plain(guiding_angle=guide, **settings))
         angle_offset = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
@@ -230,7 +230,7 @@ def test_short_streamlines_have_the_contrast_of_full_ones(method):
     angles = np.full((size, size), 0.0)
     angles[:, 100:112] = np.nan
     image = tone(angles, 1, look)
-    # Ten pixels from a gap half of a streamline is missing.
+    # Near the gap, about half of each streamline is missing.
     near_gap, far_from_gap = image[:, 112:122], image[:, 170:200]
     assert near_gap.std() == pytest.approx(far_from_gap.std(), rel=0.1)
 
@@ -286,7 +286,7 @@ def test_the_same_settings_give_the_same_bytes():
 
 
 def orientation_spectrum(image, bins=360):
-    """Power by direction of the streaks (a half turn from the wave vectors), smoothed a little."""
+    """(bins,) power by direction of the streaks, perpendicular to the wave vectors; smoothed."""
     size = image.shape[0]
     hann_window = np.hanning(size)
     power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(hann_window, hann_window))) ** 2

@@ -1,4 +1,4 @@
-"""Pictures of surfaces: what the compositor makes of a G-buffer."""
+"""Pictures of surfaces, composed from a G-buffer."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_two_degrees_in_one_picture():
 
 
 def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
-    # One direction on a plane seen at 60 degrees: autocorrelation is highest along the image of it.
+    # The autocorrelation is largest along the projected direction.
     surface = plane(2, 2, 4.0)
     direction = np.array([0.6, 0.8, 0.0])
     field = RosyField(1, np.tile(direction, (surface.face_count, 1)))
@@ -133,7 +133,7 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
 
 
 def test_silhouettes_end_streamlines():
-    """A torus' tube before its far side: what is drawn on one does not depend on the other."""
+    """The near and the far side of a torus are not linked at the silhouette between them."""
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
@@ -141,7 +141,7 @@ def test_silhouettes_end_streamlines():
     linked = pixel_field.neighbors[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
-    # The tube is 0.8 across; at the two cusps, where a silhouette begins, a pixel can span half.
+    # The tube is 0.8 wide. At the two cusps where a silhouette ends, a pixel can span half of it.
     assert gap[valid].max() < 0.55
     assert np.mean(gap[valid] > 0.3) < 0.001
 
@@ -188,7 +188,7 @@ def test_undefined_faces_have_no_excess_contrast():
     assert np.isfinite(picture.rgba).all()
     undefined = gbuffer.representation == 0
     assert undefined.any()
-    # A streamline of one sample has the spread of a whole one, no more.
+    # A streamline of one sample has about the standard deviation of a full one.
     tone = picture.layers[0].tone[:, 0]
     assert tone[undefined].std() < 1.6 * tone[~undefined].std()
 
@@ -211,7 +211,7 @@ def test_lights_of_the_scene():
     white = np.ones(3)
     sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), white, 2.0)
     assert np.allclose(diffuse(gbuffer, look, [sun]), np.sqrt(2), atol=1e-5)
-    # A point two units above the middle of the plane: 1 / r^2 and the cosine.
+    # A point light two units above the center of the plane: 1 / r^2 and the cosine.
     lamp = Light("point", np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.5, 0.0]), 4.0)
     lighting = diffuse(gbuffer, look, [lamp])
     across = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1])

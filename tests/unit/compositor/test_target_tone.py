@@ -1,4 +1,4 @@
-"""Where tones come from: attributes, images, pictures and shadows, and what hatching makes of them."""
+"""Target tones from attributes, images, reference renders and shadows, and their hatching."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def make_camera(size=SIZE, position=(0.0, -4.0, 1.2), target=(0.0, 0.0, 0.0), fo
 
 
 def tone_from_vertices(surface, values):
-    """A tone of the values of vertices."""
+    """A `SurfaceTone` from values at the vertices."""
     return SurfaceTone(np.asarray(values, dtype=np.float32)[surface.corner_vertex, None])
 
 
 def world_positions(gbuffer):
-    """(P, 3) world space."""
+    """(P, 3) positions of pixels in world space."""
     view = gbuffer.camera.view
     return (gbuffer.position - view[:3, 3]) @ view[:3, :3]
 
@@ -64,7 +64,7 @@ def world_positions(gbuffer):
 
 
 def relative_lightness(rgba, look):
-    """(H, W) how much of the light from the darker of ink and paper to the lighter there is."""
+    """(H, W) lightness, from 0 at the darker of ink and paper to 1 at the lighter."""
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
@@ -72,7 +72,7 @@ def relative_lightness(rgba, look):
 
 
 def blurred(gbuffer, values, sigma=16):
-    """(H, W) means over the pixels that see something, and which of them see hardly anything else."""
+    """(n,) blurred values of covered pixels, where the blur contains almost only such pixels."""
     size = gbuffer.camera.height, gbuffer.camera.width
     visible = np.zeros(size[0] * size[1])
     visible[gbuffer.pixel] = 1
@@ -84,10 +84,10 @@ def blurred(gbuffer, values, sigma=16):
 
 @pytest.mark.parametrize("name", mainly(HATCHED[2:3], HATCHED))
 def test_presets_reproduce_a_ramp_on_the_surface(name):
-    """Ink on paper, blurred over 16 pixels, is as light as the attribute says: 0 to 1 over a ball.
+    """Ink on paper, blurred over 16 pixels, has the tone of an attribute from 0 to 1 on a ball.
 
-    Of broad streaks few are in a blur: it is the mean over some drawings that is small, and what
-    they have in common that is smaller still.
+    A blur contains few broad streaks. So the mean absolute error over several seeds is bounded, and
+    the mean error, without its random part, is bounded more tightly.
     """
     ramp = np.clip(BALL.vertices[:, 0] * 0.62 + 0.5, 0, 1)
     instance = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
@@ -109,7 +109,7 @@ def test_presets_reproduce_a_ramp_on_the_surface(name):
 
 
 def contrast(look, tone):
-    """The deviation of what is on screen of a wall of one tone."""
+    """The standard deviation of display values on a wall of one tone."""
     surface = plane(1, 1, 4.0)
     surface_tone = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
     instance = MeshInstance(
@@ -127,13 +127,13 @@ def test_lines_have_contrast_in_dark_tones(name):
 
 
 def test_soft_streaks_lose_contrast_in_dark_tones():
-    """What lines are compared with: light is multiplied with them."""
+    """Soft streaks are multiplied by the light, in contrast to lines of hatching."""
     soft = Look(gain=1.5)
     assert contrast(soft, 0.1) < 0.6 * contrast(soft, 0.9)
 
 
 def test_attributes_are_interpolated_over_triangles():
-    """A number that is linear in space is so at the pixels, whatever the perspective."""
+    """An attribute that is linear in space is linear at the pixels, under perspective too."""
     surface = plane(3, 3, 4.0)
     linear = 0.3 * surface.vertices[:, 0] - 0.2 * surface.vertices[:, 1] + 0.5
     matrix = moved_and_scaled(0.3, 0.2, -0.4, 1.5)
@@ -181,7 +181,7 @@ def test_missing_tones_are_refused(tone, error_of):
 
 
 def test_lic_images_do_not_depend_on_the_tone():
-    """What a look's tone is has no say in the LIC: it is not done again."""
+    """Changes of the tone reuse the cached LIC images."""
     gbuffer = project(
         [make_instance(BALL, tone=tone_from_vertices(BALL, BALL.vertices[:, 0]))], make_camera(96)
     )
@@ -223,7 +223,7 @@ def test_equal_black_and_white_are_a_threshold():
 
 
 def mapped_plane(image, repeat=1.0, cells=4):
-    """A square whose UV map lays an image over it, so many times."""
+    """A square whose UV map repeats an image `repeat` times in each direction."""
     surface = plane(cells, cells, 2.0)
     uv = (surface.vertices[surface.corner_vertex, :2] * 0.5 + 0.5) * repeat
     return make_instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
@@ -234,7 +234,7 @@ def camera_above(size, scale=2.0):
 
 
 def test_images_follow_the_uv_map():
-    """Pixel for pixel, where they are as wide as those of the picture, rows from the bottom."""
+    """An image with pixels of the size of the picture's is reproduced, rows from the bottom."""
     image = np.random.default_rng(1).random((32, 32))
     gbuffer = project([mapped_plane(image)], camera_above(32))
     assert len(gbuffer.pixel) == 32 * 32
@@ -249,11 +249,11 @@ def test_images_are_interpolated():
 
 
 def test_images_finer_than_the_picture_are_averaged():
-    """A board of single pixels, sixteen of them to one of the picture, is grey."""
+    """A checkerboard with sixteen squares per pixel of the picture is gray."""
     board = np.indices((256, 256)).sum(axis=0) % 2
     tones = surface_tones(project([mapped_plane(board)], camera_above(64)))
     np.testing.assert_allclose(tones, 0.5, atol=1e-3)
-    # Odd sides, too, and one that is repeated.
+    # The same for an image with odd sides that is repeated.
     odd = np.random.default_rng(2).random((255, 131))
     tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
@@ -279,14 +279,14 @@ def test_reference_renders_are_sampled_at_the_pixel(perspective):
     gbuffer = project([make_instance(BALL)], camera)
     actual = ReferenceRender(luminance, camera).sample(gbuffer)
     np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
-    # Twice as fine: the mean of the four.
+    # At twice the resolution, the mean of four pixels.
     fine = np.repeat(np.repeat(luminance, 2, axis=0), 2, axis=1)
     actual = ReferenceRender(fine, camera).sample(gbuffer)
     np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
 
 
 def test_reference_renders_are_reprojected():
-    """From elsewhere, the surface has the tone that the camera of the picture saw there."""
+    """From another camera, a point has the tone that it has in the reference render."""
     camera = make_camera(256)
     gbuffer = project([make_instance(BALL)], camera)
     luminance = np.zeros(256 * 256, dtype=np.float32)
@@ -311,7 +311,7 @@ def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
 
 
 def point_light(camera, position, strength=1.0):
-    """A point, in the space of a camera."""
+    """A point light at a position in world space, in the space of a camera."""
     vector = camera.view[:3, :3] @ np.asarray(position, dtype=float) + camera.view[:3, 3]
     return Light("point", vector, np.ones(3), strength)
 
@@ -323,7 +323,7 @@ def sun_light(camera, direction, strength=1.0):
 
 
 def clearance_from_ball(points, toward, center, radius, max_distance=np.inf):
-    """By how much rays from points pass inside a ball (below 0) or outside; `toward` is unit."""
+    """(n,) distances of rays from a ball, negative if they hit it; `toward` are unit directions."""
     to_center = center - points
     along = np.einsum("pi,pi->p", to_center, toward)
     clearance = (
@@ -342,7 +342,7 @@ LIGHTS = {
 
 @pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
 def test_the_shadow_of_a_ball_on_a_plane(name):
-    """In closed form: what a ray to the light meets. Only at the very border may it differ."""
+    """The shadow is known in closed form. It may differ only close to its border."""
     kind, where = LIGHTS[name]
     ground, ball = (
         make_instance(plane(8, 8, 8.0)),
@@ -367,7 +367,7 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
     certain = np.abs(clearance) > 0.04
     assert certain.mean() > 0.9 and (clearance < 0).mean() > 0.02
     np.testing.assert_allclose(visibility[on_ground][certain], (clearance > 0)[certain], atol=1e-6)
-    # On the border of what is lit there is everything from 0 to 1.
+    # The border of the shadow is soft.
     assert ((visibility > 0.1) & (visibility < 0.9)).any()
 
 
@@ -383,7 +383,7 @@ def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
         )
         to_light = light.vector - gbuffer.position if kind == "point" else light.vector
         to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
-        # The triangles themselves: a smooth normal may face what they do not.
+        # Normals of triangles, because smooth normals may face the light where triangles do not.
         facing = np.einsum(
             "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(to_light, gbuffer.normal.shape)
         )
@@ -416,7 +416,7 @@ def test_the_headlight_casts_no_shadows():
 
 
 def rays_hit_triangles(origin, direction, corners):
-    """(n,) whether rays from (n, 3) points meet one of (T, 3, 3) triangles."""
+    """(n,) whether rays from (n, 3) points hit any of (T, 3, 3) triangles."""
     a, b, c = corners.transpose(1, 0, 2)
     p = np.cross(direction, c - a)
     divisor = np.einsum("ti,ti->t", b - a, p)
@@ -432,7 +432,7 @@ def rays_hit_triangles(origin, direction, corners):
 
 
 def test_shadows_match_ray_casting():
-    """Of a ring that stands on the ground and shades itself, against rays one by one."""
+    """A torus that stands on the ground and shadows itself, against ray casting."""
     quads, count = grid_of_quads(48, 24, True, True)
     u, v = np.divmod(np.arange(count), 24)
     u, v = u * 2 * np.pi / 48, v * 2 * np.pi / 24
@@ -452,7 +452,7 @@ def test_shadows_match_ray_casting():
     )
     hit = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
     assert 0.1 < hit.mean() < 0.7
-    # Light that grazes gives none, and borders are soft.
+    # Grazing light is left out, and so are the soft borders of shadows.
     certain = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
     certain &= (visibility < 0.01) | (visibility > 0.99)
     assert certain.mean() > 0.9

@@ -1,4 +1,4 @@
-"""How smooth a field is, and how far from another."""
+"""The Dirichlet energy of fields, and angle errors between fields."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rosy_addon.field.rosy_field import RosyField
 
 
 def rotating_field(surface, degree, rate):
-    """A field on a plane that turns by `rate` radians for each unit of x."""
+    """A field on a plane that rotates by `rate` radians per unit of x."""
     angle = rate * surface.face_center[:, 0]
     return RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
 def test_energy_of_a_field_that_rotates_evenly(degree):
-    """|grad z|^2 is (N rate)^2: over the plane, but for the outer half rows, 4 of them."""
+    """|grad z|^2 is (N rate)^2 on the area of 4, without half a column at two borders."""
     surface = plane(80, 80)
     rate = 0.7
     energy = dirichlet_energy(surface, rotating_field(surface, degree, rate))
@@ -47,7 +47,7 @@ def test_the_smoothest_field_has_less_energy_than_others():
     smoothest = dirichlet_energy(ball, generate(ball, "smoothest", 4))
     assert smoothest < dirichlet_energy(ball, generate(ball, "curvature", 4))
     assert smoothest < dirichlet_energy(ball, axis_field(ball, 4))
-    # 4 pi N, and what singularities of index 1/4 add on so coarse a mesh.
+    # 4 pi N, plus the energy of singularities of index 1/4 on such a coarse mesh.
     assert 4 * np.pi * 4 < smoothest < 3 * 4 * np.pi * 4
 
 

@@ -1,4 +1,4 @@
-"""The nearest triangle to points, against looking at all of them and against another library."""
+"""The triangle closest to a point, against exhaustive search and dense samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosy_addon.field.closest_point import closest_triangles, point_triangle_dis
 
 
 def distances_to_all_triangles(surface, points):
-    """Distances from all triangles: (n, T)."""
+    """(n, T) distances of points from all triangles."""
     corners = surface.vertices[surface.triangle_vertex]
     pairs = np.repeat(points, len(corners), axis=0), np.tile(corners, (len(points), 1, 1))
     return point_triangle_distances(*pairs).reshape(len(points), -1)

@@ -1,4 +1,4 @@
-"""Fields made of other fields: degrees, turns, diffusion, magnitudes."""
+"""Conversion of fields: degree, rotation, diffusion and magnitude."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BALL = icosphere(3)
 
 
 def with_random_members(surface, field, seed=0):
-    """The same RoSys, another member of each stored."""
+    """The same RoSys, with a random member of each stored."""
     random = np.random.default_rng(seed)
     member_index = random.integers(0, field.degree, surface.face_count)
     return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
@@ -46,7 +46,7 @@ def test_a_multiple_has_the_member_and_the_power_of_z(degree, multiple):
 
 @pytest.mark.parametrize(("degree", "divisor"), [(4, 2), (4, 1), (6, 2), (6, 3), (12, 1)])
 def test_a_divisor_is_consistent_without_singularities(degree, divisor):
-    """A torus' field without singularities that goes round the way of the torus."""
+    """A field without singularities, around the axis of a torus."""
     surface = torus(48, 24)
     line = axis_field(surface, divisor, (0.0, 0.0, 1.0))
     around = np.cross((0.0, 0.0, 1.0), surface.face_center * (1, 1, 0))
@@ -57,7 +57,7 @@ def test_a_divisor_is_consistent_without_singularities(degree, divisor):
         surface, with_random_members(surface, RosyField(degree, line.vectors)), divisor
     )
     assert converted.degree == divisor
-    # One of the fields that the members make up, the same everywhere.
+    # The result is the same one of the fields of degree `divisor` everywhere.
     ratio = face_representation(surface, converted) * face_representation(surface, line).conj()
     np.testing.assert_allclose(ratio, ratio[0], atol=1e-6)
     np.testing.assert_allclose(ratio[0] ** (degree // divisor), 1, atol=1e-6)
@@ -69,7 +69,7 @@ def test_a_divisor_has_seams_between_singularities():
     _, matching = field_matching(BALL, RosyField(4, converted.vectors))
     seam = matching != 0
     assert 0 < seam.sum() < 0.2 * len(matching)
-    # Eight singularities of index 1/4: around each an odd seam comes to an end.
+    # There are eight singularities of index 1/4, at which seams end.
     assert len(find_singularities(BALL, field)[0]) == 8
 
 
@@ -101,7 +101,7 @@ def test_diffusion_against_scipy(degree):
     noise = np.random.default_rng(0).normal(0, 0.4, BALL.face_count)
     field = rotate_field(BALL, field, noise)
     actual = diffuse_field(BALL, field, 0.02)
-    # The same step, put together and solved by others.
+    # The same step, with other code to assemble the right-hand side and SciPy's solver.
     connection = build_connection(BALL)
     rows = laplacian(connection, degree)
     matrix = csr_matrix((rows.data, rows.indices, rows.indptr), (len(rows), len(rows)))

@@ -1,4 +1,4 @@
-"""Directions that are no RoSy: what they deviate by, how they are carried, and how they are drawn."""
+"""Directions that are not a RoSy: harmonics, matching, families, and streaks along them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rotate(vectors, normal, angle):
 
 
 def directions_at_angles(surface, angles, lengths):
-    """(F, N, 3): on each face the same angles from its first edge."""
+    """(F, N, 3) directions with the same angles from the first edge on each face."""
     x, _ = face_frames(surface)
     return np.stack(
         [
@@ -70,7 +70,7 @@ def test_harmonics_do_not_depend_on_the_first_direction(degree, seed, shift):
     assert np.allclose(rho, other_rho)
     for j in {*ours, *theirs}:
         if 2 * j == degree:
-            continue  # known up to the sign that exp(i N t / 2) has
+            continue  # only defined up to the sign of exp(i N t / 2)
         a = ours.get(j, np.zeros(1)) * np.exp(-1j * j * first)
         b = theirs.get(j, np.zeros(1)) * np.exp(-1j * j * other_first)
         assert np.allclose(a, b, atol=2e-4)
@@ -124,7 +124,7 @@ def test_directions_on_vertices_are_averaged_onto_faces():
     angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
     directions = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
     vertex_directions = np.tile(directions, (len(surface.vertices), 1, 1))
-    # Whichever is listed first.
+    # The order of the directions differs between vertices.
     for vertex in range(len(vertex_directions)):
         vertex_directions[vertex] = np.roll(vertex_directions[vertex], vertex, axis=0)
     field = validated_directions(surface, vertex_directions, "test", domain="vertex")
@@ -192,7 +192,7 @@ def test_streaks_run_along_free_directions(method, angles):
     radians = np.radians(angles)
     directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
     directions = np.tile(directions, (surface.face_count, 1, 1))
-    for face in range(surface.face_count):  # no order may matter
+    for face in range(surface.face_count):  # the order must not matter
         directions[face] = np.roll(directions[face], face, axis=0)
     field = field_from_directions(surface, directions)
     picture = compose(
@@ -222,7 +222,7 @@ def test_a_conjugate_field_of_another_library(method, shared_data):
 
 
 def nearly_constant_faces(surface, field, count):
-    """Faces around which the field is the same within a degree and a half, all over the mesh."""
+    """Random faces whose neighbors have the same field within 1.5 degrees."""
     from rosy_addon.field.surface import build_edges
 
     edges = build_edges(surface.corner_vertex, surface.face_start)
@@ -242,11 +242,11 @@ def nearly_constant_faces(surface, field, count):
 
 
 def drawn_and_stored_angles(surface, field, face, method):
-    """Orientations, in degrees, of the streaks on a face and of its stored vectors, as projected."""
+    """Angles of the streaks drawn on a face, and of its stored directions on screen; degrees."""
     normal = surface.face_normal[face]
     center = surface.face_center[face]
     x, _ = face_frames(surface)
-    back = normalize(normal + 0.4 * x[face])  # not straight from above
+    back = normalize(normal + 0.4 * x[face])  # a slanted view of the face
     size = np.ptp(surface.vertices[surface.corner_vertex[3 * face : 3 * face + 3]], axis=0).max()
     view = look_at(center + 10 * back, center)
     camera = orthographic_camera(view, 320, 320, scale=1.2 * size, clip=(0.1, 20))
@@ -260,7 +260,7 @@ def drawn_and_stored_angles(surface, field, face, method):
     actual = np.array(peaks(orientation_spectrum(tone)))
     screen = field_directions(surface, field)[face] @ view[:3, :3].T
     expected = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
-    # The two of each pair differ by rounding.
+    # The directions are two opposite pairs, equal up to rounding.
     expected = np.sort(expected[:2])
     return actual, expected
 
@@ -278,7 +278,7 @@ def test_family_hues_keep_the_brightness():
     luminance = [
         to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, colored.rgba[..., :3])
     ]
-    # Equation 6 for the grey picture; the hues leave it as it is.
+    # Hues do not change the contrast of the gray picture.
     relative = [image.std() / image.mean() for image in luminance]
     assert 0.7 < relative[1] / relative[0] < 1.1
     assert np.corrcoef(luminance[0].ravel(), luminance[1].ravel())[0, 1] > 0.97
@@ -290,7 +290,7 @@ def test_family_hues_keep_the_brightness():
     ]
     assert np.abs((np.array(directions[0]) + 90) % 180 - 90).max() < 3
     assert np.abs(np.array(directions[1]) - 90).max() < 3
-    # As much of the one as of the other, and clearly coloured.
+    # About as much of one hue as of the other, and clearly colored.
     fractions = [np.mean(orange_minus_blue > 0.05), np.mean(orange_minus_blue < -0.05)]
     assert min(fractions) > 0.3
 

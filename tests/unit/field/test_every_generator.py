@@ -1,4 +1,4 @@
-"""Every kind of field on every awkward mesh, from the command line."""
+"""Every generator on every awkward mesh, through the command line."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from awkward import AWKWARD
 from rosy_addon.cli import main
 from rosy_addon.field.generate import GENERATORS
 
-#: Degrees of which the edges around each square, or each equilateral triangle, cancel out.
+#: Degrees in which the edges around each square, or each equilateral triangle, cancel.
 CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
 
 
 @pytest.fixture(scope="module")
 def meshes(tmp_path_factory):
-    """.obj files, with a UV map that looks at them askew from above."""
+    """The folder of the .obj files, each with a UV map that is an oblique projection from above."""
     folder = tmp_path_factory.mktemp("awkward")
     for name, make in AWKWARD.items():
         points, faces = make()
@@ -63,7 +63,7 @@ def test_strokes_on_every_mesh(meshes, tmp_path, capsys, name):
     mesh, out = str(meshes / f"{name}.obj"), str(tmp_path / "a.rosy")
     status = main(["field", mesh, "-o", out, "--strokes", str(meshes / "stroke.txt")])
     captured = capsys.readouterr()
-    if name == "moebius":  # around which the stroke is far away
+    if name == "moebius":  # its band is far from the stroke
         assert status == 2 and "no stroke is near the surface" in captured.err
     else:
         assert status == 0, captured.err

@@ -1,4 +1,4 @@
-"""Fields in the formats of other programs: there and back, and from a mesh to one like it."""
+"""Fields in the formats of other programs: round trips, and transfer to another mesh."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BALL = icosphere(2)
 
 
 def free_directions(degree, seed=0):
-    """(F, N, 3) on the ball, no RoSy."""
+    """(F, N, 3) directions on the ball that are not a RoSy."""
     random = np.random.default_rng(seed)
     field = axis_field(BALL, 1, (0.1, 0.2, 1.0))
     perpendicular = np.cross(BALL.face_normal, field.vectors)
@@ -101,7 +101,7 @@ def test_fieldgen_files_hold_the_mesh_and_a_field_on_vertices(degree, tmp_path):
     again = read_field(path, mesh)
     assert again.degree == degree
     z, expected = face_representation(surface, again), face_representation(surface, field)
-    away_from_poles = np.abs(surface.face_center[:, 2]) < 0.9  # of the poles, where it is singular
+    away_from_poles = np.abs(surface.face_center[:, 2]) < 0.9  # where the field is singular
     error = np.abs(np.angle(z[away_from_poles] * expected[away_from_poles].conj())) / degree
     assert np.degrees(error).max() < 1
 
@@ -180,7 +180,7 @@ def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending
 
 
 def quads_and_triangles():
-    """A torus of quads, and the same triangulated, its vertices and faces in another order."""
+    """A torus of quads, and the same triangulated, with its vertices and faces reordered."""
     quads = torus(48, 24)
     random = np.random.default_rng(5)
     new = random.permutation(len(quads.vertices))
@@ -200,7 +200,7 @@ def test_a_field_is_transferred_by_position_with_a_note(degree, tmp_path):
     assert "transferred by position from a.off" in note and "1,152" in note and "2,304" in note
     expected = axis_field(triangles, degree, (0.0, 0.0, 1.0))
     z, expected_z = (face_representation(triangles, f) for f in (again, expected))
-    certain = expected.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
+    certain = expected.magnitude > 0.3  # elsewhere small tilts of a face rotate the projected axis
     assert np.degrees(np.abs(np.angle(z * expected_z.conj()))[certain]).max() / degree < 8
     assert np.median(np.abs(np.angle(z * expected_z.conj()))[certain]) / degree < np.radians(1)
 

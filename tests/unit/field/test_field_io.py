@@ -1,4 +1,4 @@
-"""Fields from files and to files, and the check of vectors that come from outside."""
+"""Reading and writing of fields, and the validation of vectors from outside."""
 
 from __future__ import annotations
 
@@ -61,12 +61,12 @@ def test_a_vertex_count_is_accepted_above_face_rows(tmp_path, error_of):
 
 
 def test_rows_for_vertices_are_averaged_onto_faces(tmp_path):
-    # Members of a vertex may be any: those of a square alternate between two of the four.
+    # Any member may be stored at a vertex: here they alternate between two of the four.
     members = np.where(np.arange(12)[:, None] % 2, (0.0, 3.0, 0.0), (3.0, 0.0, 0.0))
     (tmp_path / "a.rosy").write_text(rosy_text(members))
     field = read_field(tmp_path / "a.rosy", SQUARES)
     assert field.vectors.shape == (6, 3)
-    # A mean of the vectors would be shorter, and at 45 degrees to all of them.
+    # The mean of the vectors would be shorter, and at 45 degrees to all of them.
     assert np.allclose(face_representation(SQUARES, field), 3)
 
 
@@ -122,7 +122,7 @@ def test_fields_of_other_programs(name, shared_data):
     assert field.degree == int(degree or 4)
     assert np.allclose(field.magnitude, 1, atol=1e-4)
     assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
-    if name == "cheburashka":  # the one that is closed
+    if name == "cheburashka":  # the only closed mesh
         _, index = find_singularities(surface, field)
         assert index.sum() == field.degree * euler_characteristic(surface)
 
@@ -182,7 +182,7 @@ DAMAGED = {
 def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
-    SQUARES.face_normal  # noqa: B018  not to be counted below
+    SQUARES.face_normal  # noqa: B018  computed before memory is measured
     tracemalloc.start()
     message = error_of(read_field, tmp_path / name, SQUARES)
     peak = tracemalloc.get_traced_memory()[1]
@@ -194,7 +194,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
 
 def test_a_huge_binary_file_is_refused_before_it_is_read(tmp_path, error_of):
     with open(tmp_path / "huge.rosy", "wb") as file:
-        file.truncate(2 << 30)  # a hole: takes no space
+        file.truncate(2 << 30)  # a sparse file, which takes no space
     tracemalloc.start()
     assert "binary data" in error_of(read_field, tmp_path / "huge.rosy", SQUARES)
     assert tracemalloc.get_traced_memory()[1] < 1e6
@@ -318,7 +318,7 @@ def test_the_mean_does_not_depend_on_the_members_at_vertices():
             face_representation(surface, validated_field(surface, vectors, degree, "here"))
             for vectors in (tangent, others)
         )
-        # The vertex normals are those of the polyhedron, so the turns are off by a little.
+        # The vertex normals are those of the polyhedron, so the rotations are not quite exact.
         assert np.abs(first - second).max() < 2e-3
 
 

@@ -1,4 +1,4 @@
-"""Fields against closed forms, invariances and the theorem of Poincare and Hopf."""
+"""Transport, singularities and generators, against closed forms, invariances and Poincaré-Hopf."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ vector = st.tuples(coordinate, coordinate, coordinate).filter(lambda v: np.linal
 
 
 def with_other_members(field: RosyField, surface, member_index) -> RosyField:
-    """The same field, another member stored on each face."""
+    """The same field, with another member stored on each face."""
     normal = surface.face_normal
     angle = (2 * np.pi / field.degree * member_index)[:, None]
     vectors = np.cos(angle) * field.vectors + np.sin(angle) * np.cross(normal, field.vectors)
@@ -55,7 +55,7 @@ def test_transport_is_the_minimal_rotation(a, b, angle):
     assert abs(moved @ t) < 1e-12
     assert np.linalg.norm(moved) == pytest.approx(1)
     assert np.allclose(transport(moved, t, s), v)
-    axis = np.cross(s, t)  # left alone by the rotation that takes s to t
+    axis = np.cross(s, t)  # invariant under the rotation that takes s to t
     assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
 
 
@@ -148,7 +148,7 @@ def test_indices_sum_to_the_euler_characteristic(degree):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_planar_singularity_has_its_index(degree, sign):
     surface = plane(21, 21)
-    # The singular point stands on a vertex near the middle.
+    # The singularity is at a vertex near the center.
     vertex = int(np.argmin(np.linalg.norm(surface.vertices - [0.02, 0.03, 0], axis=1)))
     direction = surface.face_center - surface.vertices[vertex]
     angle = sign * np.arctan2(direction[:, 1], direction[:, 0]) / degree + 0.4
@@ -177,7 +177,7 @@ def test_principal_directions_of_a_torus():
     along = normalize(np.stack([-center[:, 1], center[:, 0], 0 * center[:, 0]], axis=1))
     across = np.cross(surface.face_normal, along)
     degree_2 = curvature_field(surface, 2)
-    # The tube bends more than the ring everywhere.
+    # The curvature around the tube is larger than along the ring everywhere.
     angle = np.degrees(np.arccos(np.abs(dot(normalize(degree_2.vectors), across)).clip(0, 1)))
     assert angle.max() < 0.5
     # |k1 - k2| / (|k1| + |k2|) with k1 = 1 / r, k2 = cos v / (R + r cos v)

@@ -1,4 +1,4 @@
-"""Fields that follow guides: exactly, nearly, and the same however a mesh is numbered."""
+"""Guided fields: exact and soft guides, edges, features, and invariance to numbering."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BUNNY = MESHES / "stanford-bunny.obj"
 
 
 def random_guides(surface, count, seed=0):
-    """Unit tangents on a few faces that are far from each other."""
+    """Random unit tangents on `count` random faces, zero on the others."""
     random = np.random.default_rng(seed)
     chosen = random.choice(surface.face_count, count, replace=False)
     guides = np.zeros((surface.face_count, 3))
@@ -53,7 +53,7 @@ def test_soft_guides_match_a_direct_solver(degree):
     x, y = face_frames(surface)
     connection = build_connection(surface)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    # A column for each corner of a face with a guide, a row for each node: the normal equations.
+    # One row for each corner of a face with a guide, one column for each node.
     corner = np.flatnonzero(np.repeat(guides.any(axis=1), 3))
     shape = len(corner), connection.node_count
     entries = np.arange(len(corner)), connection.corner_node[corner]
@@ -177,7 +177,7 @@ def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
     guides = guides_from_edges(box, ends, 4)
     along = np.abs(guides).max(axis=1)
     np.testing.assert_allclose(along, 1, atol=1e-12)
-    # Of degree 2 the edges of a square contradict each other.
+    # In degree 2 the edges of a square cancel.
     assert not guides_from_edges(box, ends, 2).any()
     assert not len(feature_edges(box, 2.0))
 
@@ -200,9 +200,9 @@ def test_guides_lie_in_their_faces():
 
 
 def test_curvature_spreads_into_flat_regions():
-    """A cylinder between two flat caps' worth of plane: the flat parts take its directions."""
+    """A quarter of a tube between two flat parts, which take its directions."""
     count, turns = 60, np.linspace(0, np.pi / 2, 13)
-    # A quarter of a tube along y, with flat flaps on both sides, three units long.
+    # The tube is along y. The flat parts are three units long.
     flap = np.linspace(3, 0, 16)[:-1]
     x = np.concatenate([-flap, np.sin(turns), np.full(15, 1.0)])
     z = np.concatenate([np.full(15, 1.0), np.cos(turns), -flap[::-1]])
@@ -225,7 +225,7 @@ def test_features_of_a_cube(degree):
     points = box.vertices / np.abs(box.vertices).max(axis=1)[:, None]
     cubic = from_triangles(points, box.corner_vertex.reshape(-1, 3))
     field = generate(cubic, GeneratorSettings("features", sharp_angle=0.9), degree)
-    # The corners are cut off, and on the triangles there it is singular by symmetry.
+    # The corners are triangles, on which the field is singular by symmetry.
     assert (field.magnitude < 0.5).sum() in (0, 8)
     with pytest.raises(RosyError, match="no border or sharp edge"):
         generate(icosphere(3), "features", degree)

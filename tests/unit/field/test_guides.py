@@ -1,4 +1,4 @@
-"""What is at hand as guides: strokes, empties' axes, UV maps, vectors."""
+"""Guides from strokes, axes of empties, UV maps and vectors; and one-sided surfaces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BALL = icosphere(4)
 
 
 def great_circles(count, seed=2, tremble=0.0):
-    """Arcs on the unit sphere, as an artist might draw them."""
+    """Arcs of great circles on the unit sphere, with normally distributed jitter."""
     random = np.random.default_rng(seed)
     strokes = []
     for _ in range(count):
@@ -33,7 +33,7 @@ def great_circles(count, seed=2, tremble=0.0):
 
 
 def stroke_error(surface, field, stroke):
-    """Mean angle, degrees, between a stroke and the field along it."""
+    """The angle between a stroke and the mean field along it, degrees."""
     midpoint, direction = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
     face = surface.triangle_face[closest_triangles(surface, midpoint)[0]]
     x, y = face_frames(surface)
@@ -61,7 +61,7 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
     strokes = []
     while len(strokes) < 10:
         face = random.integers(bunny.face_count)
-        # Straight on, put down on the surface point by point, where it does not leave it.
+        # A straight line, projected to the surface; only where it stays close to the surface.
         direction = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
         line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * direction
         triangle, distance = closest_triangles(bunny, line)
@@ -93,7 +93,7 @@ def test_components_without_a_guide_get_the_smoothest_field():
     other = RosyField(4, field.vectors[BALL.face_count :])
     assert np.isclose(
         dirichlet_energy(BALL, other), dirichlet_energy(BALL, alone), rtol=0.1
-    )  # several are
+    )  # several fields are about equally smooth
 
 
 def test_strokes_far_from_the_surface_are_refused(error_of):
@@ -119,7 +119,7 @@ def test_axes_guide_the_faces_around_them():
 
 
 def uv_of(surface, matrix):
-    """A map of a plane: (u, v) = matrix (x, y) + an offset."""
+    """The UV map (u, v) = matrix (x, y) + offset of a plane."""
     return surface.vertices[surface.corner_vertex][:, :2] @ np.transpose(matrix) + (3.0, -1.0)
 
 
@@ -139,7 +139,7 @@ def test_a_uv_map_is_followed(degree, mirrored):
 
 def test_a_skewed_map_is_followed_equally_along_both_axes():
     surface = plane(3, 3)
-    # dP/du = (1, 0), dP/dv = (1, 1): the nearest cross halves the difference.
+    # dP/du = (1, 0) and dP/dv = (1, 1): the closest cross halves the error of 45 degrees.
     guides = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 4)
     angle = np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90
     np.testing.assert_allclose(np.minimum(angle, 90 - angle), 22.5, atol=1e-6)
@@ -184,7 +184,7 @@ def moebius(columns=60, rows=6):
     quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=-1).reshape(
         -1, 4
     )
-    # Where it comes round, bottom and top change places.
+    # At the end of the strip, bottom and top are exchanged.
     last = np.arange(rows) * columns + columns - 1
     first = (rows - np.arange(rows)) * columns
     closing = np.stack([last, first, first - columns, last + columns], axis=-1)

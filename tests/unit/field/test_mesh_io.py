@@ -1,4 +1,4 @@
-"""Meshes from files: every format, and what is wrong with damaged ones."""
+"""Reading of meshes: every format, and the errors for damaged files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapes import torus
 from rosy_addon.field.formats.stl import weld
 from rosy_addon.field.mesh_io import read_mesh
 
-# A square, and a triangle that stands on its side from 1 to 2.
+# A square, and a triangle on its edge from vertex 1 to vertex 2.
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
 FACES = [(0, 1, 2, 3), (2, 1, 4)]
 
@@ -166,7 +166,7 @@ def test_meshes_of_other_programs(shared_data):
 
 
 def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
-    # Three squares around z, a corner of 90 degrees and one of 45.
+    # Three squares with edges along z, at angles of 90 and 45 degrees.
     (tmp_path / "bent.off").write_text(
         "OFF 8 3 0\n0 0 0\n0 0 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1\n0 2 0\n0 2 1\n"
         "4 0 2 3 1\n4 2 4 5 3\n4 4 6 7 5\n"
@@ -261,13 +261,13 @@ def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path = tmp_path_factory.getbasetemp() / "exact.off"
     rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    with np.errstate(all="ignore"):  # such extremes overflow in the normal
+    with np.errstate(all="ignore"):  # normals overflow for extreme coordinates
         surface = read_mesh(path)
     assert surface.vertices.ravel().tolist() == numbers
 
 
 def test_a_torus_is_closed_when_read_from_stl(tmp_path):
-    """Welding leaves no seam: every edge of the triangles has two sides."""
+    """Equal corners become one vertex: every edge has two triangles."""
     from rosy_addon.field.singularities import euler_characteristic
 
     shape = torus(12, 8)

@@ -1,4 +1,4 @@
-"""Smoothest fields: closed forms, SciPy's solvers, invariances, and meshes that nobody wants."""
+"""Smoothest fields, against closed forms, SciPy and another library; awkward meshes."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_constant_direction_in_the_plane_has_no_energy(degree):
     connection = build_connection(surface)
     edge = np.roll(surface.vertices[surface.triangle_vertex], -1, axis=1)
     edge = (edge - surface.vertices[surface.triangle_vertex]).reshape(-1, 3)
-    # In the map of a node the x axis lies as far from an edge as it does in the plane.
+    # The angle of an edge in the map of its node, relative to its angle in the plane.
     angle = connection.edge_direction - np.arctan2(edge[:, 1], edge[:, 0])
     z = np.empty(connection.node_count, dtype=complex)
     z[connection.corner_node] = np.exp(1j * degree * angle)
@@ -143,7 +143,7 @@ def test_the_eigenvector_matches_scipy(shapes, degree):
             M=sparse.diags(connection.mass),
             sigma=below,
         )
-        order = np.argsort(actual)  # of complex matrices they come in any
+        order = np.argsort(actual)  # for complex matrices they are not sorted
         actual, vectors = actual[order], vectors[:, order]
         assert energy[0] == pytest.approx(actual[0], rel=1e-4), name
         if actual[1] > 1.03 * actual[0]:
@@ -153,9 +153,9 @@ def test_the_eigenvector_matches_scipy(shapes, degree):
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
 def test_the_field_matches_another_library(degree):
-    """geometry-central's connection Laplacian, raised to N; it shares no code with this one.
+    """The connection Laplacian of geometry-central, raised to N, has the same smallest eigenvector.
 
-    It flips edges to be Delaunay, and lays out borders differently: so a closed Delaunay mesh.
+    It flips edges to be Delaunay, and treats borders differently, so the mesh is closed and Delaunay.
     """
     potpourri3d = pytest.importorskip("potpourri3d")
     surface = bumpy(icosphere(4), 0.08, (1.0, 1.05, 1.1))
@@ -170,7 +170,7 @@ def test_the_field_matches_another_library(degree):
     entry = np.asarray(their_laplacian[tail, head]).ravel()
     np.testing.assert_allclose(np.abs(entry), connection.weight, rtol=1e-6)
 
-    # Their frames differ from these by an angle at each vertex, found along a tree of edges.
+    # Their frames differ from ours by an angle at each vertex, found along a tree of edges.
     count = connection.node_count
     ends = np.concatenate([tail, head]), np.concatenate([head, tail])
     ratio = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
@@ -206,7 +206,7 @@ def test_the_field_matches_another_library(degree):
     our_z[vertex] = z
     z_ratio = our_z * frames**degree * expected.conj()
     z_ratio *= np.conj(z_ratio.sum()) / abs(z_ratio.sum())
-    # Close to singularities both are small, and their angles anything.
+    # Close to singularities both vectors are small, so their angles are arbitrary.
     clear = np.abs(our_z) > 0.02 * np.abs(our_z).max()
     assert clear.mean() > 0.9
     assert np.degrees(np.abs(np.angle(z_ratio[clear]))).max() / degree < 1

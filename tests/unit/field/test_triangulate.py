@@ -1,4 +1,4 @@
-"""Polygons cut into triangles that fill them once, convex or not."""
+"""Triangles of convex and concave polygons, which must cover each polygon exactly once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def triangulate_polygons(*polygons):
-    """Triangles, their faces and the points of some (k, 2 or 3) polygons."""
+    """Triangulate (k, 2) or (k, 3) polygons; return the points, the triangles and their faces."""
     polygons = [np.asarray(p, dtype=float) for p in polygons]
     polygons = [np.pad(p, ((0, 0), (0, 3 - p.shape[1]))) for p in polygons]
     points = np.concatenate(polygons)
@@ -38,7 +38,7 @@ def polygon_area(points):
 
 
 def assert_filled(polygon):
-    """All triangles wind as the polygon does, and their areas add up: so none lies outside."""
+    """Check that all triangles wind like the polygon and that their areas sum to its area."""
     points, triangles, _ = triangulate_polygons(polygon)
     areas = signed_areas(points, triangles)
     area = polygon_area(np.asarray(polygon, dtype=float))
@@ -125,7 +125,7 @@ def test_convex_faces_are_fans_around_their_first_corner():
 @settings(max_examples=20)
 @given(seeds)
 def test_a_polygon_in_space_is_split_as_in_the_plane(seed):
-    """Turned anywhere, moved far away, and a little out of its plane."""
+    """A polygon that is rotated, far from the origin, and not quite planar."""
     random = np.random.default_rng(seed)
     flat = np.pad(star(random, 9), ((0, 0), (0, 1)))
     bumpy = flat + [0, 0, 1] * random.normal(size=(9, 1)) * 0.01

@@ -1,4 +1,4 @@
-"""Ambient occlusion beside what is known in closed form."""
+"""Ambient occlusion against closed forms."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def instance_at(surface, *translation):
 
 
 def values_at_vertices(surface, values):
-    """A value of each vertex, one of those of its corners."""
+    """(V,) values of vertices, from one corner of each."""
     actual = np.empty(len(surface.vertices))
     actual[surface.corner_vertex] = values
     return actual
 
 
 def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
-    """A floor (z = 0, y > 0) and a wall at an angle to it, long in x; (V,) how far from the edge."""
+    """A floor (z = 0, y > 0) and a wall at an angle, long in x; (V,) distances from the edge."""
     x = np.linspace(-3 * size, 3 * size, 3 * cells + 1)
     edge_distance = np.linspace(0, size, cells + 1)
     edge_distance = np.concatenate([-edge_distance[:0:-1], edge_distance])
@@ -42,7 +42,7 @@ def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
 
 
 def test_directions_are_evenly_spread():
-    """They have the moments of the sphere: mean 0, and 1/3 of the identity."""
+    """The directions have the moments of the sphere: mean 0, covariance 1/3 of the identity."""
     actual = fibonacci_sphere(256)
     np.testing.assert_allclose(np.linalg.norm(actual, axis=1), 1)
     np.testing.assert_allclose(actual.mean(axis=0), 0, atol=5e-3)
@@ -56,7 +56,7 @@ def test_a_sphere_is_fully_open(scale):
 
 
 def test_a_floor_beside_a_wall():
-    """A wall of height h at distance d leaves 1/2 + cos(atan(h/d))/2 of the sky: in the edge, half."""
+    """A wall of height h at distance d leaves 1/2 + cos(atan(h/d))/2 open; at the edge, half."""
     surface, edge_distance = trough()
     actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     is_central = np.abs(surface.vertices[:, 0]) < 1
@@ -69,7 +69,7 @@ def test_a_floor_beside_a_wall():
 
 @pytest.mark.parametrize("degrees", [60, 150, *long(90, 135)])
 def test_the_edge_of_two_planes(degrees):
-    """They leave each other 1/2 - cos(angle)/2, also where the point is on both of them."""
+    """At the edge, 1/2 - cos(angle)/2 is open for both planes."""
     angle = np.radians(degrees)
     surface, edge_distance = trough(2, angle=angle)
     actual = ambient_occlusion([instance_at(surface)], 0)
@@ -79,7 +79,7 @@ def test_the_edge_of_two_planes(degrees):
 
 
 def test_the_smooth_edge_of_two_planes():
-    """Where the two mix, normals are between: a wedge of a right angle around one leaves sin 45."""
+    """The normal bisects the open wedge of 90 degrees, whose visibility is sin 45."""
     surface, edge_distance = trough(sharp=False)
     actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
     selected = (np.abs(surface.vertices[:, 0]) < 1) & (edge_distance == 0)

@@ -1,4 +1,4 @@
-"""Cameras: lenses as in Blender, framing, and what is refused."""
+"""Cameras: lenses as in Blender, framing, and errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ angles = st.floats(-400, 400)
 
 
 def device_coordinates(camera, points):
-    """(V, 3) normalised device coordinates."""
+    """(V, 3) normalized device coordinates."""
     view = points @ camera.view[:3, :3].T + camera.view[:3, 3]
     clip = view @ camera.projection[:, :3].T + camera.projection[:, 3]
     assert (clip[:, 3] > 0).all()
@@ -58,7 +58,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     ndc = device_coordinates(camera, points)
     assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6
     assert np.abs(ndc[:, 2]).max() < 1
-    # As large as fits: along one side of the frame both margins are touched, unless the eye would
+    # As large as possible: the points touch both margins in one direction, unless the eye would
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
     touched = (np.isclose(low, -0.9, atol=1e-6) & np.isclose(high, 0.9, atol=1e-6)).any()
@@ -85,7 +85,7 @@ def test_a_single_point_can_be_framed(perspective):
 
 
 def test_blenders_default_lens():
-    """50 mm on 36 mm at 1920 x 1080, from Blender's calc_matrix_camera."""
+    """50 mm on 36 mm at 1920 x 1080; expected values are from Blender's calc_matrix_camera."""
     camera = perspective_camera(np.eye(4), 1920, 1080, clip=(0.1, 100))
     expected = [
         [2.7777777, 0, 0, 0],

@@ -1,4 +1,4 @@
-"""Where streamlines may step: smooth surfaces stay whole, silhouettes and creases cut."""
+"""Links between pixels: smooth surfaces are continuous, silhouettes and creases separate pixels."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def project_surfaces(surfaces, camera, shifts=None):
 
 
 def camera_above(width=200, scale=4.0, perspective=False, eye=(0, 0, 6), up=(0, 1, 0)):
-    """A camera 6 away from the origin, that sees `scale` units there."""
+    """A camera at distance 6 from the origin whose frame is `scale` units wide there."""
     view = look_at(eye, (0, 0, 0), up)
     if perspective:
         fov = 2 * np.arctan(scale / 12)
@@ -43,7 +43,7 @@ def camera_above(width=200, scale=4.0, perspective=False, eye=(0, 0, 6), up=(0, 
 
 
 def neighbor_pairs(gbuffer, masks):
-    """(K, 2) covered neighbours here and there, and (K,) whether they are linked."""
+    """(K, 2) pairs of neighboring covered pixels, and (K,) whether they are linked."""
     width, height = gbuffer.camera.width, gbuffer.camera.height
     entry = np.full((height + 2, width + 2), -1)
     row, column = np.divmod(gbuffer.pixel, width)
@@ -78,7 +78,7 @@ def test_a_tilted_plane_is_continuous(perspective, tilt, roll):
 @pytest.mark.parametrize("perspective", [False, True])
 @pytest.mark.parametrize("radius", [4, 12, 40, 90])
 def test_spheres_are_continuous(perspective, radius):
-    """Of some pixels' radius, up to the silhouette where the surface is seen edge-on."""
+    """Spheres of a radius in pixels, up to the silhouette, where the surface is seen edge-on."""
     camera = camera_above(200, 200 / radius, perspective)
     gbuffer = project_surfaces([icosphere(5)], camera)
     assert unlinked_fraction(gbuffer) == 0
@@ -87,9 +87,9 @@ def test_spheres_are_continuous(perspective, radius):
 
 @pytest.mark.parametrize(("perspective", "height"), [(False, 1.0), (True, 0.4)])
 def test_an_uneven_surface_is_continuous(perspective, height):
-    """Waves up to 80 degrees steep, seen from above: no inflection is taken for a silhouette.
+    """Waves of up to 80 degrees, seen from above: inflections do not count as silhouettes.
 
-    Under perspective they are less steep, for the border would have silhouettes.
+    Under perspective they are less steep, because there would be silhouettes near the border.
     """
     surface = plane(300, 300, 4.0)
     x, y, _ = surface.vertices.T
@@ -100,7 +100,7 @@ def test_an_uneven_surface_is_continuous(perspective, height):
 
 @pytest.mark.parametrize("perspective", [False, True])
 def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
-    """A torus seen over its near side: no link jumps from the near tube to the far one."""
+    """A torus seen over its near side: the near tube is not linked to the far one."""
     camera = camera_above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
     surface = torus(200, 100)
     gbuffer = project_surfaces([surface], camera)
@@ -118,7 +118,7 @@ def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
 @pytest.mark.parametrize("tilt", [0, 40, 60, 75, 80])
 @pytest.mark.parametrize("same_instance", [False, True])
 def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
-    """One sheet over the half of another, two pixels above it."""
+    """A sheet partly covered by another one, two pixels above it."""
     t = np.radians(tilt)
     camera = camera_above(200, 4.0, perspective, eye=(0, -6 * np.sin(t), 6 * np.cos(t)))
     low, high = plane(3, 3, 6.0), plane(2, 2, 1.0)
@@ -140,7 +140,7 @@ def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
 
 
 def test_the_rim_of_a_bowl_is_a_silhouette():
-    """The outside in front, the inside behind it: no step over the rim."""
+    """The outside of the near wall and the inside of the far wall are not linked at the rim."""
     ball = icosphere(4)
     triangles = ball.corner_vertex.reshape(-1, 3)
     bowl = from_triangles(ball.vertices, triangles[ball.face_center[:, 2] < 0.2])
@@ -172,7 +172,7 @@ def test_creases_separate_pixels_unless_crossed(perspective):
 
 
 def test_inconsistently_oriented_faces_are_continuous():
-    """Half of the faces wound the other way: the surface goes on all the same."""
+    """Half of the faces have the opposite winding, but the surface is continuous."""
     sheet = plane(8, 8, 3.0)
     quads = sheet.corner_vertex.reshape(-1, 4).copy()
     quads[::2] = quads[::2, ::-1]

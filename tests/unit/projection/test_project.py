@@ -48,7 +48,7 @@ def tangent_field(surface, degree, seed=0):
 
 
 def with_other_members(surface, field, member_index):
-    """The same field by other members: each vector turned by `member_index` times 2 pi / N."""
+    """The same field with other members stored: vectors rotated by `member_index` 2 pi / N."""
     angle = member_index * 2 * np.pi / field.degree
     sideways = np.cross(surface.face_normal, field.vectors)
     return RosyField(
@@ -57,7 +57,7 @@ def with_other_members(surface, field, member_index):
 
 
 def members_in_space(gbuffer, degree):
-    """(P, 3) in camera space: the member that the representation stands for."""
+    """(P, 3) members in camera space, from the representation."""
     angle = np.angle(gbuffer.representation.astype(complex)) / degree
     toward_eye = gbuffer.view_direction.astype(float)
     x, y = view_frame(toward_eye)
@@ -79,14 +79,14 @@ def member(z, normal, degree):
 
 
 def screen_directions(gbuffer, degree):
-    """(P,) complex: N-th power of a member's direction on screen (face-on the same for all)."""
+    """(P,) complex directions of a member on screen."""
     axes = screen_jacobians(gbuffer).astype(complex)
     angle = np.angle(gbuffer.representation.astype(complex)) / degree
     return axes[:, 0] * np.cos(angle) + axes[:, 1] * np.sin(angle)
 
 
 def explicit_values(surface, field, gbuffer, chosen, linear):
-    """z at some pixels in the view frame, every vector carried one at a time in space."""
+    """z at some pixels in the view frame, by transporting one vector at a time in space."""
     degree = field.degree
     vectors, faces = field.vectors @ linear.T, surface.face_normal @ linear.T
     corner_normal = surface.corner_normal @ linear.T
@@ -125,7 +125,7 @@ def explicit_values(surface, field, gbuffer, chosen, linear):
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("inside", [False, True])
 def test_values_match_explicit_transport(degree, inside):
-    """On a very coarse sphere, where the ways of transport differ by many degrees."""
+    """On a very coarse sphere, where other paths of transport differ by many degrees."""
     surface = icosphere(1)
     field = tangent_field(surface, degree)
     camera = orbit_camera(surface, 30, 20, 64, 64)
@@ -139,7 +139,7 @@ def test_values_match_explicit_transport(degree, inside):
 
 
 def test_values_are_continuous_across_edges_of_triangles():
-    """Neighbouring pixels on a coarse sphere, of one triangle and of two, differ alike."""
+    """Differences of neighboring pixels are not larger across edges than inside triangles."""
     surface = icosphere(1)
     gbuffer = project(
         [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))],
@@ -211,7 +211,7 @@ def test_moving_mesh_and_camera_together_changes_nothing(seed, degree, perspecti
 @pytest.mark.parametrize("perspective", [True, False])
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 def test_a_tilted_plane_under_a_wide_lens(perspective, display):
-    """Two triangles at 80 degrees: directions on screen are those of the projected vector."""
+    """Two triangles at 80 degrees: directions on screen match the projected vector."""
     corners = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0.0]])
     surface = from_quads(corners, np.array([[0, 1, 2, 3]]))
     vector = np.array([0.6, 0.8, 0.0])
@@ -263,7 +263,7 @@ def test_directions_on_a_sphere_match_projected_members():
 
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 def test_flat_faces_show_their_own_member(display):
-    """A cube of flat faces: in either display each pixel shows its face's member."""
+    """A cube with flat faces: in both displays each pixel shows the member of its face."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.0)])
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     surface = from_quads(corners, np.array(quads), flat_faces=np.ones(6, dtype=bool))
@@ -287,12 +287,12 @@ def unit_z(z):
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 @pytest.mark.parametrize("degree", [1, 4, 5])
 def test_mirrored_objects(display, degree):
-    """A negative scale shows what the mirrored mesh with mirrored vectors shows."""
+    """A negative scale has the same result as a mirrored mesh with mirrored vectors."""
     surface = torus(14, 8)
     field = tangent_field(surface, degree)
     mirror = np.array([-1.0, 1, 1])
     mirrored = build_surface(surface.vertices * mirror, surface.corner_vertex, surface.face_start)
-    # Each face the other way round from the same first corner, so that it is cut the same way.
+    # Each face is reversed from the same first corner, so that it is triangulated the same way.
     backward = (np.arange(0, surface.face_start[-1], 4)[:, None] + [0, 3, 2, 1]).ravel()
     outward = build_surface(
         surface.vertices * mirror, surface.corner_vertex[backward], surface.face_start
@@ -314,9 +314,9 @@ def test_mirrored_objects(display, degree):
 
 @pytest.mark.parametrize("cells", [(4, 4), (9, 2), (1, 6)])
 def test_stretching_rotates_members_by_its_polar_rotation(cells):
-    """A stretch along the axes turns nothing; a shear by s turns by -atan(s / 2).
+    """A stretch along the axes rotates nothing; a shear by s rotates by -atan(s / 2).
 
-    Whatever the shape of the faces that the map is read from.
+    This does not depend on the shape of the faces.
     """
     surface = plane(*cells)
     field = RosyField(4, np.tile([np.cos(0.3), np.sin(0.3), 0], (surface.face_count, 1)) * 2.0)
@@ -335,7 +335,7 @@ def test_stretching_rotates_members_by_its_polar_rotation(cells):
 
 @pytest.mark.parametrize("columns", [4, 40])
 def test_the_field_of_a_sheet_bends_with_it(columns):
-    """A strip rolled to a half tube: the members roll with it."""
+    """A sheet is rolled to a half tube, and the members rotate with it."""
     sheet = plane(columns, columns)
     x, y, _ = sheet.vertices.T
     radius = 2 / np.pi
@@ -352,7 +352,7 @@ def test_the_field_of_a_sheet_bends_with_it(columns):
     expected = np.stack([0.8 * np.cos(about), 0.6 + 0 * about, -0.8 * np.sin(about)], axis=1)
     actual = members_in_space(gbuffer, 1) @ camera.view[:3, :3]
     off = np.degrees(np.arccos(np.clip(dot(actual, expected), -1, 1)))
-    # At the sheet's border normals are one-sided, half a column off.
+    # Normals at the border of the sheet are averages over one side only: half a column off.
     assert off.max() < 1.3 * 90 / columns
     assert np.median(off) < 8 / columns
 
@@ -438,7 +438,7 @@ def test_undefined_and_degenerate_faces_are_zero(display):
 
 
 def test_custom_normals_within_a_fan():
-    """Corner normals that differ within a fan: finite, near the values with common ones."""
+    """Corner normals that differ within a fan: values are close to those with equal normals."""
     surface = icosphere(2)
     field = tangent_field(surface, 4)
     random = np.random.default_rng(1)

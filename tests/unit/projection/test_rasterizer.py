@@ -1,4 +1,4 @@
-"""The rasteriser against a ray caster, and its promises: no cracks, no double hits, any order."""
+"""The rasterizer against a ray caster; no cracks, no overlaps, any order of triangles."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def make_camera(perspective, width=WIDTH, height=HEIGHT):
 
 
 def cast_rays(points, triangles, camera):
-    """For each pixel the nearest triangle, its barycentrics and depth along -z, ray by ray.
+    """Cast a ray through each pixel: nearest triangle, barycentric coordinates and depth along -z.
 
-    Also whether the answer hangs on less than 1e-9, so that rounding may decide it.
+    Also return whether a margin is below 1e-9, so that the result depends on rounding.
     """
     shape = camera.width * camera.height
     owner, depth = np.full(shape, -1), np.full(shape, np.inf)
@@ -72,7 +72,7 @@ def cast_rays(points, triangles, camera):
 @settings(max_examples=15)
 @given(seeds, st.booleans())
 def test_visible_triangles_match_a_ray_caster(seed, perspective):
-    """Triangles anywhere: before, behind and around the eye, across both clip planes."""
+    """Triangles in front of, behind and around the eye, and across both clip planes."""
     random = np.random.default_rng(seed)
     camera = make_camera(perspective, 19, 13)
     points = random.normal(size=(24, 3)) * (2, 2, 4) + (0, 0, -2)
@@ -93,10 +93,10 @@ def test_visible_triangles_match_a_ray_caster(seed, perspective):
 
 
 def jittered_grid(random, cells, snap):
-    """A square from 3.5 to 25.5 pixels cut at random into triangles of either winding.
+    """A square from 3.5 to 25.5 pixels, split at random into triangles of both windings.
 
     With `snap` all vertices lie on multiples of 1 / snap, so that many edges and vertices fall on
-    the centres of pixels.
+    the centers of pixels.
     """
     side = np.linspace(3.5, 25.5, cells + 1)
     x, y = np.meshgrid(side, side)
@@ -119,7 +119,7 @@ def jittered_grid(random, cells, snap):
 
 
 def coverage(clip, triangles, width=WIDTH, height=HEIGHT):
-    """(height, width) how many of the triangles, drawn one by one, hold each pixel."""
+    """(height, width) number of triangles, drawn one by one, that cover each pixel."""
     count = np.zeros(width * height, dtype=int)
     for triangle in triangles:
         count[rasterize(clip, triangle[None], width, height).pixel] += 1
@@ -129,9 +129,9 @@ def coverage(clip, triangles, width=WIDTH, height=HEIGHT):
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 6), st.sampled_from([0, 2, 4]))
 def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
-    """Half-open: pixel centres on the left and lower border are in, the others out."""
+    """Pixel centers on the left and lower borders are inside, on the other borders outside."""
     x, y, triangles = jittered_grid(np.random.default_rng(seed), cells, snap)
-    # In a frame of 32 x 32 pixels clip coordinates of the border are exact.
+    # In a frame of 32 x 32 pixels the clip coordinates of the border are exact.
     count = coverage(flat_clip(x, y, 0.0, 32, 32), triangles, 32, 32)
     expected = np.zeros((32, 32), dtype=int)
     expected[3:25, 3:25] = 1
@@ -141,13 +141,15 @@ def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
 @settings(max_examples=25)
 @given(seeds)
 def test_no_cracks_where_the_near_plane_cuts(seed):
-    """A floor that passes under the eye, cut at random: below the horizon all is covered once."""
+    """A floor under the eye, split at random: all pixels below the horizon are covered once."""
     random = np.random.default_rng(seed)
     camera = make_camera(True)
     x, y, triangles = jittered_grid(random, 5, 0)
     points = np.stack([(x - 14.5) * 30, np.full(x.shape, -0.1), (y - 14.5) * 0.7], axis=1)
     clip = to_clip(points, camera)
-    clip[:, 2] = -0.1 + 0 * clip[:, 2]  # w from behind the eye to before it; near where w = 0.1
+    clip[:, 2] = (
+        -0.1 + 0 * clip[:, 2]
+    )  # w is from behind the eye to in front of it; the near plane is at w = 0.1
     count = coverage(clip, triangles)
     lowest_row = HEIGHT / 2 * (1 - camera.projection[1, 1] * 0.1 / 0.1)
     farthest_row = HEIGHT / 2 * (1 - camera.projection[1, 1] * 0.1 / (11 * 0.7))
@@ -159,7 +161,7 @@ def test_no_cracks_where_the_near_plane_cuts(seed):
 
 
 def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
-    """Two triangles, most of each behind the eye."""
+    """Two triangles, mostly behind the eye."""
     camera = make_camera(True, 200, 150)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
@@ -241,7 +243,7 @@ def test_triangles_without_area_or_outside_the_frame_cover_nothing():
 
 
 def test_vertices_far_outside_the_frame():
-    """A triangle of 10^12 pixels, whose one edge runs through the picture."""
+    """A triangle of 10^12 pixels with an edge across the picture."""
     x, y = np.array([18.5, 18.5, 1e12]), np.array([-1e12, 1e12, 0.0])
     fragments = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
     assert len(fragments.pixel) == HEIGHT * (WIDTH - 18)
@@ -261,7 +263,7 @@ def test_two_million_tiny_triangles_leave_no_hole():
 
 
 def test_near_plane_intersections_do_not_depend_on_the_edge_direction():
-    """Bit for bit: else the two triangles of an edge would be cut apart by rounding."""
+    """Intersections are bit-identical; otherwise rounding would separate adjacent triangles."""
     vertices = np.random.default_rng(3).normal(size=(2000, 4))
     first, second = np.arange(1000), np.arange(1000, 2000)
     forward = rasterizer._intersect_near(vertices, first, second)
@@ -271,7 +273,7 @@ def test_near_plane_intersections_do_not_depend_on_the_edge_direction():
 def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():
     camera = make_camera(True)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
-    # A floor four times, cut in different shapes, and a wall that is whole.
+    # A floor four times, clipped in different ways, and a wall that is not clipped.
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])
     fragments = rasterize(to_clip(points, camera), triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
     assert set(fragments.triangle) <= {0, 1, 2}

@@ -25,6 +25,8 @@ BASE_ROOMS = {
     "settings",
     "cache",
 }
+
+#: What each room may import besides itself. Modules at the top of the package are rooms, too.
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
@@ -96,7 +98,7 @@ def room_of(path: Path) -> str:
 
 def imports_of(path: Path) -> tuple[set[str], set[str]]:
     """Imported modules: dotted paths of those in RoSy, and top-level names of all others."""
-    here = path.relative_to(PACKAGE).parent.parts
+    package_parts = path.relative_to(PACKAGE).parent.parts
     inside, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -104,8 +106,8 @@ def imports_of(path: Path) -> tuple[set[str], set[str]]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             outside.add(node.module.split(".")[0])
         elif isinstance(node, ast.ImportFrom):
-            assert node.level <= len(here) + 1, f"{path} reaches out of the package"
-            base = here[: len(here) - node.level + 1]
+            assert node.level <= len(package_parts) + 1, f"{path} reaches out of the package"
+            base = package_parts[: len(package_parts) - node.level + 1]
             names = [node.module] if node.module else [alias.name for alias in node.names]
             inside |= {".".join((*base, name)) for name in names}
     return inside, outside

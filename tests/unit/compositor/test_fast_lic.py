@@ -73,13 +73,13 @@ def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(tape
 
 @given(
     degree=st.integers(1, 12),
-    here=st.floats(-np.pi, np.pi),
-    there=st.floats(-np.pi, np.pi),
+    first_angle=st.floats(-np.pi, np.pi),
+    second_angle=st.floats(-np.pi, np.pi),
     guide=st.floats(-3, 3),
 )
 @settings(max_examples=200)
-def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, here, there, guide):
-    field = planar_pixel_field(np.array([[here, there]]), degree)
+def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, second_angle, guide):
+    field = planar_pixel_field(np.array([[first_angle, second_angle]]), degree)
     covering = build_covering(
         field, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32)
     )

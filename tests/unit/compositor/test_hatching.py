@@ -220,8 +220,8 @@ def test_lines_run_along_the_field(name):
 
 UNEVEN_LINES = {
     "broken": {"breaks": 1.0},
-    "by a hand that wavers": {"wobble": 1.0},
-    "on paper with a tooth": {"paper_grain": 1.0},
+    "wobble": {"wobble": 1.0},
+    "paper grain": {"paper_grain": 1.0},
     "all three": {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.6},
 }
 
@@ -369,18 +369,18 @@ def ramp_error(look):
 
 
 COLORED_INKS = {
-    "from one to another": {"ink_ramp": True, "ink_colour": "#201848"},
-    "from one to another, light": {
+    "ramp": {"ink_ramp": True, "ink_colour": "#201848"},
+    "ramp, light": {
         "ink_ramp": True,
         "ink_colour": "#c08050",
         "ink_colour_light": "#fff0c0",
         "paper_colour": "#182028",
     },
     "families": {"hue": "families"},
-    "families, coloured": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
+    "families, colored": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_colour": "#f0e8d0", "paper_colour": "#101418"},
-    "families from one to another": {"hue": "families", "ink_ramp": True},
-    "through a third": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
+    "families, ramp": {"hue": "families", "ink_ramp": True},
+    "ramp with a third ink": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
 }
 
 
@@ -399,7 +399,7 @@ def test_a_third_ink_is_between_the_other_two():
 
 @pytest.mark.parametrize(
     "kind",
-    mainly(["families, light", "families from one to another", "through a third"], COLORED_INKS),
+    mainly(["families, light", "families, ramp", "ramp with a third ink"], COLORED_INKS),
 )
 def test_colored_inks_reproduce_a_ramp(kind):
     assert ramp_error(replace(INK, layers=3, **COLORED_INKS[kind])) <= 0.04

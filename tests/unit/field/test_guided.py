@@ -92,7 +92,7 @@ def test_a_field_follows_strokes_within_two_degrees():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not BUNNY.exists(), reason="the bunny is not here")
+@pytest.mark.skipif(not BUNNY.exists(), reason="needs ../shared/data")
 @pytest.mark.long
 def test_ten_strokes_on_the_bunny():
     surface = read_mesh(BUNNY)

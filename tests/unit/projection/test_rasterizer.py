@@ -221,8 +221,10 @@ def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
     expected = rasterize(clip, triangles, WIDTH, HEIGHT)
     monkeypatch.setattr(rasterizer, "BLOCK_SIZE", block)
     monkeypatch.setattr(rasterizer, "MAX_BAND_PIXELS", band)
-    for actual, wanted in zip(rasterize(clip, triangles, WIDTH, HEIGHT), expected, strict=True):
-        assert (actual == wanted).all()
+    for actual, expected_values in zip(
+        rasterize(clip, triangles, WIDTH, HEIGHT), expected, strict=True
+    ):
+        assert (actual == expected_values).all()
 
 
 @pytest.mark.parametrize("z", [-1.0, 1.0])

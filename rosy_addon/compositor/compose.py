@@ -84,22 +84,22 @@ def compose_task(
     tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
     layers = []
     degrees = np.unique(np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]).tolist()
-    for number, degree in enumerate(degrees):
+    for layer_index, degree in enumerate(degrees):
         field = stages.pixel_field(degree, pixel_look)
-        start, stop = number / len(degrees), (number + 1) / len(degrees)
+        start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
         images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
         layer = _build_layer(field, pixel_look, images)
-        index = field.gbuffer_index
+        entries = field.gbuffer_index
         if is_hatched(look):
-            tone = np.clip(tone_rgb[index].mean(axis=1), 0, 1)
+            tone = np.clip(tone_rgb[entries].mean(axis=1), 0, 1)
             modulation = yield from subtask(
                 _line_modulation_task(stages, field, pixel_look, tone), stop, stop
             )
-            color[index], alpha[index] = render_hatching(
+            color[entries], alpha[entries] = render_hatching(
                 field, images, pixel_look, tone, modulation
             )
         else:
-            color[index] = _colorize(field, layer, pixel_look)
+            color[entries] = _colorize(field, layer, pixel_look)
         layers.append(layer)
     if not is_hatched(look):
         color *= tone_rgb

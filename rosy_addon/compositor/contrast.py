@@ -14,7 +14,7 @@ def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Lo
 
     The mean of n samples has full / n times the variance of the mean of all samples. Without this
     correction, contrast is too high at borders and around zeros of the field. Means over less than
-    two cells of the noise fade to gray, as they would look like dots, not streaks.
+    two cells of the noise fade to gray, because they would look like dots, not streaks.
 
     Parameters
     ----------

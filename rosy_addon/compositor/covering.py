@@ -15,8 +15,8 @@ they have no opposites, the forward and backward directions are two separate cov
 and a streamline stays on one of them. A full turn then passes N sheets, not S.
 
 Tracing is bound by memory accesses, not by arithmetic. So the record of a state is short. Pixels
-are *cells* of a window of the frame that has a border: the index of a neighbor is a sum, and no
-table of neighbors is read.
+are *cells* of a window of the frame with an empty border. So the index of a neighbor is the index
+of the cell plus a constant, and no table of neighbors is read.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..field.directional_field import evaluate_harmonics
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, normalized
 
-#: Number of pixels of a block. Their data fits the cache of a processor core.
+#: Pixels per block. Their data fit the cache of a processor core.
 BLOCK_PIXELS = 1 << 14
 
 #: The largest integer in `Covering.state_table`.
@@ -80,17 +80,17 @@ class Covering:
 
     @property
     def line_count(self) -> int:
-        """M."""
+        """M, the number of lines through a cell."""
         return self.sheets // 2
 
     @property
     def cell_count(self) -> int:
-        """C."""
+        """C, the number of cells."""
         return len(self.packed_phase)
 
     @property
     def noise_channels(self) -> int:
-        """K."""
+        """K, the number of noise channels."""
         return self.state_table.shape[1] // 2 - 1
 
     def sheet_offsets(self, max_winding: int) -> tuple[np.ndarray, int]:
@@ -142,8 +142,8 @@ class Covering:
         column = np.rint((forward * x - left * y) / norm).astype(np.intp)
         row = np.rint((forward * y + left * x) / norm).astype(np.intp)
         phase_bits = self.packed_phase.take(cell)
-        is_open = unpack_neighbor_mask(phase_bits) >> (column + 3 * row + 4).astype(np.uint32) & 1
-        neighbor = np.where(is_open, cell + row * self.width + column, SINK_CELL)
+        linked = unpack_neighbor_mask(phase_bits) >> (column + 3 * row + 4).astype(np.uint32) & 1
+        neighbor = np.where(linked, cell + row * self.width + column, SINK_CELL)
         matching = np.rint(phase_bits - self.packed_phase.take(neighbor)).astype(np.intp)
         return (sheet + matching) % self.line_count * self.cell_count + neighbor
 
@@ -247,12 +247,12 @@ def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray
 
 
 def scatter_rows(table: np.ndarray, index: np.ndarray, rows: np.ndarray) -> None:
-    """Assign rows of a table. Rows are copied as scalars, which is faster."""
+    """Assign ``table[index] = rows``. Rows are copied as scalars, which is faster."""
     rows_as_scalars(table)[index] = rows_as_scalars(rows)
 
 
 def rows_as_scalars(table: np.ndarray) -> np.ndarray:
-    """An (n,) view of an (n, k) array whose rows of 8 or 16 bytes are seen as complex scalars."""
+    """An (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
     scalar_type = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
     return table.view(scalar_type)[:, 0]
 
@@ -301,6 +301,7 @@ def _nearest_member(
 
 
 def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotate vectors, given by components, counter-clockwise by an angle in radians."""
     if angle == 0:
         return x, y
     cosine, sine = np.float32(np.cos(angle)), np.float32(np.sin(angle))

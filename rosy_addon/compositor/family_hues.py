@@ -22,8 +22,8 @@ from .pixel_field import PixelField, all_members
 SOFTMAX_SHARPNESS = 1.6
 
 #: (12, 3) display values (sRGB) of the families, in order. Their luminances (Rec. 709) are similar,
-#: 0.27 to 0.31. The first two are orange and blue, which most people with color blindness can tell
-#: apart.
+#: 0.27 to 0.31. The first two are orange and blue, which most people with color blindness can
+#: distinguish.
 PALETTE = np.array(
     [
         (0.86, 0.50, 0.13),

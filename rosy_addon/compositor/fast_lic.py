@@ -48,12 +48,14 @@ HALF_WINDOW_STEPS = 96
 #: windows.
 SEED_SPACING_FACTOR = 1.1
 
-#: Seeds of a later round, relative to the number of streamlines that would just cover the rest.
+#: Number of seeds of a later round, relative to the number of streamlines that would just cover the
+#: remaining lines.
 RESEED_FACTOR = 1.75
 
 #: Maximum fraction of the lines that remain without a streamline after the last round. They take
 #: the average of a neighbor.
 MAX_UNCOVERED_FRACTION = 0.15
+
 #: Maximum number of rounds of seeding.
 MAX_ROUNDS = 8
 
@@ -64,7 +66,7 @@ FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 
 #: than those of the method "brute"; this gives them the same standard deviation.
 CONTRAST_MATCH = 0.99
 
-#: States of a strip of the picture. Bounds the memory.
+#: Maximum number of states in a strip of the picture. Bounds the memory.
 MAX_STATES_PER_STRIP = 1 << 23
 
 

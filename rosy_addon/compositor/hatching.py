@@ -235,8 +235,8 @@ def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
     Returns
     -------
     list of M (P,) ndarrays, or None
-        Indices of inks (see `Inks.ink_at_tone`). Ranks give fractional indices where two lines swap
-        places. None if all lines have the same ink.
+        Indices of inks (see `Inks.ink_at_tone`). If they are ranks, they are fractional where two
+        lines swap ranks. None if all lines have the same ink.
     """
     if not has_ink_per_line(look):
         return None
@@ -249,8 +249,8 @@ def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
 def _line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
     """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
 
-    The line to which k others are nearer has a rank from k to k + 1. Where two lines swap places,
-    both have the same integer rank.
+    A line has a rank from k to k + 1 if k other lines are nearer to the guiding angle. Where two
+    lines swap ranks, both have the same integer rank.
     """
     ranks = []
     for member in all_members(field, look.guiding_angle)[: field.line_count]:
@@ -261,13 +261,13 @@ def _line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
 
 
 def _soft_rank(rank: np.ndarray, rank_count: int) -> np.ndarray:
-    """Ranks rounded down, with a smooth transition around the integers where lines swap places.
+    """Ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
 
     The result is at most `rank_count - 1`.
     """
     soft_rank = np.zeros_like(rank)
-    for layer in range(1, rank_count):
-        soft_rank += smoothstep((rank - layer + RANK_BLEND) / (2 * RANK_BLEND))
+    for boundary in range(1, rank_count):
+        soft_rank += smoothstep((rank - boundary + RANK_BLEND) / (2 * RANK_BLEND))
     return soft_rank
 
 
@@ -293,17 +293,17 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
     onsets = [_onset_darkness(rank, look) for rank in _line_ranks(field, look)]
     first_onset = np.minimum.reduce(onsets)
     delays = [onset - first_onset for onset in onsets]
-    line_fractions = []
+    shares = []
     for darkness in 1 - transmittance:
         onset_weights = [
-            smoothstep((darkness - onset + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
-            for onset in delays
+            smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
+            for delay in delays
         ]
         total = np.add.reduce(onset_weights)
         if len(transmittance) == 1:
-            return [share / total for share in onset_weights]
-        line_fractions.append(onset_weights[len(line_fractions)] / total)
-    return line_fractions
+            return [weight / total for weight in onset_weights]
+        shares.append(onset_weights[len(shares)] / total)
+    return shares
 
 
 def _onset_darkness(rank: np.ndarray, look: Look) -> np.ndarray:

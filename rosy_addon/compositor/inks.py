@@ -1,8 +1,8 @@
 """Inks of hatching: their colors, and the coverage of the paper that a tone requires.
 
 A look has one ink, one ink whose color changes from the shadows to the lights, or one ink for each
-family of lines. The coverage for a tone depends on the luminance of the ink. Crossing lines of one
-ink are not darker where they cross. Inks of several colors are transparent: where they cross, their
+family of lines. The coverage for a tone depends on the luminance of the ink. Lines of one ink are
+not darker where they cross. Inks of several colors are transparent: where their lines cross, the
 transmittances are multiplied. If the ink is lighter than the paper, the same is done with the
 complements (1 - light), which is the blend mode "screen".
 """
@@ -94,8 +94,8 @@ class Inks:
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]
         dark, middle, light = (
-            inks[lower] + fraction * (inks[upper] - inks[lower])
-            for inks in (self.dark, self.middle, self.light)
+            colors[lower] + fraction * (colors[upper] - colors[lower])
+            for colors in (self.dark, self.middle, self.light)
         )
         lighter = np.clip((tone - np.float32(self.mid_tone)) / np.float32(1 - self.mid_tone), 0, 1)
         darker = np.clip(1 - tone / np.float32(self.mid_tone), 0, 1)

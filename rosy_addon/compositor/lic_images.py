@@ -82,14 +82,14 @@ def convolve_members_task(
                 integrate_noise(
                     field,
                     block,
-                    follow,
+                    direction_at,
                     padded_noise,
                     look.length,
                     look.step,
                     block_limit,
                     look.taper,
                 )
-                for follow in tracer(block)
+                for direction_at in tracer(block)
             )
             full_length = look.length if block_limit is None else block_limit
             weights = kernel_weights(forward, backward, full_length, look.taper)

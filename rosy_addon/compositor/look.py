@@ -42,7 +42,7 @@ def _uses_ink_ramp(look: Any) -> bool:
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
-    """Return the arguments that most settings of the panel Ink have in common."""
+    """Return the arguments that most settings of the panel Ink share."""
     return {"panel": "ink", "stage": Stage.SHADING, "applies": applies}
 
 

@@ -59,11 +59,11 @@ def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]
     Look
         Its `unit_size` is the size of a pixel at that center, in Blender units.
     """
-    body_bounds = [world_bounds(instance) for instance in instances if instance.field is not None]
-    if look.unit == "pixels" or not body_bounds:
+    bounds = [world_bounds(instance) for instance in instances if instance.field is not None]
+    if look.unit == "pixels" or not bounds:
         return look
     exact_scale = look.unit_size / (
-        pixel_world_size(np.concatenate(body_bounds), camera) * look.supersampling
+        pixel_world_size(np.concatenate(bounds), camera) * look.supersampling
     )
     scale = float(
         np.clip(
@@ -135,5 +135,6 @@ def _scale_limits(look: Look) -> tuple[float, float]:
 
 
 def _scaled_length(look: Look, setting: Number, scale: float) -> float:
+    """Return a length of a look times a scale, rounded to at least 1 if it is an integer."""
     value = getattr(look, setting.name) * scale
     return max(round(value), 1) if setting.is_integer else value

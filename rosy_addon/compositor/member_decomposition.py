@@ -1,4 +1,4 @@
-"""The method of the paper: decompose the field into member vector fields, with an LIC image each.
+"""The paper's LIC method: decompose the field into member vector fields, with an image of each.
 
 Palacios and Zhang, "Interactive Visualization of Rotational Symmetry Fields on Surfaces", IEEE
 TVCG 17(7), 2011, section 4.

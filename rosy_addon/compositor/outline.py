@@ -43,9 +43,10 @@ def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
     row, column = np.divmod(gbuffer.pixel, np.int32(width))
     cell = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
     entry_of_cell[cell] = np.arange(len(cell), dtype=np.int32)
-    inv_depth, tolerance = affine_depth(gbuffer)
+    # Larger depths are nearer to the eye.
+    depth, tolerance = affine_depth(gbuffer)
     edge_pixels, line_width = _outline_edges(
-        gbuffer, look, entry_of_cell, cell, stride, inv_depth, tolerance
+        gbuffer, look, entry_of_cell, cell, stride, depth, tolerance
     )
     depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
     coverage = np.zeros(len(cell), dtype=np.float32)
@@ -54,7 +55,7 @@ def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
         paintable = (neighbor >= 0) & (
             gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge_pixels]
         )
-        paintable &= inv_depth.take(neighbor) >= inv_depth[edge_pixels] - depth_slack * np.float32(
+        paintable &= depth.take(neighbor) >= depth[edge_pixels] - depth_slack * np.float32(
             max(distance, 1.0)
         )
         pixel_coverage = np.clip(line_width[paintable] - np.float32(distance), 0, 1)
@@ -69,13 +70,13 @@ def _outline_edges(
     entry_of_cell: np.ndarray,
     cell: np.ndarray,
     stride: int,
-    inv_depth: np.ndarray,
+    depth: np.ndarray,
     tolerance: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the pixels at an edge of their surface, unless the neighbor occludes them.
 
     Both sides of a crease are edges, so each gets half the width. There is no edge at the border of
-    the frame, nor where the surface continues and only the field ends.
+    the frame, and none where the surface continues but the field ends.
 
     Returns
     -------
@@ -93,14 +94,12 @@ def _outline_edges(
         inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
         border = np.flatnonzero(inside & defined & (mask >> np.uint16(bit) & 1 == 0))
         neighbor = entry_of_cell.take(cell[border] + (dy * stride + dx))
-        jump = (inv_depth.take(neighbor) - inv_depth[border]) / (
-            np.float32(DEPTH_JUMP) * tolerance[border]
-        )
+        jump = (depth.take(neighbor) - depth[border]) / (np.float32(DEPTH_JUMP) * tolerance[border])
         same_depth = (np.abs(jump) <= 1) & (neighbor >= 0)
         side_width = np.where(same_depth, np.float32(look.outline / 2), np.float32(look.outline))
         side_width[(jump > 1) & (neighbor >= 0)] = 0
-        same_body = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[border]
-        side_width[same_body & ~defined.take(neighbor) & (neighbor >= 0)] = 0
+        same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[border]
+        side_width[same_instance & ~defined.take(neighbor) & (neighbor >= 0)] = 0
         line_width[border] = np.maximum(line_width[border], side_width)
     edge_pixels = np.flatnonzero(line_width)
     return edge_pixels, line_width[edge_pixels]
@@ -110,4 +109,4 @@ def _disc_offsets(radius: int) -> list[tuple[float, int, int]]:
     """(distance, dx, dy) of the pixels within `radius` pixels of a pixel, itself included."""
     steps = range(-radius, radius + 1)
     offsets = [(float(np.hypot(dx, dy)), dx, dy) for dy in steps for dx in steps]
-    return [entry for entry in offsets if entry[0] <= radius]
+    return [offset for offset in offsets if offset[0] <= radius]

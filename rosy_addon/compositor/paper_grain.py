@@ -16,8 +16,8 @@ import numpy as np
 from .image_noise import box_radius, gaussian_blur, hash_bits_2d, tile_bounds
 from .look import Look
 
-#: Standard deviation of the finest of the blurs between which the frequency bands lie, in grains,
-#: and its minimum in pixels.
+#: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
+#: grains, and its minimum in pixels.
 FINEST_SIGMA_GRAINS, MIN_SIGMA_PIXELS = 0.16, 0.7
 
 #: Combined with the seed of a look, so that the paper grain is independent of the streaks.
@@ -111,7 +111,7 @@ def line_offset(grain: float) -> int:
 
 
 def _band_sigmas(grain: float) -> list[float]:
-    """Standard deviations in pixels of the blurs between which the frequency bands lie."""
+    """Standard deviations in pixels of the blurs whose differences are the frequency bands."""
     finest_sigma = max(FINEST_SIGMA_GRAINS * grain, MIN_SIGMA_PIXELS)
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from .pixel_field import PixelField
 
-#: Number of streamlines of a block. Their state, about 40 bytes each, fits the cache of a processor
-#: core.
+#: Streamlines per block, one per pixel. Their state, about 40 bytes each, fits the cache of a
+#: processor core.
 BLOCK_PIXELS = 16384
 
-#: (entries, offsets) -> directions; see `integrate_noise`.
+#: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 

@@ -68,7 +68,7 @@ class PixelField:
 
     @cached_property
     def symmetry(self) -> FieldSymmetry:
-        """Which directions share a line."""
+        """The symmetry of the directions: which of them share a line."""
         return FieldSymmetry(self.degree, tuple(j for j, _ in self.harmonics))
 
     @property
@@ -101,10 +101,10 @@ class PixelField:
 
     @cached_property
     def neighbors(self) -> np.ndarray:
-        """(9, P + 1) int32 entries of the list after a step to each of `NEIGHBOR_OFFSETS`.
+        """(9, P + 1) int32 indices into the list after a step to each of `NEIGHBOR_OFFSETS`.
 
-        The entry is P where streamlines end, and in column P. There is one row per offset, because
-        a streamline mostly steps in one direction and then reads adjacent entries.
+        The index is P where streamlines end, and in column P. There is one row per offset, because
+        a streamline mostly steps in one direction and then reads adjacent elements of a row.
         """
         count = len(self.pixel)
         entry = np.full(self.height * self.width, count, dtype=np.int32)

@@ -227,7 +227,7 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     histograms = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
     return np.array(
-        [np.interp(coverages, ink_fraction @ share, thresholds) for share in histograms]
+        [np.interp(coverages, ink_fraction @ histogram, thresholds) for histogram in histograms]
     )
 
 
@@ -251,7 +251,7 @@ def _noise_sample(
 
 
 def _line_means(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:
-    """(n, side) means over `length` pixels of the rows of (n, width) noise, from its middle."""
+    """(n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
     # Tapered weights are a box filter of half the length, applied twice.
     for window in [max(length // 2, 1)] * 2 if tapered else [length]:
         sums = np.cumsum(np.pad(noise, ((0, 0), (1, 0))), axis=1, dtype=np.float64)

@@ -26,6 +26,9 @@ MAX_LATERAL_OFFSET = 0.25
 class StreamlineBatch:
     """A batch of streamlines of equal length, traced together, with preallocated buffers.
 
+    A *lane* of the buffers is one half of a streamline: n seeds have n forward lanes, followed by n
+    backward lanes.
+
     Parameters
     ----------
     covering : Covering
@@ -51,10 +54,10 @@ class StreamlineBatch:
         self._covering = covering
         self._half_window, self._max_steps = half_window, half_window + look.length
         self._length, self._tapered = look.length, look.taper
-        step, tone, slope = covering.state_scales
-        self._step, self._tone = np.float32(1.5 * step), np.float32(tone)
-        self._lateral_gain = np.float32(LATERAL_GAIN * slope / look.step * step)
-        self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step)
+        step_scale, noise_scale, slope_scale = covering.state_scales
+        self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
+        self._lateral_gain = np.float32(LATERAL_GAIN * slope_scale / look.step * step_scale)
+        self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step_scale)
         self._step_limit = None if step_limit is None else np.tile(step_limit, covering.line_count)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
@@ -103,10 +106,10 @@ class StreamlineBatch:
                 noise_sum = self._prefix_sums_through(last, lanes) - self._prefix_sums_before(
                     first, lanes
                 )
-            # A streamline passes up to half a pixel beside the center of a pixel. The sum is
-            # corrected to the center by its derivative across the streamline.
+            # A streamline passes the center of a pixel at up to half a pixel. The sum is corrected
+            # to the center by its derivative across the streamline.
             lateral = self._lateral_offset[step, :lanes]
-            np.multiply(noise_sum.real, self._tone, out=values[:, :-1])
+            np.multiply(noise_sum.real, self._noise_scale, out=values[:, :-1])
             values[:, :-1] -= (lateral * self._lateral_gain)[:, None] * noise_sum.imag
             values[:, -1] = weights.effective_samples
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
@@ -127,8 +130,8 @@ class StreamlineBatch:
             Last row that is filled.
         """
         covering, lanes = self._covering, 2 * len(seeds)
-        record_type = np.float64 if covering.noise_channels == 1 else np.complex128
-        state_table = covering.state_table.view(record_type)[:, 0]
+        scalar_type = np.float64 if covering.noise_channels == 1 else np.complex128
+        state_table = covering.state_table.view(scalar_type)[:, 0]
         # A streamline makes at most one full turn in four steps.
         max_winding = self._max_steps // 4 + 2
         sheet_offset, backward_offset = covering.sheet_offsets(max_winding)
@@ -144,7 +147,7 @@ class StreamlineBatch:
         position = np.concatenate([seed_offsets, seed_offsets])
         previous_direction = None
         total = np.zeros((lanes, covering.noise_channels), dtype=np.complex64)
-        # Indices of the streamlines that go on, after the first compaction.
+        # Lanes that had not ended at the last compaction; None before the first one.
         active, step_counts = None, np.full(lanes, self._max_steps)
         active_counts = step_counts
         for step in range(self._max_steps + 1):
@@ -162,7 +165,7 @@ class StreamlineBatch:
             flat_displacement, offset = displacement.view(np.float32), position.view(np.float32)
             flat_displacement *= np.float32(-1 / 3)
             displacement += direction
-            flat_displacement *= self._step
+            flat_displacement *= self._step_scale
             position += displacement
             previous_direction = direction
             np.rint(offset, out=flat_displacement)
@@ -209,7 +212,7 @@ class StreamlineBatch:
     def _step_cells(
         self, cell: np.ndarray, mask: np.ndarray, column: np.ndarray, row: np.ndarray
     ) -> np.ndarray:
-        """Step cells by -1 to 1 columns and rows, in place; return the streamlines that end."""
+        """Step cells by -1 to 1 columns and rows, in place; return the indices of those that end."""
         blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
         if len(blocked):
             bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
@@ -231,7 +234,7 @@ class StreamlineBatch:
         direction: np.ndarray,
         total: np.ndarray,
     ) -> None:
-        """Write row `step` of the buffers, for all streamlines or the active ones."""
+        """Write row `step` of the buffers, for all lanes or the active ones."""
         self._totals[slice(lanes) if active is None else active] = total
         self._sums[step, :lanes] = self._totals[:lanes]
         if self._tapered and step:
@@ -250,7 +253,7 @@ class StreamlineBatch:
             self._lateral_offset[step, active] = lateral
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
-        """Fill the rows after the end of the last streamline. Sums of sums still grow there."""
+        """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
         if self._tapered:
             for step in range(last_step, self._max_steps):
                 np.add(

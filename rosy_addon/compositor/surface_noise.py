@@ -1,4 +1,4 @@
-"""Noise anchored to surfaces: a solid texture of white noise whose cells keep their size on screen.
+"""Noise anchored to surfaces: solid white noise whose cells keep their size on screen.
 
 A cell of the noise is a cube in the rest space of a mesh instance, so streaks do not slide over the
 surface when the surface or the camera moves. The cells come in octaves of size. At each pixel three
@@ -40,7 +40,7 @@ OCTAVES = 3
 #: Range of the ratio of the size of cells to `grain` in which the contrast is corrected for it.
 CONTRAST_SCALE_RANGE = (0.25, 4.0)
 
-#: Added to the numbers of octaves, so that positive integers are hashed.
+#: Added to octave indices, so that positive integers are hashed.
 OCTAVE_OFFSET = 64
 
 
@@ -124,12 +124,12 @@ def cell_scale(
     """
     if not pixel_size:
         return np.float32(1)
-    body_scale = np.array(
+    instance_scale = np.array(
         [pixel_size / matrix_scale(instance.matrix) for instance in gbuffer.instances],
         dtype=np.float32,
     )
     return np.maximum(
-        body_scale[gbuffer.instance_id] / np.maximum(size, 1e-30), np.float32(min_scale)
+        instance_scale[gbuffer.instance_id] / np.maximum(size, 1e-30), np.float32(min_scale)
     )
 
 
@@ -182,7 +182,7 @@ def instance_hashes(names: Sequence[str]) -> np.ndarray:
     """(B,) uint32 hashes of mesh instances, stable from picture to picture.
 
     A hash depends on the name of an instance and, if several instances have that name, on its
-    position among them. The name of a mesh file is its path, of which the folder does not count.
+    position among them. The name of a mesh file is its path; the folder is ignored.
     """
     counts: Counter[str] = Counter()
     hashes = []
@@ -213,7 +213,7 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 def _low_frequencies(gbuffer: GBuffer, values: np.ndarray, sigma: float) -> np.ndarray:
     """(P,) values after a Gaussian blur that ignores pixels outside the G-buffer."""
     row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
-    # The empty margin is as wide as the reach of the blur.
+    # The empty margin is as wide as the support of the blur.
     margin = 3 * box_radius(sigma)
     bottom, left = int(row[0]) - margin, int(column.min()) - margin
     shape = int(row[-1]) - bottom + 1 + margin, int(column.max()) - left + 1 + margin

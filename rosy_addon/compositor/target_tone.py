@@ -127,7 +127,9 @@ def target_tone(
     return tone
 
 
-def check_tone(look: Look, body_tones: Sequence[object], reference: ReferenceRender | None) -> None:
+def check_tone(
+    look: Look, instance_tones: Sequence[object], reference: ReferenceRender | None
+) -> None:
     """Check that the source of a look's tone exists.
 
     Parameters
@@ -145,7 +147,7 @@ def check_tone(look: Look, body_tones: Sequence[object], reference: ReferenceRen
     """
     if look.tone == "picture" and reference is None:
         raise RosyError("tone 'picture' needs a picture, but none is given")
-    if look.tone in ("attribute", "image") and all(tone is None for tone in body_tones):
+    if look.tone in ("attribute", "image") and all(tone is None for tone in instance_tones):
         raise RosyError(f"tone '{look.tone}' needs an {look.tone}, but no object has one")
 
 

@@ -2,7 +2,7 @@
 
 The angle is a sum of a few plane waves. They are anchored like the noise: to the picture, or to the
 rest space of the mesh instances. In rest space the wavelengths come in octaves that follow the size
-of a pixel, and two octaves are blended, similar to `surface_noise`. So the waves stay with the
+of a pixel, and two octaves are blended, similar to `surface_noise`. So the waves move with the
 surface and keep their wavelength on screen.
 """
 
@@ -34,8 +34,8 @@ WOBBLE_STD = 0.09
 #: the same bits on all platforms.
 UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
 
-#: Number of pixels that are processed at once.
-_BLOCK_PIXELS = 1 << 15
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 15
 
 
 def has_wobble(look: Look) -> bool:
@@ -87,8 +87,8 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
         size = np.ones(len(row), dtype=np.float32)
     level = np.log2(np.maximum(size, 1e-30) * np.float32(look.grain * MEAN_WAVELENGTH_GRAINS))
     angle = np.empty(len(level), dtype=np.float32)
-    for start in range(0, len(level), _BLOCK_PIXELS):
-        block = slice(start, start + _BLOCK_PIXELS)
+    for start in range(0, len(level), BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
         angle[block] = _wave_sum(position[:, block], level[block])
     return np.float32(WOBBLE_STD) * angle
 

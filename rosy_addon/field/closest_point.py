@@ -39,10 +39,10 @@ def closest_triangles(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
     triangle = np.zeros(len(points), dtype=np.int32)
     distance = np.full(len(points), np.inf)
     if len(grid.large_triangles):
-        all_points = np.arange(len(points))
+        point_index = np.arange(len(points))
         grid.update_closest(
             points,
-            np.repeat(all_points, len(grid.large_triangles)),
+            np.repeat(point_index, len(grid.large_triangles)),
             np.tile(grid.large_triangles, len(points)),
             triangle,
             distance,
@@ -73,7 +73,8 @@ class _TriangleGrid:
         self.origin = low.min(axis=0)
         extent = high.max(axis=0) - self.origin
         longest = max(float(extent.max()), 1e-300)
-        # The surface passes about T cells if T cell faces cover its area (six sides of the box).
+        # The surface passes through about T cells if T cell faces have the area of its bounding box,
+        # which has six sides.
         self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(corners) / 6), 1)
         self.shape = np.maximum((extent / self.cell_size).astype(np.int64) + 1, 1)
         self.max_ring = int(self.shape.max()) + 1

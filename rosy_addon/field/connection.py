@@ -74,12 +74,12 @@ class Connection:
 
     @cached_property
     def component(self) -> np.ndarray:
-        """(n,) int32: the number of the connected component of each node."""
+        """(n,) int32: the index of the connected component of each node."""
         return connected_components(self.node_count, np.stack([self.tail, self.head], axis=1))
 
 
 def build_connection(surface: Surface) -> Connection:
-    """Build the connection of the triangles of a surface, at its present vertex positions."""
+    """Build the connection of the triangles of a surface, at `Surface.vertices`."""
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
     edges = build_edges(vertex, start)

@@ -27,7 +27,7 @@ class Conversion:
     Attributes
     ----------
     degree : int or None
-        The new degree, a multiple or a divisor of the present one; None to keep it.
+        The new degree, a multiple or a divisor of the old one; None to keep it.
     rotation : float
         Counter-clockwise rotation about the normals, radians.
     smoothing_length : float
@@ -80,9 +80,9 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
 def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
     """Change the degree of a field to a multiple or a divisor.
 
-    For a multiple, the members stay and others are added between them. For a divisor, a subset of
-    the members is selected on each face so that the subsets match from face to face. If the subsets
-    do not match after a loop around a singularity, a seam remains.
+    For a multiple, members are added between the existing ones. For a divisor, a subset of the
+    members is selected on each face so that the subsets match from face to face. If the subsets do
+    not match after a loop around a singularity, a seam remains.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     surface : Surface
     field : RosyField
     period : int
-        Members whose numbers are equal modulo this are equivalent; a divisor of N.
+        Members whose indices are equal modulo this are equivalent; a divisor of N.
 
     Returns
     -------

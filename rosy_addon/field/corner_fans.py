@@ -1,4 +1,4 @@
-"""Transport of face values to corners, averaging over smooth fans, and transport back."""
+"""Transport face values to corners, average them over smooth fans, and transport them back."""
 
 from __future__ import annotations
 

@@ -67,8 +67,8 @@ def load_field(
 
     ============  ==================================================================
     `.rosy`       a count, N, and rows x y z with one member each
-    `.rawfield`   N, a count, and rows of all N directions, a RoSy or not
-    `.obj`        a mesh with the field in comments, as the program fieldgen writes it
+    `.rawfield`   N, a count, and rows of all N directions, which need not be a RoSy
+    `.obj`        a mesh with the field in comments, as written by the program fieldgen
     `.txt`        rows of 3 numbers (a member each), of 3 N (all directions), or of 9
                   that are symmetric 3 x 3 tensors
     `.npy`        the same as an array, (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
@@ -83,7 +83,7 @@ def load_field(
     surface : Surface
         The mesh of the field.
     degree : int, optional
-        The required degree N; any if not given. Plain files with one member a row do not state a
+        The required degree N; any if not given. Plain files with one member per row do not state a
         degree. They get this one, or `DEFAULT_DEGREE`.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
@@ -181,8 +181,8 @@ def _source_surface(
         return read_mesh(mesh)
     count = len(raw.values)
     if raw.polygons is not None:
-        source = len(raw.polygons.vertices), raw.polygons.face_count
-        if source == (len(surface.vertices), surface.face_count):
+        counts = len(raw.polygons.vertices), raw.polygons.face_count
+        if counts == (len(surface.vertices), surface.face_count):
             return None
         return build_surface(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
     if count == surface.face_count:
@@ -190,7 +190,7 @@ def _source_surface(
     candidates = [
         path.with_suffix(suffix) for suffix in MESH_READERS if suffix != path.suffix.lower()
     ]
-    mesh_path = next((other for other in candidates if other.is_file()), None)
+    mesh_path = next((candidate for candidate in candidates if candidate.is_file()), None)
     if mesh_path is None:
         return None
     source = read_mesh(mesh_path)
@@ -206,7 +206,7 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
 
     Numbers are written so that reading gives exactly the same float64; the field in an `.obj` file
     differs, because it is averaged onto the vertices. Fields made from directions are written with
-    their `source_directions`, where the format has all directions.
+    their `source_directions`, if the format stores all directions.
 
     Raises
     ------

@@ -195,7 +195,7 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
     if settings.axis_guides:
         position, axis, radius = (
-            np.array(part, dtype=np.float64) for part in zip(*settings.axis_guides, strict=True)
+            np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
         )
         guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
     if settings.uv is not None:
@@ -370,7 +370,7 @@ def _face_curvature(
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
-    uu, uv, vv, up, mixed, vq = (sum_per_face(each, surface.face_start) for each in products)
+    uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
     trace = uu + vv
     trace[trace == 0] = 1.0
     regularization = 1e-9 * trace  # faces without area get curvature 0 instead of a singular system

@@ -180,7 +180,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     uu, uv_sum, vv = (
         sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
     )
-    up, vp = (sum_per_face(part * position, surface.face_start) for part in (u, v))
+    up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
@@ -244,7 +244,9 @@ def _resample(stroke: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarra
     count = max(int(arc_length[-1] / spacing), 1)
     midpoint = (np.arange(count) + 0.5) * (arc_length[-1] / count)
 
-    def at(distance: np.ndarray) -> np.ndarray:
+    def point_at(distance: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(distance, arc_length, column) for column in stroke.T], axis=1)
 
-    return at(midpoint), normalize(at(midpoint + spacing) - at(midpoint - spacing))
+    return point_at(midpoint), normalize(
+        point_at(midpoint + spacing) - point_at(midpoint - spacing)
+    )

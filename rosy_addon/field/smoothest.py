@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import Connection, build_connection, laplacian
+from .connection import BLOCK_TRIANGLES, Connection, build_connection, laplacian
 from .frames import dot
 from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
@@ -26,9 +26,6 @@ from .surface import Surface
 #: seconds and make no visible difference.
 TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
 MAX_ITERATIONS = 60
-
-#: Triangles processed at once, to bound memory and fit in the CPU caches.
-BLOCK_TRIANGLES = 1 << 14
 
 #: Largest number of iterations on each intermediate level; they reduce those on the finest level.
 COARSE_ITERATIONS = 12
@@ -177,8 +174,8 @@ def _lobpcg_task(
     def combine(vectors: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
         """The linear combination of vectors with (components, k) coefficients."""
         total = vectors[0] * broadcast(coefficients[:, 0])
-        for number, vector in enumerate(vectors[1:], 1):
-            total += vector * broadcast(coefficients[:, number])
+        for index, vector in enumerate(vectors[1:], 1):
+            total += vector * broadcast(coefficients[:, index])
         return total
 
     z, image = normalize_in_place(z, matrix @ z)
@@ -195,8 +192,8 @@ def _lobpcg_task(
         )
         search = normalize_in_place(direction, matrix @ direction)
         basis = [(z, image), search, *previous_step]
-        vectors, images = [one for one, _ in basis], [one for _, one in basis]
-        weighted = [mass * one for one in vectors]
+        vectors, images = [pair[0] for pair in basis], [pair[1] for pair in basis]
+        weighted = [mass * vector for vector in vectors]
         coefficients, energy = _rayleigh_ritz(
             gram_matrices(vectors, images), gram_matrices(vectors, weighted)
         )

@@ -403,8 +403,8 @@ def _smooth_corner_pairs(
 def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     """Label the connected components of a graph.
 
-    Each node points to the smallest node known to be in its component. Each round links the roots
-    of connected nodes, then flattens the trees by pointer jumping.
+    Each node points to a root: the smallest node known to be in its component. Each round links the
+    roots of connected nodes, then flattens the trees by pointer jumping.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Transfer of a field between two meshes of the same shape, by position."""
+"""Transfer a field between two meshes of the same shape, by position."""
 
 from __future__ import annotations
 
@@ -52,19 +52,19 @@ def transfer_field(
     extent = max(source.extent, 1e-300)
     normal = target.face_normal
     normal_cosine = dot(normal, source.face_normal[face])
-    is_far = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
-    is_far |= ~normal.any(axis=1)
-    unmatched = is_far & normal.any(axis=1)
-    if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(is_far):
+    undefined = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
+    undefined |= ~normal.any(axis=1)
+    unmatched = undefined & normal.any(axis=1)
+    if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
         raise RosyError(
-            f"{field_name}: {unmatched.sum()} of {len(is_far)} faces of {target.name} do not lie on "
+            f"{field_name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
             f"{source.name} (distances up to {distance.max():.3g}): the two meshes must have the same "
             "shape and position"
         )
     vectors = field.vectors[face]
     length = np.sqrt(dot(vectors, vectors))[:, None]
     vectors = normalize(transport(vectors, source.face_normal[face], normal)) * length
-    vectors[is_far] = 0
+    vectors[undefined] = 0
     direction_ratios = None if field.direction_ratios is None else field.direction_ratios[face]
     return RosyField(field.degree, vectors, direction_ratios, field.family_count)
 

@@ -161,8 +161,8 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """(k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
     area = _cross(b - a, c - a)
-    one, two, three = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
-    scale = one * two * three / np.maximum(np.minimum(np.minimum(one, two), three), 1e-300)
+    ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
+    scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
 
 

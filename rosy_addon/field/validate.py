@@ -32,8 +32,8 @@ from .surface import Surface, mean_per_face
 #: of this.
 FACE_TOLERANCE_DEG = 5.0
 
-#: The same for vectors on vertices. Definitions of vertex normals differ: on coarse meshes,
-#: angle-weighted and area-weighted normals are this far apart.
+#: The same for vectors on vertices. Programs define vertex normals differently: on coarse meshes,
+#: angle-weighted and area-weighted normals differ by this much.
 VERTEX_TOLERANCE_DEG = 20.0
 
 #: Largest fraction of the nonzero vectors that may exceed the tolerance, for example on needle
@@ -265,7 +265,7 @@ def project_to_tangent(
     Raises
     ------
     RosyError
-        If more than `MAX_OUTLIER_FRACTION` of them are off by more than `tolerance_deg` degrees.
+        If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
     length = np.sqrt(dot(vectors, vectors))
     normal_component = dot(vectors, normal)

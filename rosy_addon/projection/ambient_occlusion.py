@@ -18,14 +18,14 @@ from .shadow_maps import (
     visibility_from,
     world_bounds,
 )
+from .vector_components import cofactor_matrix
 
 #: Defaults: number of light directions, and width and height of each shadow map in pixels.
 DIRECTION_COUNT, DEPTH_MAP_SIZE = 256, 512
 
 #: Sample points are moved from their vertex into the adjacent faces: by this many pixels of the
 #: shadow map, but at most by this fraction of the distance to the mean of the face centers.
-#: Otherwise a wall that stands on an edge would hide half of the filter window of a sample on that
-#: edge.
+#: Otherwise an adjacent wall would hide half of the filter window of a sample on their common edge.
 SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
@@ -67,7 +67,7 @@ def occlusion_task(
         raise RosyError(f"{direction_count} directions of light: choose 1 or more")
     instance = instances[instance_id]
     receiver_points = world_bounds(instance)
-    caster_points = np.concatenate([world_bounds(other) for other in instances])
+    caster_points = np.concatenate([world_bounds(caster) for caster in instances])
     pixel_size = float(np.ptp(receiver_points, axis=0).max()) / resolution
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
@@ -118,9 +118,8 @@ def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np
     offset = center - position
     length = np.sqrt(dot(offset, offset))
     fraction = np.minimum(MAX_INSET_FRACTION, inset / np.maximum(length, 1e-30))
-    a, b, c = linear
-    cofactors = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
-    return position + fraction[:, None] * offset, normalize(surface.fan_normal @ cofactors.T)
+    normals = normalize(surface.fan_normal @ cofactor_matrix(linear).T)
+    return position + fraction[:, None] * offset, normals
 
 
 def _fan_positions(surface: Surface) -> tuple[np.ndarray, np.ndarray]:

@@ -142,7 +142,7 @@ def cached_corner_field_task(
 ) -> Task[CornerField]:
     """Do the same as `corner_field_task`, with results stored in a cache if one is given.
 
-    One corner field is shared by all cameras, and by instances that differ only in their location.
+    All cameras, and instances that differ only in their location, share one corner field.
     """
     if cache is None:
         return (yield from corner_field_task(surface, matrix, field, display))
@@ -264,7 +264,9 @@ def _corner_normals(
     custom_normals_at_corners = [
         [
             component.astype(np.float32)
-            for component in normalize_components([part.take(corner) for part in custom_normals])
+            for component in normalize_components(
+                [values.take(corner) for values in custom_normals]
+            )
         ]
         for corner in corners
     ]

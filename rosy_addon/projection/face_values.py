@@ -1,4 +1,4 @@
-"""The field on the faces of a deformed surface, transported from the faces at rest."""
+"""The field on the faces of a deformed surface, transported from the rest shape."""
 
 from __future__ import annotations
 
@@ -86,10 +86,10 @@ def face_values(
         rest = np.ascontiguousarray(
             (surface.vertices if surface.rest_vertices is None else surface.rest_vertices).T
         )
-    for size, block in _faces_by_size(surface.face_start):
+    for corner_count, block in _faces_by_size(surface.face_start):
         first_corner = surface.face_start[:-1][block]
         corner_vertex = [
-            surface.corner_vertex.take(first_corner + corner) for corner in range(size)
+            surface.corner_vertex.take(first_corner + corner) for corner in range(corner_count)
         ]
         points = relative_to_first(deformed, corner_vertex)
         normal = polygon_normals(points)
@@ -106,10 +106,10 @@ def face_values(
             member = _transport_member(
                 relative_to_first(rest, corner_vertex), points, vectors, x, y
             )
-        size = np.abs(member)
-        member /= np.maximum(size, np.finfo(np.float64).tiny)
+        rho = np.abs(member)
+        member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
-        result.representation[block] = power(member, field.degree) * (size * has_area)
+        result.representation[block] = power(member, field.degree) * (rho * has_area)
         for channel, values in relative_channels.items():
             rotation = signed_power(member, rotation_order(channel, field.degree))
             result.channels[channel][block] = values[block] * rotation * has_area
@@ -120,7 +120,7 @@ def face_values(
 
 
 def _faces_by_size(face_start: np.ndarray) -> Iterator[tuple[int, slice | np.ndarray]]:
-    """Yield blocks of faces that have the same number of corners: this number, and the faces."""
+    """Yield blocks of faces with equally many corners, as the number of corners and the faces."""
     corner_counts = np.diff(face_start)
     if (corner_counts == corner_counts[0]).all():
         for start in range(0, len(corner_counts), BLOCK_SIZE):
@@ -139,11 +139,14 @@ def _similarity_scale(linear: np.ndarray) -> float | None:
 
     A similarity is a uniform scale with a rotation or reflection.
     """
-    square = linear.T @ linear
-    scale = np.trace(square) / 3
-    if not scale > 0 or np.abs(square - scale * np.eye(3)).max() > SIMILARITY_EPS * scale:
+    gram = linear.T @ linear
+    squared_scale = np.trace(gram) / 3
+    if (
+        not squared_scale > 0
+        or np.abs(gram - squared_scale * np.eye(3)).max() > SIMILARITY_EPS * squared_scale
+    ):
         return None
-    return float(np.sqrt(scale))
+    return float(np.sqrt(squared_scale))
 
 
 def _transport_member(
@@ -171,20 +174,20 @@ def _transport_member(
 
     Notes
     -----
-    Write the corners in a frame of their plane as complex numbers: w at rest, u deformed. The
-    linear map from w to u of least squared error, u = a w + b conj(w), has the polar rotation
-    a / |a|. Only this rotation is applied. So the members keep their length and stay 2 pi / N
-    apart, however the face is stretched. Both normals follow from the order of the corners, so
-    mirrored faces need no special case.
+    Let the corners, as complex numbers in a frame of their plane, be w in the rest shape and u in
+    the deformed shape. The linear map from w to u of least squared error, u = a w + b conj(w), has
+    the polar rotation a / |a|. Only this rotation is applied, so the members keep their length and
+    their angles of 2 pi / N, even if the face is stretched. Both normals follow from the order of
+    the corners, so mirrored faces need no special case.
     """
     rest_normal = polygon_normals(rest)
     rest_x, rest_y = tangent_frame_components(rest_normal)
     w, u = plane_coordinates(rest, rest_x, rest_y), plane_coordinates(deformed, x, y)
     ww = uw = squared_norm = 0
-    for one, other in zip(w, u, strict=True):
-        ww, uw = ww + one * one, uw + other * one
-        squared_norm = squared_norm + (one.real**2 + one.imag**2)
-    rotation = squared_norm * sum(other * one.conj() for one, other in zip(w, u, strict=True))
+    for w_k, u_k in zip(w, u, strict=True):
+        ww, uw = ww + w_k * w_k, uw + u_k * w_k
+        squared_norm = squared_norm + (w_k.real**2 + w_k.imag**2)
+    rotation = squared_norm * sum(u_k * w_k.conj() for w_k, u_k in zip(w, u, strict=True))
     rotation -= np.conj(ww) * uw
     rotation *= np.logical_or.reduce(rest_normal)
     rotation /= np.maximum(np.abs(rotation), np.finfo(np.float64).tiny)

@@ -25,7 +25,7 @@ class MeshInstance:
     matrix : (4, 4) float64 ndarray
         Object to world space.
     field : RosyField or None
-        On the faces of `surface`. An instance without a field is not drawn, but hides others.
+        On the faces of `surface`. An instance without a field is not drawn, but occludes others.
     tone : SurfaceTone or None
         The tone of the surface, if it is given: painted, computed or from an image.
     """

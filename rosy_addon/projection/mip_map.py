@@ -77,7 +77,9 @@ def _sample_bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray, repeat: bo
         fractions.append((position - first).astype(np.float32))
         first = first.astype(np.intp)
         pair = first, first + 1
-        neighbors.append([end % size if repeat else np.clip(end, 0, size - 1) for end in pair])
+        neighbors.append(
+            [index % size if repeat else np.clip(index, 0, size - 1) for index in pair]
+        )
     (low, high), (left, right) = neighbors
     fraction_y, fraction_x = fractions
     below = image[low, left] * (1 - fraction_x) + image[low, right] * fraction_x

@@ -1,7 +1,7 @@
 """Stepping over the pixels of a G-buffer: directions on screen, and continuity between neighbors.
 
 `screen_jacobians` maps tangents of the surface to directions on screen. `neighbor_masks` marks the
-neighboring pixels on which the surface continues, without a silhouette between.
+neighboring pixels on which the surface continues, without a silhouette in between.
 """
 
 from __future__ import annotations
@@ -76,9 +76,10 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
     Returns
     -------
     (P,) uint16 ndarray
-        Bit ``(dy + 1) * 3 + (dx + 1)`` is set if the surface continues on the neighbor at (dx, dy):
-        the neighbor shows the same mesh instance, and there is no silhouette between, and no crease
-        that may not be crossed. Bit 4, the pixel itself, is always set. The relation is symmetric.
+        Bit ``(dy + 1) * 3 + (dx + 1)`` is set if the surface continues on the neighbor at (dx, dy).
+        Then the neighbor shows the same mesh instance, and they are separated neither by a
+        silhouette nor, unless creases may be crossed, by a crease. Bit 4, the pixel itself, is
+        always set. The relation is symmetric.
 
     Notes
     -----
@@ -132,8 +133,8 @@ def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     depth, tolerance : (P,) float32 ndarray
-        Depth: z if orthographic, -1 / z if perspective; larger is nearer to the eye. Tolerance:
-        permitted deviation from the prediction of the tangent plane, one pixel away.
+        Depth: z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
+        Tolerance: permitted deviation from the prediction of the tangent plane, one pixel away.
     """
     depth, tolerance = np.empty((2, len(gbuffer.pixel)), dtype=np.float32)
     for start in range(0, len(gbuffer.pixel), BLOCK_PIXELS):
@@ -227,6 +228,7 @@ def _depth_slopes(
     slope_x *= limit
     slope_y *= limit
     steepness *= limit
+    # From here on, `steepness` becomes the tolerance, in place.
     steepness *= np.float32(SLOPE_TOLERANCE)
     steepness += np.float32(DEPTH_TOLERANCE)
     steepness /= scale

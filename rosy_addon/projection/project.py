@@ -23,10 +23,7 @@ from .camera import Camera, pixel_rays
 from .corner_field import CornerField, cached_corner_field_task
 from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
-from .pixel_neighbors import neighbor_masks, screen_jacobians
 from .rasterizer import Fragments, rasterize
-
-__all__ = ["neighbor_masks", "project", "project_task", "screen_jacobians"]
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
 BLOCK_PIXELS = 1 << 14
@@ -67,7 +64,7 @@ def project_task(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Instances without a field only hide others.
+        Instances without a field only occlude others.
     camera : Camera
     display : {"smooth", "flat"}
         Average values and normals over smooth fans and interpolate them, or keep those of each
@@ -108,9 +105,9 @@ def project_task(
         )
         triangle = visible.triangle[pixels]
         instance = instances[instance_id]
-        start, middle, stop = (
-            0.4 + 0.6 * share / count
-            for share in (
+        start, midpoint, stop = (
+            0.4 + 0.6 * pixels_before / count
+            for pixels_before in (
                 pixels_done,
                 pixels_done + 0.5 * len(triangle),
                 pixels_done + len(triangle),
@@ -121,13 +118,13 @@ def project_task(
                 instance.surface, instance.matrix, instance.field, display, cache
             ),
             start,
-            middle,
+            midpoint,
         )
         corner_field = corner_field.rotated(camera.view[:3, :3])
         _allocate_channels(gbuffer, corner_field)
         for block_start in range(0, len(triangle), BLOCK_PIXELS):
             yield Progress(
-                middle + (stop - middle) * block_start / len(triangle),
+                midpoint + (stop - midpoint) * block_start / len(triangle),
                 "rotating the field into the view plane",
             )
             block = slice(block_start, block_start + BLOCK_PIXELS)
@@ -148,7 +145,7 @@ def cached_project_task(
 ) -> Task[GBuffer]:
     """Do the same as `project_task`, with the G-buffer stored in a cache.
 
-    It is found again for the same instances (by identity), the same camera (by value) and display.
+    The key consists of the instances (by identity), the camera (by value) and the display.
     """
     camera_key = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     return (

@@ -182,8 +182,8 @@ def _clip_crossing_triangles(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Clip K triangles that cross the near plane, and triangulate what is in front of it.
 
-    In each crossing triangle, one vertex (`apex`) is alone on its side of the plane. If it is in
-    front, a triangle remains, otherwise a quadrilateral.
+    In each crossing triangle, one vertex (`apex`) is on one side of the plane and two are on the
+    other. If the apex is in front, a triangle remains, otherwise a quadrilateral.
 
     Parameters
     ----------
@@ -392,22 +392,24 @@ def _spans_with_depth(
     slope_y *= row + 0.5
     base += slope_y
     end_depths = []
-    for column in (first + 0.5, last - 0.5):
-        column *= slope_x
-        column += base
+    # The centers of the first and last columns become the depths there, in place.
+    for depth in (first + 0.5, last - 0.5):
+        depth *= slope_x
+        depth += base
         # The gradient of a sliver may be dominated by rounding errors, so the depth is clamped to
         # the range of the triangle.
-        np.maximum(column, min_depth, out=column)
-        end_depths.append(np.minimum(column, max_depth, out=column))
-    start, end = end_depths
+        np.maximum(depth, min_depth, out=depth)
+        end_depths.append(np.minimum(depth, max_depth, out=depth))
+    first_depth, depth_step = end_depths
     pixel_count = last - first
-    end -= start
-    end /= np.maximum(pixel_count - 1, 1)
+    # The depth at the last pixel becomes the step from pixel to pixel, in place.
+    depth_step -= first_depth
+    depth_step /= np.maximum(pixel_count - 1, 1)
     return _Spans(
         start=row * width + first.astype(np.intp),
         count=pixel_count.astype(np.intp),
-        depth=start,
-        depth_step=end,
+        depth=first_depth,
+        depth_step=depth_step,
         triangle=local_triangle,
     )
 
@@ -470,9 +472,9 @@ def _sorted_by_y(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vertex indices of each triangle, sorted from the lowest to the highest y."""
 
-    def ordered(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        swap = y.take(one) > y.take(other)
-        return np.where(swap, other, one), np.where(swap, one, other)
+    def ordered(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        swap = y.take(first) > y.take(second)
+        return np.where(swap, second, first), np.where(swap, first, second)
 
     a, b = ordered(a, b)
     b, c = ordered(b, c)

@@ -1,6 +1,6 @@
 """Positions of the pixels of a G-buffer on the rest shapes of the meshes.
 
-They move with the surface when it is transformed or deformed.
+Points of the surface keep these positions when the mesh is transformed or deformed.
 """
 
 from __future__ import annotations
@@ -63,7 +63,6 @@ class RestCoordinates:
         total = weight.sum(axis=0)
         total[np.abs(total) < 1e-30] = 1
         weight /= total
-        # On a triangle that is seen edge-on, an offset may reach far beyond the triangle.
         np.clip(weight, *BARYCENTRIC_RANGE, out=weight)
         return sum(
             corner_weight * corner

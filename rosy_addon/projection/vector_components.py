@@ -32,7 +32,7 @@ def cross_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarra
 
 def subtract_components(a: VectorComponents, b: VectorComponents) -> list[np.ndarray]:
     """Return the components of a - b."""
-    return [one - other for one, other in zip(a, b, strict=True)]
+    return [component_a - component_b for component_a, component_b in zip(a, b, strict=True)]
 
 
 def normalize_components(vectors: VectorComponents) -> list[np.ndarray]:
@@ -91,10 +91,10 @@ def polygon_normals(points: Sequence[VectorComponents]) -> list[np.ndarray]:
     without area. `points` are the corners as returned by `relative_to_first`.
     """
     area_vector = cross_components(points[0], points[1])
-    for one, other in pairwise(points[1:]):
+    for first, second in pairwise(points[1:]):
         area_vector = [
             total + component
-            for total, component in zip(area_vector, cross_components(one, other), strict=True)
+            for total, component in zip(area_vector, cross_components(first, second), strict=True)
         ]
     return normalize_components(area_vector)
 

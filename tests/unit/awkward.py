@@ -1,4 +1,4 @@
-"""Meshes that are no closed smooth manifolds, as points and faces: for tests here and in Blender."""
+"""Meshes that are unusual or not closed manifolds, as points and faces; also for Blender."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def cube():
 
 def moebius(count=24):
     angle = np.repeat(np.arange(count) * (2 * np.pi / count), 2)
-    out = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
-    up = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
-    points = np.stack([out * np.cos(angle), out * np.sin(angle), up], axis=1)
+    radius = 1 + np.tile([-0.3, 0.3], count) * np.cos(angle / 2)
+    height = np.tile([-0.3, 0.3], count) * np.sin(angle / 2)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
     triangles = []
     for step in range(count):
         a, b = 2 * step, 2 * step + 1
@@ -27,8 +27,8 @@ def moebius(count=24):
 def grid(count=4):
     points = [(x, y, 0) for y in range(count + 1) for x in range(count + 1)]
     row = count + 1
-    here = [y * row + x for y in range(count) for x in range(count)]
-    return points, [(a, a + 1, a + row + 1, a + row) for a in here]
+    first_corners = [y * row + x for y in range(count) for x in range(count)]
+    return points, [(a, a + 1, a + row + 1, a + row) for a in first_corners]
 
 
 def octahedron():
@@ -38,25 +38,25 @@ def octahedron():
 
 
 def pieces():
-    """A cube, an octahedron beside it, and a grid above them."""
+    """A cube, an octahedron and a grid, which are not connected."""
     points, faces = [], []
-    for number, (more, others) in enumerate((cube(), octahedron(), grid())):
-        faces += [tuple(vertex + len(points) for vertex in face) for face in others]
-        points += [(x + 3 * number, y, z + number) for x, y, z in more]
+    for index, (part_points, part_faces) in enumerate((cube(), octahedron(), grid())):
+        faces += [tuple(vertex + len(points) for vertex in face) for face in part_faces]
+        points += [(x + 3 * index, y, z + index) for x, y, z in part_points]
     return points, faces
 
 
 def fan():
-    """Three triangles on one edge."""
+    """Three triangles that share one edge, which is nonmanifold."""
     points = [(0, 0, 0), (0, 0, 1), (1, 0, 0), (-1, 0.5, 0), (-1, -0.5, 0)]
     return points, [(0, 1, 2), (0, 1, 3), (1, 0, 4)]
 
 
 def faces_without_area(count=1000):
-    """An octahedron, and a thousand triangles without area."""
+    """An octahedron, and `count` triangles without area."""
     points, faces = octahedron()
-    points += [(0.1 * number, 0.0, 2.0) for number in range(count + 2)]
-    return points, faces + [(6 + number, 7 + number, 8 + number) for number in range(count)]
+    points += [(0.1 * index, 0.0, 2.0) for index in range(count + 2)]
+    return points, faces + [(6 + index, 7 + index, 8 + index) for index in range(count)]
 
 
 def triangle():

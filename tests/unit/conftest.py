@@ -1,4 +1,4 @@
-"""What several tests need."""
+"""Settings, fixtures and parameter helpers that the unit tests share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import settings
 
 from rosy_addon.errors import RosyError
 
-#: Machines are busy at times: no example is wrong for being slow.
+#: Machines may be busy, so hypothesis has no deadline for an example.
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 
@@ -17,17 +17,20 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def long(*cases):
-    """Cases of a test that `make test-long` adds to the usual ones. A tuple has several arguments."""
+    """Parameters of a test that only `make test-long` runs. A tuple holds several arguments."""
     return [
         pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
         for case in cases
     ]
 
 
-def mainly(kept, cases):
-    """All cases, of which `make test` runs those kept and `make test-long` the others."""
-    kept, cases = set(kept), list(cases)
-    return [*(case for case in cases if case in kept), *long(*(c for c in cases if c not in kept))]
+def mainly(common, cases):
+    """Parameters of all cases; `make test` runs the common ones, `make test-long` all."""
+    common, cases = set(common), list(cases)
+    return [
+        *(case for case in cases if case in common),
+        *long(*(c for c in cases if c not in common)),
+    ]
 
 
 def pytest_collection_modifyitems(items):
@@ -39,7 +42,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Meshes and fields that other programs made, where they lie beside the repository."""
+    """The folder of meshes and fields of other programs, beside the repository."""
     folder = ROOT.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("no ../shared/data")
@@ -48,11 +51,11 @@ def shared_data() -> Path:
 
 @pytest.fixture
 def error_of():
-    """The text of the RosyError that a call raises; it must be one line."""
+    """A function that makes a call and returns the text of its RosyError, a single line."""
 
-    def catch(function, *arguments, **more) -> str:
+    def catch(function, *arguments, **keywords) -> str:
         with pytest.raises(RosyError) as caught:
-            function(*arguments, **more)
+            function(*arguments, **keywords)
         message = str(caught.value)
         assert "\n" not in message
         return message

@@ -1,4 +1,4 @@
-"""Surfaces, matrices and measures that several tests of fields use."""
+"""Surfaces, matrices and measures for tests of fields."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy import sparse
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.surface import build_surface
 
-#: Meshes that other programs made, where they lie beside the repository.
+#: The folder of meshes of other programs, beside the repository.
 MESHES = ROOT.parent / "shared" / "data" / "meshes"
 
 
@@ -19,15 +19,15 @@ def as_scipy(matrix):
 
 
 def bumpy(surface, amount=0.15, stretch=(1.0, 1.2, 1.5)):
-    """Without any symmetry, so that the smallest eigenvalue is a single one."""
+    """A surface without symmetry, so that the smallest eigenvalue is simple."""
     x, y, z = surface.vertices.T
     out = 1 + amount * np.sin(3 * x + 1) * np.cos(2 * y) + 0.5 * amount * np.sin(4 * z + x)
     points = surface.vertices * out[:, None] * stretch
     return build_surface(points, surface.corner_vertex, surface.face_start)
 
 
-def angles_apart(surface, one, other, degree):
-    """(F,) radians between members of two arrays of vectors on the faces."""
+def angle_differences(surface, first, second, degree):
+    """(F,) angles between nearest members of two fields, given by vectors on the faces; radians."""
     x, y = face_frames(surface)
-    z, w = (to_representation(vectors, x, y, degree) for vectors in (one, other))
+    z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree

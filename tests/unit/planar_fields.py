@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 
-def pixel_centres(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """(size, size) x and y of pixel centres, rows from the bottom."""
+def pixel_centers(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """(size, size) x and y of pixel centers, rows from the bottom."""
     y, x = np.mgrid[0:size, 0:size] + 0.5
     return x, y
 
@@ -19,5 +19,5 @@ def pair_angle(x: np.ndarray, y: np.ndarray, size: int, degree: int) -> np.ndarr
 
 
 def swirl_angle(x: np.ndarray, y: np.ndarray, size: int) -> np.ndarray:
-    """A vector field that turns smoothly everywhere, without a zero."""
+    """Angle of a smooth vector field without zeros, whose direction varies everywhere."""
     return 0.5 + np.sin(2 * np.pi * x / size) + np.cos(2 * np.pi * y / size)

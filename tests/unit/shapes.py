@@ -1,4 +1,4 @@
-"""Meshes in closed form, for tests."""
+"""Surfaces in closed form, and a translation matrix, for tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosy_addon.field.surface import Surface, build_surface
 def grid_of_quads(
     columns: int, rows: int, wrap_columns: bool, wrap_rows: bool
 ) -> tuple[np.ndarray, int]:
-    """(F, 4) vertex indices of a lattice of quads, and how many vertices it has."""
+    """(F, 4) vertex indices of a lattice of quads, and its number of vertices."""
     nu = columns if wrap_columns else columns + 1
     nv = rows if wrap_rows else rows + 1
     i, j = (a.ravel() for a in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
@@ -20,15 +20,17 @@ def grid_of_quads(
     return np.stack([(a % nu) * nv + b % nv for a, b in corner], axis=1), nu * nv
 
 
-def from_quads(vertices: np.ndarray, quads: np.ndarray, **more) -> Surface:
+def from_quads(vertices: np.ndarray, quads: np.ndarray, **settings) -> Surface:
     """A surface of quads."""
-    return build_surface(vertices, quads.ravel(), np.arange(0, quads.size + 1, 4), **more)
+    return build_surface(vertices, quads.ravel(), np.arange(0, quads.size + 1, 4), **settings)
 
 
-def from_triangles(vertices: ArrayLike, triangles: ArrayLike, **more) -> Surface:
+def from_triangles(vertices: ArrayLike, triangles: ArrayLike, **settings) -> Surface:
     """A surface of triangles."""
     triangles = np.asarray(triangles)
-    return build_surface(vertices, triangles.ravel(), np.arange(0, triangles.size + 1, 3), **more)
+    return build_surface(
+        vertices, triangles.ravel(), np.arange(0, triangles.size + 1, 3), **settings
+    )
 
 
 def torus(columns: int = 96, rows: int = 48, major: float = 1.0, minor: float = 0.4) -> Surface:
@@ -66,14 +68,14 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     ends = [(-1, golden, 0), (1, golden, 0), (-1, -golden, 0), (1, -golden, 0)]
     vertices = np.array([np.roll(p, shift) for shift in range(3) for p in ends], dtype=float)
     distance = np.linalg.norm(vertices[:, None] - vertices[None], axis=2)
-    near = np.isclose(distance, 2.0)
+    is_adjacent = np.isclose(distance, 2.0)
     triangles = np.array(
         [
             (a, b, c)
             for a in range(12)
             for b in range(a + 1, 12)
             for c in range(b + 1, 12)
-            if near[a, b] and near[b, c] and near[a, c]
+            if is_adjacent[a, b] and is_adjacent[b, c] and is_adjacent[a, c]
         ]
     )
     inward = np.einsum(
@@ -84,8 +86,8 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
     triangles[inward < 0] = triangles[inward < 0][:, ::-1]
     for _ in range(subdivisions):
         edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        edges, middle = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-        ab, bc, ca = middle.reshape(3, -1) + len(vertices)
+        edges, midpoint = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        ab, bc, ca = midpoint.reshape(3, -1) + len(vertices)
         vertices = np.concatenate([vertices, vertices[edges].mean(axis=1)])
         a, b, c = triangles.T
         quarters = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
@@ -95,7 +97,7 @@ def icosphere(subdivisions: int = 3, radius: float = 1.0) -> Surface:
 
 
 def moved(x=0.0, y=0.0, z=0.0) -> np.ndarray:
-    """The matrix that shifts by so much."""
+    """The (4, 4) matrix of a translation."""
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix

@@ -1,4 +1,4 @@
-"""Polynomials for angles, against double precision."""
+"""The polynomials of `deterministic_trig`, against numpy's functions in double precision."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from rosy_addon.deterministic_trig import cos_sin, unit_phasor, vector_angle
 ANGLES = st.floats(-1e4, 1e4)
 
 
-def around(count=200_001):
+def full_turn(count=200_001):
     return np.linspace(-np.pi, np.pi, count)
 
 
-def test_angles_of_vectors():
-    angle = around()
+def test_vector_angle():
+    angle = full_turn()
     x, y = (np.float32(7) * part.astype(np.float32) for part in (np.cos(angle), np.sin(angle)))
     np.testing.assert_allclose(vector_angle(x, y), np.arctan2(y.astype(float), x), atol=5e-7)
     assert vector_angle(np.zeros(1, np.float32), np.zeros(1, np.float32)) == 0
 
 
 def test_cosine_and_sine():
-    angle = (around() / 2).astype(np.float32)
+    angle = (full_turn() / 2).astype(np.float32)
     cosine, sine = cos_sin(angle)
     np.testing.assert_allclose(cosine, np.cos(angle.astype(float)), atol=3e-7)
     np.testing.assert_allclose(sine, np.sin(angle.astype(float)), atol=3e-7)
 
 
 @given(ANGLES)
-def test_phase(angle):
+def test_unit_phasor(angle):
     phase = unit_phasor(np.array([angle]))
     assert phase.dtype == np.complex64
     np.testing.assert_allclose(phase, np.exp(1j * angle), atol=4e-7)

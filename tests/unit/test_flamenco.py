@@ -11,7 +11,7 @@ from rosy_addon.frame_workers import parse_frames
 
 quickjs = pytest.importorskip("quickjs")
 
-#: What the manager gives to scripts, as its manual tells: `author`, `frameChunker`, and jobs.
+#: The functions that the manager offers to scripts, after its manual.
 MANAGER = """
 const author = {
     Task: (name, type) => ({name, type, commands: [], addCommand(c) { this.commands.push(c); }}),
@@ -38,17 +38,17 @@ function compiled(settings) {
 }
 """
 
-USUAL = {"folder": "/out", "blendfile": "/a b/scene.blend", "preset": "", "cameras": ""}
+DEFAULTS = {"folder": "/out", "blendfile": "/a b/scene.blend", "preset": "", "cameras": ""}
 
 
-def compiled(**settings):
+def compiled_tasks(**settings):
     engine = quickjs.Context()
     script = (ROOT / "farm" / "flamenco" / "rosy_bake.js").read_text()
     engine.eval(MANAGER + script.replace("const JOB_TYPE", "var JOB_TYPE"))
-    return json.loads(engine.eval(f"compiled({json.dumps({**USUAL, **settings})})"))
+    return json.loads(engine.eval(f"compiled({json.dumps({**DEFAULTS, **settings})})"))
 
 
-def commands(tasks):
+def command_args(tasks):
     for task in tasks:
         assert task["type"] == "blender" and len(task["commands"]) == 1
         (command,) = task["commands"]
@@ -56,15 +56,15 @@ def commands(tasks):
         yield command["parameters"]["args"]
 
 
-def test_a_chunk_is_a_command():
-    args = list(commands(compiled(frames="1-25", chunk_size=10)))
+def test_each_chunk_is_one_command():
+    args = list(command_args(compiled_tasks(frames="1-25", chunk_size=10)))
     start = ["-b", "/a b/scene.blend", "--command", "rosy", "bake", "--out", "/out", "--frames"]
     assert args == [[*start, "1-10"], [*start, "11-20"], [*start, "21-25"]]
 
 
-def test_two_cameras_have_a_sequence_each():
-    tasks = compiled(frames="3, 5-8", chunk_size=3, cameras="Close, Far ", preset="plaid")
-    args = list(commands(tasks))
+def test_each_camera_has_its_own_sequence():
+    tasks = compiled_tasks(frames="3, 5-8", chunk_size=3, cameras="Close, Far ", preset="plaid")
+    args = list(command_args(tasks))
     assert [each[-4:] for each in args] == [
         ["--camera", name, "--preset", "plaid"] for name in ("Close", "Close", "Far", "Far")
     ]
@@ -72,11 +72,11 @@ def test_two_cameras_have_a_sequence_each():
     assert [task["name"] for task in tasks] == [
         "Close 3,5,6", "Close 7-8", "Far 3,5,6", "Far 7-8",
     ]  # fmt: skip
-    # The command line takes what the manager makes of frames.
+    # The command line accepts the frames in the form that the manager writes.
     assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]
 
 
-def test_settings_are_what_the_manager_knows():
+def test_settings_have_only_keys_that_the_manager_knows():
     engine = quickjs.Context()
     script = (ROOT / "farm" / "flamenco" / "rosy_bake.js").read_text()
     engine.eval(MANAGER + script.replace("const JOB_TYPE", "var JOB_TYPE"))

@@ -1,4 +1,4 @@
-"""The same pictures with another version of numpy, all but the last bit of a few pixels."""
+"""Pictures are the same with another version of numpy, except for the last bit of a few pixels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from conftest import ROOT
 
 
 @pytest.mark.slow
-def test_another_numpy_draws_the_same(tmp_path):
+def test_another_numpy_version_draws_the_same(tmp_path):
     other = os.environ.get("ROSY_OTHER_PYTHON")
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
@@ -21,9 +21,9 @@ def test_another_numpy_draws_the_same(tmp_path):
     code = "import numpy; print(numpy.__version__, end='')"
     version = subprocess.run([other, "-c", code], check=True, capture_output=True, text=True).stdout
     assert version != np.__version__
-    theirs = np.load(file)
-    for name, ours in version_pictures.draw().items():
-        difference = np.abs(ours.astype(int) - theirs[name]).max(axis=2)
+    other_pictures = np.load(file)
+    for name, picture in version_pictures.draw().items():
+        difference = np.abs(picture.astype(int) - other_pictures[name]).max(axis=2)
         assert difference.max() <= 1, name
         assert (difference > 0).mean() <= 1e-3, name
 

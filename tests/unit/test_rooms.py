@@ -1,4 +1,4 @@
-"""Imports run one way, also inside rooms, and the numpy rooms do without Blender."""
+"""Imports run one way, also inside rooms, and the numpy rooms import without Blender."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from conftest import ROOT
 
 PACKAGE = ROOT / "rosy_addon"
 
-#: What each room may import besides itself. Modules at the top are rooms of their own.
-BASE = {
+#: The modules that every room may import.
+BASE_ROOMS = {
     "errors",
     "progress",
     "file_io",
@@ -25,6 +25,8 @@ BASE = {
     "settings",
     "cache",
 }
+
+#: What each room may import besides itself. Modules at the top of the package are rooms, too.
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
@@ -34,23 +36,23 @@ MAY_IMPORT = {
     "color": {"errors"},
     "file_io": {"errors"},
     "settings": {"errors"},
-    "field": BASE,
-    "projection": BASE | {"field"},
-    "compositor": BASE | {"field", "projection"},
-    "strokes": BASE | {"field", "projection"},
-    "image_io": BASE,
-    "render": BASE | {"field", "projection", "compositor", "cache"},
-    "presets": BASE | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE | {"field", "projection", "compositor", "render", "cache"},
-    "scene": BASE
+    "field": BASE_ROOMS,
+    "projection": BASE_ROOMS | {"field"},
+    "compositor": BASE_ROOMS | {"field", "projection"},
+    "strokes": BASE_ROOMS | {"field", "projection"},
+    "image_io": BASE_ROOMS,
+    "render": BASE_ROOMS | {"field", "projection", "compositor", "cache"},
+    "presets": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "render", "cache"},
+    "scene": BASE_ROOMS
     | {"field", "projection", "compositor", "strokes", "render", "cache", "image_io", "presets"},
-    "bake": BASE | {"compositor", "scene", "gpu", "cache"},
-    "animation": BASE | {"projection", "compositor", "render", "scene", "gpu", "cache"},
-    "viewport": BASE | {"projection", "compositor", "render", "scene", "gpu"},
-    "draw_strokes": BASE | {"projection", "compositor", "strokes", "scene", "cache"},
-    "frame_workers": BASE,
-    "turntable": BASE | {"projection", "compositor", "render", "image_io"},
-    "ui": BASE
+    "bake": BASE_ROOMS | {"compositor", "scene", "gpu", "cache"},
+    "animation": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu", "cache"},
+    "viewport": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu"},
+    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "strokes", "scene", "cache"},
+    "frame_workers": BASE_ROOMS,
+    "turntable": BASE_ROOMS | {"projection", "compositor", "render", "image_io"},
+    "ui": BASE_ROOMS
     | {
         "presets",
         "field",
@@ -62,7 +64,7 @@ MAY_IMPORT = {
         "bake",
         "viewport",
     },
-    "cli": BASE
+    "cli": BASE_ROOMS
     | {
         "field",
         "projection",
@@ -85,8 +87,8 @@ MAY_IMPORT = {
 }
 NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
 
-#: What of the room `gpu` draws with Blender, and imports that when it does.
-DRAWN_WITH = ("device.py",)
+#: Files of the room `gpu` that draw with Blender, and may import its modules.
+BLENDER_GPU_FILES = ("device.py",)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -95,8 +97,8 @@ def room_of(path: Path) -> str:
 
 
 def imports_of(path: Path) -> tuple[set[str], set[str]]:
-    """Modules of RoSy as paths from the package, and top-level names of all others."""
-    here = path.relative_to(PACKAGE).parent.parts
+    """Imported modules: dotted paths of those in RoSy, and top-level names of all others."""
+    package_parts = path.relative_to(PACKAGE).parent.parts
     inside, outside = set(), set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -104,8 +106,8 @@ def imports_of(path: Path) -> tuple[set[str], set[str]]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             outside.add(node.module.split(".")[0])
         elif isinstance(node, ast.ImportFrom):
-            assert node.level <= len(here) + 1, f"{path} reaches out of the package"
-            base = here[: len(here) - node.level + 1]
+            assert node.level <= len(package_parts) + 1, f"{path} reaches out of the package"
+            base = package_parts[: len(package_parts) - node.level + 1]
             names = [node.module] if node.module else [alias.name for alias in node.names]
             inside |= {".".join((*base, name)) for name in names}
     return inside, outside
@@ -121,15 +123,15 @@ def test_imports_run_one_way(path):
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in ("scene", "ui", "bake", "draw_strokes", "viewport", "cli", "animation"):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
-    if path.name in DRAWN_WITH and room == "gpu":
+    if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room == "frame_workers":
-        allowed |= {"distributed"}  # asked for by name, and only then
+        allowed |= {"distributed"}  # optional, imported only if the user chooses it
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 
-def test_the_rule_is_seen_when_broken(tmp_path, monkeypatch):
-    """The reader of imports finds what it is there to find."""
+def test_imports_of_finds_all_kinds_of_imports(tmp_path, monkeypatch):
+    """All forms of imports, of RoSy and of others."""
     monkeypatch.setitem(globals(), "PACKAGE", tmp_path)
     (tmp_path / "field").mkdir()
     path = tmp_path / "field" / "wrong.py"
@@ -140,7 +142,7 @@ def test_the_rule_is_seen_when_broken(tmp_path, monkeypatch):
 
 
 def imported_files(path: Path) -> Iterator[Path]:
-    """Files of all modules that a file imports relatively, in functions as well."""
+    """Yield the files of all modules that a file imports relatively, in functions as well."""
     for node in ast.walk(ast.parse(path.read_text())):
         if not isinstance(node, ast.ImportFrom) or not node.level:
             continue
@@ -157,7 +159,7 @@ def imported_files(path: Path) -> Iterator[Path]:
 
 
 def import_cycle(folder: Path) -> list[str]:
-    """Files of a folder that import each other in a circle, or an empty list."""
+    """Files of a folder that import each other in a cycle, or an empty list."""
     graph = {path: set(imported_files(path)) for path in sorted(folder.rglob("*.py"))}
     try:
         TopologicalSorter(graph).prepare()
@@ -167,8 +169,8 @@ def import_cycle(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("folder", ["rosy_addon", "operators"])
-def test_no_module_imports_itself_through_others(folder):
-    """Not inside a room either, and not by an import in a function."""
+def test_there_are_no_import_cycles(folder):
+    """Neither between rooms nor inside a room, nor by an import in a function."""
     assert import_cycle(ROOT / folder) == []
 
 
@@ -181,7 +183,7 @@ def test_no_module_imports_itself_through_others(folder):
         "from .inner.third import x",
     ],
 )
-def test_a_cycle_is_seen(tmp_path, back):
+def test_import_cycle_finds_cycles(tmp_path, back):
     (tmp_path / "inner").mkdir()
     (tmp_path / "first.py").write_text("from . import second\n")
     (tmp_path / "second.py").write_text("import os\n")

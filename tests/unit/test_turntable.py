@@ -1,4 +1,4 @@
-"""Films from all around, against another decoder."""
+"""Turntable videos, and GIF files against Pillow's decoder."""
 
 from __future__ import annotations
 
@@ -24,53 +24,53 @@ from rosy_addon.turntable import check_video_path, turntable_task, turntable_vie
 QUICK = Look(length=8)
 
 
-def frames_of(data):
-    film = Image.open(io.BytesIO(data))
-    found = []
-    for number in range(film.n_frames):
-        film.seek(number)
-        found.append(np.asarray(film.convert("RGB")))
-    return film, found
+def decode_frames(data):
+    gif = Image.open(io.BytesIO(data))
+    frames = []
+    for index in range(gif.n_frames):
+        gif.seek(index)
+        frames.append(np.asarray(gif.convert("RGB")))
+    return gif, frames
 
 
 @settings(max_examples=40)
 @given(st.integers(1, 3), st.integers(1, 90), st.integers(1, 70), st.integers(0, 10**6))
-def test_grey_pictures_come_back_as_they_are(count, width, height, seed):
+def test_gray_frames_are_stored_exactly(count, width, height, seed):
     random = np.random.default_rng(seed)
     top = random.integers(1, 257)
     frames = [
         np.repeat(random.integers(0, top, (height, width, 1), dtype=np.uint8), 3, axis=2)
         for _ in range(count)
     ]
-    _, found = frames_of(gif_bytes(frames, 25))
-    assert len(found) == count or all((a == frames[0]).all() for a in frames)
-    for one, other in zip(found, frames, strict=False):
-        assert np.array_equal(one, other)
+    _, actual = decode_frames(gif_bytes(frames, 25))
+    assert len(actual) == count or all((a == frames[0]).all() for a in frames)
+    for decoded, original in zip(actual, frames, strict=False):
+        assert np.array_equal(decoded, original)
 
 
-def test_long_runs_of_codes(tmp_path):
-    """Past 4096 codes the table is begun anew."""
+def test_the_table_of_codes_is_reset_when_full(tmp_path):
+    """After 4096 codes the table starts again."""
     noise = np.random.default_rng(0).integers(0, 256, (300, 400, 1), dtype=np.uint8)
-    ((_, (found,)),) = [frames_of(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
-    assert np.array_equal(found[..., :1], noise)
+    ((_, (actual,)),) = [decode_frames(gif_bytes([np.repeat(noise, 3, axis=2)], 10))]
+    assert np.array_equal(actual[..., :1], noise)
     assert len(lzw_compress(bytes(100_000))) < 1500
 
 
-def test_colours_are_right_on_average():
+def test_dithered_colors_are_right_on_average():
     ramp = np.zeros((64, 64, 3), dtype=np.uint8)
     ramp[...] = (200, 90, 30)
-    _, (found,) = frames_of(gif_bytes([ramp], 10))
-    assert np.abs(found.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
+    _, (actual,) = decode_frames(gif_bytes([ramp], 10))
+    assert np.abs(actual.mean(axis=(0, 1)) - (200, 90, 30)).max() < 3
     assert BAYER_MATRIX.shape == (4, 4) and np.prod(PALETTE_LEVELS) <= 256
 
 
 def test_rate_and_repetition():
     frames = [np.full((4, 4, 3), value, dtype=np.uint8) for value in (0, 90, 200)]
-    film, _ = frames_of(gif_bytes(frames, 20))
-    assert film.info["duration"] == 50 and film.info["loop"] == 0
+    gif, _ = decode_frames(gif_bytes(frames, 20))
+    assert gif.info["duration"] == 50 and gif.info["loop"] == 0
 
 
-def test_all_of_it_is_in_the_frame_all_the_way_round():
+def test_the_object_stays_in_the_frame_in_all_views():
     surface = torus(48, 24)
     matrix = np.diag((1.0, 2.0, 1.5, 1.0))
     matrix[:3, 3] = (5.0, -2.0, 1.0)
@@ -79,27 +79,29 @@ def test_all_of_it_is_in_the_frame_all_the_way_round():
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
         rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
         assert rgba.shape == (60, 80, 4)
-        seen = rgba[..., 3] > 0
-        assert not (seen[0].any() or seen[-1].any() or seen[:, 0].any() or seen[:, -1].any())
-        covered.append(seen.mean())
+        visible = rgba[..., 3] > 0
+        assert not (
+            visible[0].any() or visible[-1].any() or visible[:, 0].any() or visible[:, -1].any()
+        )
+        covered.append(visible.mean())
     assert min(covered) > 0.1
 
 
-def test_a_film_is_written_whole(tmp_path):
+def test_a_video_has_all_frames(tmp_path):
     surface = icosphere(2)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     path = tmp_path / "film.gif"
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
     assert run_to_completion(turntable_task(CpuRenderer(), views, 3, path, 12)) == path
-    film, found = frames_of(path.read_bytes())
-    assert len(found) == 3 and film.size == (32, 32)
-    assert (found[0][0, 0] == 255).all(), "on white paper"
+    gif, actual = decode_frames(path.read_bytes())
+    assert len(actual) == 3 and gif.size == (32, 32)
+    assert (actual[0][0, 0] == 255).all(), "on white paper"
     with pytest.raises(RosyError, match=r"must end in .mp4 or .gif"):
         check_video_path(tmp_path / "film.avi")
 
 
-def test_lights_stand_still_while_the_camera_goes_round():
-    """A sun from +y lights the far side in the first picture and the near side in the second."""
+def test_lights_stay_fixed_while_the_camera_orbits():
+    """A sun from +y lights the far side in the first view and the near side in the second."""
     surface = icosphere(3)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     look = Look(length=8, shading=1.0, light="scene")
@@ -111,7 +113,7 @@ def test_lights_stand_still_while_the_camera_goes_round():
     assert dark < 0.05 < 0.2 < lit
 
 
-def test_a_video_that_is_not_finished_leaves_no_file(tmp_path):
+def test_an_unfinished_video_leaves_no_file(tmp_path):
     surface = icosphere(2)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))

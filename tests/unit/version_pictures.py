@@ -1,4 +1,4 @@
-"""Pictures to be compared between versions of numpy: ``python version_pictures.py FILE.npz``."""
+"""Draw pictures to compare between versions of numpy: ``python version_pictures.py FILE.npz``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 if __name__ == "__main__":  # started by another interpreter, without pytest's search path
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from planar_fields import pair_angle, pixel_centres
+from planar_fields import pair_angle, pixel_centers
 from shapes import icosphere, torus
 
 from rosy_addon.compositor.compose import compose, compose_planar
@@ -24,9 +24,9 @@ from rosy_addon.projection.project import project
 
 
 def draw() -> dict[str, np.ndarray]:
-    """8 bit pictures by name."""
+    """Draw the pictures; return (H, W, 3) or (H, W, 4) uint8 arrays by name."""
     look = Look()
-    pictures = {"plane": compose_planar(pair_angle(*pixel_centres(96), 96, 4), 4, look)}
+    pictures = {"plane": compose_planar(pair_angle(*pixel_centers(96), 96, 4), 4, look)}
     shapes = {
         "torus": (torus(), "curvature", 4, look),
         "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
@@ -34,11 +34,11 @@ def draw() -> dict[str, np.ndarray]:
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
         "magnitude": (icosphere(3), "axis", 3, Look(magnitude="both", supersampling=2)),
     }
-    for name, (surface, kind, degree, drawn) in shapes.items():
-        size = 160 * drawn.supersampling
+    for name, (surface, kind, degree, shape_look) in shapes.items():
+        size = 160 * shape_look.supersampling
         camera = orbit_camera(surface, -25, 30, size, size)
         instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
-        pictures[name] = compose(project([instance], camera), drawn)
+        pictures[name] = compose(project([instance], camera), shape_look)
     return {name: to_srgb_uint8(picture.rgba) for name, picture in pictures.items()}
 
 

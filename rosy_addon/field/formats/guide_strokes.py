@@ -1,4 +1,4 @@
-"""Read guide strokes from text: one point x y z a row, with an empty line between strokes."""
+"""Read guide strokes from text: one point x y z per row, with an empty line between strokes."""
 
 from __future__ import annotations
 

@@ -56,8 +56,10 @@ def read_npy(path: Path) -> RawField:
     try:
         values = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
-        what = str(reason).splitlines() or [type(reason).__name__]
-        raise RosyError(f"{path}: is not a valid .npy file of numbers: {what[0]}") from None
+        message_lines = str(reason).splitlines() or [type(reason).__name__]
+        raise RosyError(
+            f"{path}: is not a valid .npy file of numbers: {message_lines[0]}"
+        ) from None
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         raise RosyError(f"{path}: does not contain an array of real numbers")
     if values.ndim not in (2, 3) or not len(values) or (values.ndim == 3 and values.shape[2] != 3):
@@ -70,7 +72,7 @@ def read_npy(path: Path) -> RawField:
 
 
 def directions_text(directions: np.ndarray) -> str:
-    """Format (F, N, 3) directions as text, 3 N numbers a row."""
+    """Format (F, N, 3) directions as text, 3 N numbers per row."""
     return "\n".join([*format_rows(directions.reshape(len(directions), -1)), ""])
 
 

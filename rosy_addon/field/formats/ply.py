@@ -333,8 +333,8 @@ def _list_length(path: Path, element: _Element, row: int, length) -> int:
     return int(length)
 
 
-def _truncated(path: Path, element: _Element, found: int) -> RosyError:
-    """The error for a file that ends after `found` rows of an element."""
+def _truncated(path: Path, element: _Element, row_count: int) -> RosyError:
+    """The error for a file that ends after `row_count` rows of an element."""
     return RosyError(
-        f"{path}: declares {element.count} rows of element '{element.name}', but ends after {found}"
+        f"{path}: declares {element.count} rows of element '{element.name}', but ends after {row_count}"
     )

@@ -18,14 +18,14 @@ class RawField:
     Attributes
     ----------
     values : (n, k, 3) float64 ndarray
-        k vectors a row: one member (k = 1), all N directions (k = N), or the rows of a tensor
+        k vectors per row: one member (k = 1), all N directions (k = N), or the rows of a tensor
         (k = 3).
     degree : int or None
-        N; None if the file does not say.
+        N; None if the file does not state it.
     header_count : int or None
         Number of rows that the header declares; None if there is no such header.
     domain : {"face", "vertex"} or None
-        The mesh elements that the rows belong to; None if only the number of rows tells.
+        The mesh elements that the rows belong to; None to infer them from the number of rows.
     tensors : bool
         Whether `values` are symmetric 3 x 3 tensors.
     polygons : Polygons or None
@@ -41,5 +41,5 @@ class RawField:
 
     @property
     def columns(self) -> int:
-        """The number of numbers a row, 3 k."""
+        """3 k, the count of numbers per row."""
         return int(np.prod(self.values.shape[1:]))

@@ -1,4 +1,4 @@
-"""Read and write `.rosy` (one member vector a row) and `.rawfield` (all N directions a row) files.
+"""Read and write `.rosy` (a member vector per row) and `.rawfield` (N directions per row) files.
 
 `.rawfield` is a format of the library Directional.
 """
@@ -61,14 +61,14 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
     """The first two integers of the file, on one line or on two; `names` are for messages."""
     words = [word for line in rows.words[:2] for word in line][:2]
     values = []
-    for number, name in enumerate(names):
+    for index, name in enumerate(names):
         try:
-            values.append(int(words[number]))
+            values.append(int(words[index]))
         except IndexError:
             raise RosyError(f"{rows.path}: ends before the {name}") from None
         except ValueError:
-            row = rows.row_of_word(number)
-            found = abbreviate(words[number])
+            row = rows.row_of_word(index)
+            found = abbreviate(words[index])
             raise rows.error(row, f"expected the {name}, a whole number, found {found}") from None
     return values[0], values[1]
 

@@ -1,4 +1,4 @@
-"""The compositor that walks each streamline once, against brute force and closed forms."""
+"""Fast LIC on the covering surface, against brute force and closed forms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from conftest import long
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_fields import pair_angle, pixel_centres
+from planar_fields import pair_angle, pixel_centers
 from scipy import ndimage
 
 from rosy_addon.compositor import fast_lic
@@ -26,10 +26,10 @@ SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
 
 
-def noise_of(flow, look=LOOK, channels=1):
+def make_noise(field, look=LOOK, channels=1):
     return image_noise(
-        flow.pixel,
-        flow.width,
+        field.pixel,
+        field.width,
         look.grain,
         look.seed,
         channels,
@@ -38,196 +38,204 @@ def noise_of(flow, look=LOOK, channels=1):
     )
 
 
-def drawn(flow, look=LOOK, noise=None):
-    return run_to_completion(fast_lic_task(flow, look, noise_of(flow) if noise is None else noise))
-
-
-def brute(flow, look=LOOK, noise=None):
+def fast_images(field, look=LOOK, noise=None):
     return run_to_completion(
-        brute_force_task(flow, look, noise_of(flow) if noise is None else noise)
+        fast_lic_task(field, look, make_noise(field) if noise is None else noise)
     )
 
 
-def uniform(angle, degree, size=SIZE):
+def brute_force_images(field, look=LOOK, noise=None):
+    return run_to_completion(
+        brute_force_task(field, look, make_noise(field) if noise is None else noise)
+    )
+
+
+def uniform_field(angle, degree, size=SIZE):
     return planar_pixel_field(np.full((size, size), angle), degree)
 
 
-def singular(degree, size=SIZE):
-    """Singularities of index 1 / N and -1 / N."""
-    x, y = pixel_centres(size)
+def singular_field(degree, size=SIZE):
+    """A field with singularities of index 1 / N and -1 / N."""
+    x, y = pixel_centers(size)
     return planar_pixel_field(pair_angle(x, y, size, degree), degree)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("taper", [False, True])
-def test_where_noise_does_not_change_across_streamlines_sums_are_those_of_brute_force(
-    taper, degree
-):
-    flow, look = uniform(0.0, degree), replace(LOOK, taper=taper)
-    noise = np.tile(noise_of(flow)[:SIZE], (SIZE, 1))
-    found, expected = drawn(flow, look, noise), brute(flow, look, noise)
-    np.testing.assert_allclose(found.effective_samples, expected.effective_samples, rtol=1e-6)
-    contrast = (found.members - 0.5) / fast_lic.CONTRAST_MATCH
+def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(taper, degree):
+    field, look = uniform_field(0.0, degree), replace(LOOK, taper=taper)
+    noise = np.tile(make_noise(field)[:SIZE], (SIZE, 1))
+    actual, expected = fast_images(field, look, noise), brute_force_images(field, look, noise)
+    np.testing.assert_allclose(actual.effective_samples, expected.effective_samples, rtol=1e-6)
+    contrast = (actual.members - 0.5) / fast_lic.CONTRAST_MATCH
     np.testing.assert_allclose(contrast, expected.members - 0.5, atol=5e-4)
 
 
 @given(
     degree=st.integers(1, 12),
-    here=st.floats(-np.pi, np.pi),
-    there=st.floats(-np.pi, np.pi),
+    first_angle=st.floats(-np.pi, np.pi),
+    second_angle=st.floats(-np.pi, np.pi),
     guide=st.floats(-3, 3),
 )
 @settings(max_examples=200)
-def test_the_sheet_of_the_next_pixel_is_the_direction_nearest_to_this_one(
-    degree, here, there, guide
-):
-    flow = planar_pixel_field(np.array([[here, there]]), degree)
+def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, second_angle, guide):
+    field = planar_pixel_field(np.array([[first_angle, second_angle]]), degree)
     covering = build_covering(
-        flow, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32)
+        field, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32)
     )
     first, second = covering.cell_of_pixel
     directions = covering.state_table.reshape(covering.sheets, -1, 4)[..., :2] / 32767.0
     match = directions[:, first] @ directions[:, second].T
     for sheet in range(covering.sheets):
-        slip = np.rint(covering.packed_phase[first] - covering.packed_phase[second])
-        chosen = int(sheet + slip) % covering.sheets
+        matching = np.rint(covering.packed_phase[first] - covering.packed_phase[second])
+        chosen = int(sheet + matching) % covering.sheets
         assert match[sheet, chosen] > match[sheet].max() - 2e-4
 
 
 def test_the_directions_of_states_are_the_members_and_their_opposites():
     angle, degree = 0.3, 5
-    covering = build_covering(uniform(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32))
+    covering = build_covering(
+        uniform_field(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32)
+    )
     states = (
         covering.state_table.reshape(covering.sheets, -1, 4)[:, covering.cell_of_pixel, :2]
         / 32767.0
     )
     expected = np.exp(1j * (angle + 2 * np.pi * np.arange(10) / 10))
-    found = states[..., 0] + 1j * states[..., 1]
-    np.testing.assert_allclose(found, np.broadcast_to(expected[:, None], found.shape), atol=1e-4)
+    actual = states[..., 0] + 1j * states[..., 1]
+    np.testing.assert_allclose(actual, np.broadcast_to(expected[:, None], actual.shape), atol=1e-4)
 
 
 def autocorrelations(image, angle, lags):
-    """At some distances along and across a direction, of the inner part of a picture."""
+    """Autocorrelations of the inner part of a picture at `lags` along and across a direction."""
     image = image.reshape(512, 512)[45:-45, 45:-45]
     power = np.abs(np.fft.fft2(image - image.mean())) ** 2
-    all_of_them = np.fft.fftshift(np.fft.ifft2(power).real)
-    all_of_them /= all_of_them.max()
+    autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
+    autocorrelation /= autocorrelation.max()
     middle = image.shape[0] // 2
     along = [np.sin(angle) * lags, np.cos(angle) * lags]
     across = [np.cos(angle) * lags, -np.sin(angle) * lags]
-    return [ndimage.map_coordinates(all_of_them, np.add(way, middle)) for way in (along, across)]
+    return [
+        ndimage.map_coordinates(autocorrelation, np.add(direction, middle))
+        for direction in (along, across)
+    ]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_streaks_are_as_strong_long_and_wide_as_those_of_brute_force(degree):
+def test_streaks_match_brute_force_in_contrast_length_and_width(degree):
     lags = np.array([1.0, 2.0, 3.0, 4.0])
-    spread, curves = [], []
+    stds, curves = [], []
     for angle in (0.05, 0.37, 0.8, 1.1):
-        flow = uniform(angle, degree, 512)
-        pair = [images.members[0, :, 0] for images in (drawn(flow), brute(flow))]
-        spread.append([np.std(image) for image in pair])
+        field = uniform_field(angle, degree, 512)
+        pair = [
+            images.members[0, :, 0] for images in (fast_images(field), brute_force_images(field))
+        ]
+        stds.append([np.std(image) for image in pair])
         curves.append([autocorrelations(image, angle, lags) for image in pair])
-    found, expected = np.mean(spread, axis=0)
-    assert found == pytest.approx(expected, rel=0.02)
-    found, expected = np.mean(curves, axis=0)
-    np.testing.assert_allclose(found, expected, atol=0.035)
+    actual, expected = np.mean(stds, axis=0)
+    assert actual == pytest.approx(expected, rel=0.02)
+    actual, expected = np.mean(curves, axis=0)
+    np.testing.assert_allclose(actual, expected, atol=0.035)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
 @pytest.mark.parametrize("taper", [False, True])
 def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
-    flow, look = singular(degree), replace(LOOK, taper=taper)
-    found, expected = drawn(flow, look).blend[:, 0], brute(flow, look).blend[:, 0]
-    # Not the same: each streak is shifted by up to half a pixel.
-    assert np.corrcoef(found, expected)[0, 1] > 0.85
-    assert found.std() == pytest.approx(expected.std(), rel=0.03)
+    field, look = singular_field(degree), replace(LOOK, taper=taper)
+    actual, expected = (
+        fast_images(field, look).blend[:, 0],
+        brute_force_images(field, look).blend[:, 0],
+    )
+    # They are not equal, because each streak is shifted by up to half a pixel.
+    assert np.corrcoef(actual, expected)[0, 1] > 0.85
+    assert actual.std() == pytest.approx(expected.std(), rel=0.03)
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_the_surroundings_of_singularities_are_not_grainy(degree):
-    # Grain is what changes from each pixel to the next; breaking points would show as well.
-    flow = singular(degree)
-    x, y = (axis.ravel() for axis in pixel_centres(SIZE))
+    # Grain is the change from pixel to pixel. Breaking points would increase it as well.
+    field = singular_field(degree)
+    x, y = (axis.ravel() for axis in pixel_centers(SIZE))
     near = np.zeros(SIZE * SIZE, dtype=bool)
-    for centre in (0.33, 0.67):
-        near |= (x - centre * SIZE) ** 2 + (y - SIZE / 2) ** 2 < 20**2
+    for center in (0.33, 0.67):
+        near |= (x - center * SIZE) ** 2 + (y - SIZE / 2) ** 2 < 20**2
 
     def grain(images):
         image = images.blend[:, 0].reshape(SIZE, SIZE)
         return ndimage.laplace(image).ravel()[near].std()
 
-    assert grain(drawn(flow)) < 1.15 * grain(brute(flow))
+    assert grain(fast_images(field)) < 1.15 * grain(brute_force_images(field))
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_streamlines_end_where_those_of_brute_force_end(taper):
+def test_streamlines_end_where_brute_force_ends_them(taper):
     look = replace(LOOK, taper=taper)
-    x, y = pixel_centres(SIZE)
+    x, y = pixel_centers(SIZE)
     angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, 4), np.nan)
-    flow = planar_pixel_field(angles, 4)
-    found, expected = drawn(flow, look), brute(flow, look)
-    inside = flow.representation != 0
-    assert (found.effective_samples[~inside] == 1).all()
-    difference = found.effective_samples[inside] - expected.effective_samples[inside]
+    field = planar_pixel_field(angles, 4)
+    actual, expected = fast_images(field, look), brute_force_images(field, look)
+    inside = field.representation != 0
+    assert (actual.effective_samples[~inside] == 1).all()
+    difference = actual.effective_samples[inside] - expected.effective_samples[inside]
     assert abs(difference.mean()) < 0.5
     assert np.abs(difference).mean() < 2
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_magnitude_sets_the_samples_of_a_pixel(taper):
-    x, _ = pixel_centres(SIZE)
-    flow = planar_pixel_field(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
+def test_magnitude_determines_the_samples_of_a_pixel(taper):
+    x, _ = pixel_centers(SIZE)
+    field = planar_pixel_field(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
     look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, taper=taper)
-    samples = drawn(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
+    samples = fast_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
     np.testing.assert_allclose(
         samples, kernel_weights(reach, reach, reach, taper).effective_samples, rtol=1e-5
     )
-    expected = brute(flow, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
+    expected = brute_force_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     np.testing.assert_allclose(samples, expected, rtol=1e-5)
 
 
 def test_three_channels_are_three_pictures():
-    flow = singular(3)
-    noise = noise_of(flow, channels=3)
-    together = drawn(flow, noise=noise).members
+    field = singular_field(3)
+    noise = make_noise(field, channels=3)
+    together = fast_images(field, noise=noise).members
     for channel in range(3):
-        alone = drawn(flow, noise=noise[:, channel : channel + 1]).members
+        alone = fast_images(field, noise=noise[:, channel : channel + 1]).members
         np.testing.assert_allclose(together[..., channel], alone[..., 0], atol=2e-4)
 
 
 def test_the_same_input_gives_the_same_bytes():
-    flow = singular(5)
-    assert drawn(flow).members.tobytes() == drawn(flow).members.tobytes()
+    field = singular_field(5)
+    assert fast_images(field).members.tobytes() == fast_images(field).members.tobytes()
 
 
 def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
-    # A tall picture, in streaks that run up and down: a seam would show as a change of rows.
-    flow = planar_pixel_field(np.full((1024, 64), np.pi / 2 + 0.1), 2)
-    whole = drawn(flow)
+    # A tall picture with vertical streaks: a seam would be a large change between two rows.
+    field = planar_pixel_field(np.full((1024, 64), np.pi / 2 + 0.1), 2)
+    in_one_strip = fast_images(field)
     monkeypatch.setattr(fast_lic, "MAX_STATES_PER_STRIP", 64 * 256 * 2)
-    wide = [(wide.stop - wide.start) // 64 for wide, _, _ in fast_lic._strips(flow, LOOK)]
-    assert len(wide) == 4
-    assert max(wide) <= 256 + 3 * (LOOK.length + 2)
-    found = drawn(flow)
-    assert found.effective_samples.min() >= 1
-    assert np.abs(found.effective_samples - whole.effective_samples).mean() < 2
-    image = found.members[0, :, 0].reshape(1024, 64)
+    extent = [(extent.stop - extent.start) // 64 for extent, _, _ in fast_lic._strips(field, LOOK)]
+    assert len(extent) == 4
+    assert max(extent) <= 256 + 3 * (LOOK.length + 2)
+    actual = fast_images(field)
+    assert actual.effective_samples.min() >= 1
+    assert np.abs(actual.effective_samples - in_one_strip.effective_samples).mean() < 2
+    image = actual.members[0, :, 0].reshape(1024, 64)
     change = np.abs(np.diff(image, axis=0)).mean(axis=1)
     assert change[[255, 511, 767]].mean() < 1.3 * np.median(change)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
 def test_pictures_of_any_size(shape):
-    images = drawn(planar_pixel_field(np.full(shape, 0.7), 3))
+    images = fast_images(planar_pixel_field(np.full(shape, 0.7), 3))
     assert np.isfinite(images.members).all()
     assert images.effective_samples.min() >= 1
 
 
-def test_a_field_that_is_defined_nowhere_is_its_noise():
-    flow = planar_pixel_field(np.full((20, 20), np.nan), 4)
-    images = drawn(flow)
+def test_an_undefined_field_shows_its_noise():
+    field = planar_pixel_field(np.full((20, 20), np.nan), 4)
+    images = fast_images(field)
     assert (images.effective_samples == 1).all()
     assert np.isfinite(images.blend).all()

@@ -1,4 +1,4 @@
-"""How the samples of streamlines are weighted, against sums written out."""
+"""Sums of the weights of samples along streamlines, against explicit sums."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from rosy_addon.compositor.look import Look
 
 @st.composite
 def streamlines(draw):
-    reach = draw(st.integers(0, 400))
-    return draw(st.integers(0, reach)), draw(st.integers(0, reach)), reach
+    full_length = draw(st.integers(0, 400))
+    return draw(st.integers(0, full_length)), draw(st.integers(0, full_length)), full_length
 
 
 @given(streamlines())
 def test_sums_of_tapered_weights_in_closed_form(streamline):
-    ahead, behind, reach = streamline
-    away = np.abs(np.arange(-behind, ahead + 1))
-    weight = 1 - away / (reach + 1)
-    found = kernel_weights(np.float64(ahead), np.float64(behind), reach, tapered=True)
-    np.testing.assert_allclose(found.total, weight.sum(), rtol=1e-9)
+    forward, backward, full_length = streamline
+    distance = np.abs(np.arange(-backward, forward + 1))
+    weight = 1 - distance / (full_length + 1)
+    actual = kernel_weights(np.float64(forward), np.float64(backward), full_length, tapered=True)
+    np.testing.assert_allclose(actual.total, weight.sum(), rtol=1e-9)
     np.testing.assert_allclose(
-        found.effective_samples, weight.sum() ** 2 / (weight**2).sum(), rtol=1e-9
+        actual.effective_samples, weight.sum() ** 2 / (weight**2).sum(), rtol=1e-9
     )
 
 
 @given(streamlines())
 def test_without_taper_every_sample_counts_as_one(streamline):
-    ahead, behind, reach = streamline
-    found = kernel_weights(ahead, behind, reach, tapered=False)
-    assert found.total == found.effective_samples == ahead + behind + 1
+    forward, backward, full_length = streamline
+    actual = kernel_weights(forward, backward, full_length, tapered=False)
+    assert actual.total == actual.effective_samples == forward + backward + 1
 
 
 def test_tapered_streamlines_have_three_quarters_of_the_samples():

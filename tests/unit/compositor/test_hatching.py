@@ -1,4 +1,4 @@
-"""Hatching: the tone that is asked for, lines along the field, and streaks that stay where they are."""
+"""Hatching: target tones, lines along the field, inks, outlines, and stability under motion."""
 
 from __future__ import annotations
 
@@ -60,20 +60,20 @@ INK = Look(
 
 @lru_cache(maxsize=4)
 def tube(around=160, along=120, bend=0.0):
-    """A tube along z, of radius 0.5; bent, it remembers what it was."""
-    turn = np.arange(around) * 2 * np.pi / around
+    """A tube along z with radius 0.5; its rest shape is straight if it is bent."""
+    angle = np.arange(around) * 2 * np.pi / around
     height = np.linspace(-1.5, 1.5, along + 1)
     rest = np.stack(
         [
-            np.tile(0.5 * np.cos(turn), along + 1),
-            np.tile(0.5 * np.sin(turn), along + 1),
+            np.tile(0.5 * np.cos(angle), along + 1),
+            np.tile(0.5 * np.sin(angle), along + 1),
             np.repeat(height, around),
         ],
         axis=1,
     )
-    here = np.arange(along)[:, None] * around + np.arange(around)
-    right = np.roll(here, -1, axis=1)
-    faces = np.stack([here, right, right + around, here + around], axis=-1).reshape(-1, 4)
+    left = np.arange(along)[:, None] * around + np.arange(around)
+    right = np.roll(left, -1, axis=1)
+    faces = np.stack([left, right, right + around, left + around], axis=-1).reshape(-1, 4)
     points = rest if not bend else bent(rest, bend)
     return build_surface(
         points,
@@ -85,51 +85,60 @@ def tube(around=160, along=120, bend=0.0):
 
 
 def bent(points, angle):
-    """Turned about the x axis, the more the higher, as an armature with smooth weights does it."""
-    share = angle * np.clip(0.5 + points[:, 2], 0, 1)
-    cos, sin = np.cos(share), np.sin(share)
+    """Rotate points about the x axis by angles that grow with z, like an armature."""
+    local_angle = angle * np.clip(0.5 + points[:, 2], 0, 1)
+    cos, sin = np.cos(local_angle), np.sin(local_angle)
     y, z = points[:, 1], points[:, 2]
     return np.stack([points[:, 0], cos * y - sin * z, sin * y + cos * z], axis=1)
 
 
 @lru_cache(maxsize=4)
 def ball(rows=70):
-    up = np.linspace(0, np.pi, rows + 1)[:, None]
-    around = np.arange(2 * rows) * np.pi / rows
+    polar = np.linspace(0, np.pi, rows + 1)[:, None]
+    azimuth = np.arange(2 * rows) * np.pi / rows
     points = np.stack(
-        [np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up) + 0 * around], axis=-1
+        [
+            np.sin(polar) * np.cos(azimuth),
+            np.sin(polar) * np.sin(azimuth),
+            np.cos(polar) + 0 * azimuth,
+        ],
+        axis=-1,
     ).reshape(-1, 3)
-    here = np.arange(rows)[:, None] * 2 * rows + np.arange(2 * rows)
-    right = np.roll(here, -1, axis=1)
+    left = np.arange(rows)[:, None] * 2 * rows + np.arange(2 * rows)
+    right = np.roll(left, -1, axis=1)
     corners = np.concatenate(
         [
-            np.stack([here, here + 2 * rows, right + 2 * rows], axis=-1).reshape(-1, 3),
-            np.stack([here, right + 2 * rows, right], axis=-1).reshape(-1, 3),
+            np.stack([left, left + 2 * rows, right + 2 * rows], axis=-1).reshape(-1, 3),
+            np.stack([left, right + 2 * rows, right], axis=-1).reshape(-1, 3),
         ]
     )
     return build_surface(points, corners.ravel(), np.arange(0, corners.size + 1, 3), name="ball")
 
 
-def instance(surface: Surface, degree=4, matrix=None):
+def make_instance(surface: Surface, degree=4, matrix=None):
     field = axis_field(surface, degree, (0.3, 0.2, 1.0))
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
 
 
-def eye(azimuth=0.0, zoom=1.0, away=4.0):
-    place = away * np.array([np.sin(azimuth), -np.cos(azimuth), 0.3])
+def make_camera(azimuth=0.0, zoom=1.0, distance=4.0):
+    position = distance * np.array([np.sin(azimuth), -np.cos(azimuth), 0.3])
     return perspective_camera(
-        look_at(place, (0, 0, 0)), SIZE, SIZE, fov=2 * np.arctan(np.tan(0.28) / zoom)
+        look_at(position, (0, 0, 0)), SIZE, SIZE, fov=2 * np.arctan(np.tan(0.28) / zoom)
     )
 
 
-def finer(camera, side):
+def supersampled(camera, factor):
     return Camera(
-        camera.view, np.array(camera.projection), camera.width * side, camera.height * side, "fine"
+        camera.view,
+        np.array(camera.projection),
+        camera.width * factor,
+        camera.height * factor,
+        "fine",
     )
 
 
-def drawn(thing, camera, look, lights=()):
-    return compose(project([thing], finer(camera, look.supersampling)), look, lights).rgba
+def render(instance, camera, look, lights=()):
+    return compose(project([instance], supersampled(camera, look.supersampling)), look, lights).rgba
 
 
 # --- tone ------------------------------------------------------------------------------------------
@@ -137,69 +146,69 @@ def drawn(thing, camera, look, lights=()):
 
 @pytest.mark.parametrize("name", mainly(HATCHED[1::3], HATCHED))
 def test_presets_reproduce_a_ramp(name):
-    """A ball under one light, from 0 to 1: blurred, ink on paper is as light as it was to be."""
+    """A ball under one light, with tones from 0 to 1: the blurred picture has the target tone."""
     look = PRESETS[name]
-    thing, camera = instance(ball()), eye()
-    rgba = drawn(thing, camera, look)
-    gbuffer = project([thing], camera)
-    asked = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
-    assert asked.min() < 1 - look.shading + 0.05 and asked.max() > 0.97
+    instance, camera = make_instance(ball()), make_camera()
+    rgba = render(instance, camera, look)
+    gbuffer = project([instance], camera)
+    target_tone = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
+    assert target_tone.min() < 1 - look.shading + 0.05 and target_tone.max() > 0.97
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
-    # From the darker of ink and paper to the lighter, by the channel in which they differ most.
+    # Lightness from the darker of ink and paper to the lighter, in the channel of largest contrast.
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
-    left = (rgba[..., channel] - darker) / (lighter - darker)
-    seen = np.zeros(SIZE * SIZE)
-    seen[gbuffer.pixel] = 1
-    wanted = np.zeros(SIZE * SIZE)
-    wanted[gbuffer.pixel] = asked
-    seen, wanted = seen.reshape(SIZE, SIZE), wanted.reshape(SIZE, SIZE)
-    share = gaussian_filter(seen, 16)
-    inner = share > 0.98
-    got = gaussian_filter(np.where(seen > 0, left, 0), 16)[inner] / share[inner]
-    error = np.abs(got - gaussian_filter(wanted, 16)[inner] / share[inner])
+    lightness = (rgba[..., channel] - darker) / (lighter - darker)
+    visible = np.zeros(SIZE * SIZE)
+    visible[gbuffer.pixel] = 1
+    expected = np.zeros(SIZE * SIZE)
+    expected[gbuffer.pixel] = target_tone
+    visible, expected = visible.reshape(SIZE, SIZE), expected.reshape(SIZE, SIZE)
+    fraction = gaussian_filter(visible, 16)
+    inner = fraction > 0.98
+    rendered = gaussian_filter(np.where(visible > 0, lightness, 0), 16)[inner] / fraction[inner]
+    error = np.abs(rendered - gaussian_filter(expected, 16)[inner] / fraction[inner])
     assert error.mean() <= 0.04
 
 
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
-def test_thresholds_cover_what_they_say(crispness):
-    """Of normal streaks, those of a threshold cover as much of the paper as it is for."""
+def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
+    """Higher coverages have lower thresholds, and half coverage is near the mean."""
     settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
     threshold, deviation, *_ = streak_statistics(settings)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
-    assert abs(middle) < 0.1  # half of the paper: streaks of dense noise are hardly skew
+    assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6, 7])
 @pytest.mark.parametrize("layers", [1, 2, 3])
-def test_shares_of_families_are_whole_and_continuous(degree, layers):
-    """They sum to 1, and change places without a jump as the field turns under the guide."""
+def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
+    """Shares sum to 1, and have no jumps as the field rotates relative to the guiding angle."""
     angles = np.linspace(-1, 1, 40001)[None]
-    flow = planar_pixel_field(angles, degree)
+    field = planar_pixel_field(angles, degree)
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
     for tone in (0.02, 0.3, 0.7, 0.98):
-        left = np.full((1, angles.size), tone, dtype=np.float32)
-        shares = np.array(line_shares(flow, look, left))
+        transmittance = np.full((1, angles.size), tone, dtype=np.float32)
+        shares = np.array(line_shares(field, look, transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
-        # The members jump where the guide lies between two; the directions that get ink do not.
+        # Members jump where two are equally near the guiding angle, but the sorted shares do not.
         ordered = np.sort(shares, axis=0)
         assert np.abs(np.diff(ordered, axis=1)).max() < 0.03
-        # Where two change places both are there, and so may be their neighbour on the other side.
-        usual = np.median((shares > 0.02).sum(axis=0))
-        assert usual <= min(layers, flow.line_count)
+        # Where two families swap ranks, both are drawn, and possibly a third one.
+        typical_count = np.median((shares > 0.02).sum(axis=0))
+        assert typical_count <= min(layers, field.line_count)
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::3], HATCHED))
 def test_lines_run_along_the_field(name):
-    """The peak of the orientations on a wall that faces the eye is the field's, within 2 degrees."""
+    """The mean orientation on a wall that faces the eye is that of the field within 2 degrees."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     angle = np.radians(25)
     field = axis_field(wall, 2, (np.cos(angle), 0, np.sin(angle)))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=6)
     look = replace(PRESETS[name], shading=0.8)
-    rgba = drawn(MeshInstance(wall, np.eye(4), field), camera, look)
+    rgba = render(MeshInstance(wall, np.eye(4), field), camera, look)
     picture = rgba[..., 1] * rgba[..., 3]
     up, right = (gaussian_filter(picture, 2.0, order=order) for order in ((1, 0), (0, 1)))
     across = np.angle(((right + 1j * up) ** 2).mean()) / 2
@@ -209,354 +218,391 @@ def test_lines_run_along_the_field(name):
 
 # --- uneven lines ------------------------------------------------------------------------------------
 
-UNEVEN = {
+UNEVEN_LINES = {
     "broken": {"breaks": 1.0},
-    "by a hand that wavers": {"wobble": 1.0},
-    "on paper with a tooth": {"paper_grain": 1.0},
+    "wobble": {"wobble": 1.0},
+    "paper grain": {"paper_grain": 1.0},
     "all three": {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.6},
 }
 
 
-def on_a_plane(look, tone, degree=2, angle=0.3, side=320):
-    """Coverage of a field of one direction in the plane, under one tone."""
+def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
+    """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
     look = replace(look, anchor="picture", clear_paper=True)
-    flow = planar_pixel_field(np.full((side, side), angle), degree)
-    noise = look_noise(flow, look)
-    pieces = tooth = None
+    field = planar_pixel_field(np.full((side, side), angle), degree)
+    noise = look_noise(field, look)
+    break_images = paper_grain = None
     if look.breaks or look.wobble:
-        shorter = replace(look, length=break_steps(look))
-        pieces = run_to_completion(fast_lic_task(flow, shorter, noise))
+        break_look = replace(look, length=break_steps(look))
+        break_images = run_to_completion(fast_lic_task(field, break_look, noise))
     if look.paper_grain:
-        tooth = picture_paper_grain(
-            flow.pixel, flow.width, look.grain, look.seed, 1, flow.line_count
+        paper_grain = picture_paper_grain(
+            field.pixel, field.width, look.grain, look.seed, 1, field.line_count
         )
-    images = run_to_completion(fast_lic_task(flow, look, noise))
-    tones = np.full(len(flow.pixel), tone, dtype=np.float32)
-    _, alpha = render_hatching(flow, images, look, tones, LineModulation(pieces, tooth))
+    images = run_to_completion(fast_lic_task(field, look, noise))
+    tones = np.full(len(field.pixel), tone, dtype=np.float32)
+    _, alpha = render_hatching(
+        field, images, look, tones, LineModulation(break_images, paper_grain)
+    )
     # Streamlines end at the frame.
     return alpha.reshape(side, side)[40:-40, 40:-40]
 
 
-@pytest.mark.parametrize("kind", UNEVEN)
+@pytest.mark.parametrize("kind", UNEVEN_LINES)
 @pytest.mark.parametrize("crispness", [0.1, 0.9])
-def test_uneven_lines_cover_as_much(kind, crispness):
-    """The tone is that of even lines, from the darkest to the lightest."""
-    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN[kind])
+def test_uneven_lines_have_the_same_coverage(kind, crispness):
+    """The mean coverage is that of even lines, from dark to light tones."""
+    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
     for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
-        assert on_a_plane(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
+        assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
 
 
-@pytest.mark.parametrize("kind", mainly(["all three"], UNEVEN))
+@pytest.mark.parametrize("kind", mainly(["all three"], UNEVEN_LINES))
 def test_uneven_lines_reproduce_a_ramp(kind):
-    assert error_of_ramp(replace(INK, **UNEVEN[kind])) <= 0.04
+    assert ramp_error(replace(INK, **UNEVEN_LINES[kind])) <= 0.04
 
 
-def runs(ink):
+def mean_run_length(ink):
     """Mean length of the runs of ink along the rows."""
     ink = ink > 0.5
     begins = ink[:, 1:] & ~ink[:, :-1]
     return ink.sum() / begins.sum()
 
 
-def test_lines_break_in_the_lights_first():
+def test_lines_break_in_light_tones_first():
     look = Look(ink="hatch", grain=2.0, length=60, crispness=1.0)
     broken = replace(look, breaks=1.0)
     shorter = [
-        runs(on_a_plane(broken, tone, angle=0.0)) / runs(on_a_plane(look, tone, angle=0.0))
+        mean_run_length(plane_coverage(broken, tone, angle=0.0))
+        / mean_run_length(plane_coverage(look, tone, angle=0.0))
         for tone in (0.9, 0.5, 0.2)
     ]
     assert shorter[0] < 0.5
     assert shorter[0] < shorter[1] < shorter[2]
 
 
-def test_the_tooth_breaks_lines_into_grains():
+def test_paper_grain_breaks_lines():
     look = Look(ink="hatch", grain=2.0, length=60, crispness=0.8)
-    plain, rough = (on_a_plane(replace(look, paper_grain=share), 0.6) for share in (0, 1))
-    assert runs(rough) < 0.6 * runs(plain)
+    plain, rough = (plane_coverage(replace(look, paper_grain=fraction), 0.6) for fraction in (0, 1))
+    assert mean_run_length(rough) < 0.6 * mean_run_length(plain)
 
 
 @pytest.mark.parametrize("grain", [1.5, 3.0, 8.0])
-def test_the_tooth_of_paper(grain):
-    """Even all over, as deep everywhere, and no cloud in it."""
+def test_statistics_of_paper_grain(grain):
+    """Mean 0, standard deviation 1, no low frequencies, independent of other lines and streaks."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
-    tooth, beside = picture_paper_grain(pixel, side, grain, 0, line_count=2).reshape(2, side, side)
-    assert abs(np.corrcoef(tooth.ravel(), beside.ravel())[0, 1]) < 0.03
-    assert abs(tooth.mean()) < 0.02 and tooth.std() == pytest.approx(1, abs=0.03)
-    assert gaussian_filter(tooth, 16).std() < 0.12
+    first_grain, second_grain = picture_paper_grain(pixel, side, grain, 0, line_count=2).reshape(
+        2, side, side
+    )
+    assert abs(np.corrcoef(first_grain.ravel(), second_grain.ravel())[0, 1]) < 0.03
+    assert abs(first_grain.mean()) < 0.02 and first_grain.std() == pytest.approx(1, abs=0.03)
+    assert gaussian_filter(first_grain, 16).std() < 0.12
     streaks = image_noise(pixel, side, grain, 0, 1)
-    assert abs(np.corrcoef(tooth.ravel(), streaks[:, 0])[0, 1]) < 0.02
+    assert abs(np.corrcoef(first_grain.ravel(), streaks[:, 0])[0, 1]) < 0.02
 
 
-def test_the_paper_stays_where_it_is():
-    """A height is that of the pixel, whatever else is seen, and that of all its subpixels."""
-    whole = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 3).reshape(300, 700)
+def test_paper_grain_depends_only_on_the_pixel():
+    """A height does not depend on the other visible pixels, and is equal at all subpixels."""
+    full_frame = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 3).reshape(
+        300, 700
+    )
     column, row = np.meshgrid(np.arange(310, 330), np.arange(250, 280))
-    some = picture_paper_grain((row * 700 + column).ravel().astype(np.int32), 700, 2.0, 3)
-    np.testing.assert_allclose(some.reshape(30, 20), whole[250:280, 310:330], atol=1e-5)
-    finer = picture_paper_grain(np.arange(1400 * 600, dtype=np.int32), 1400, 2.0, 3, 2)
+    part = picture_paper_grain((row * 700 + column).ravel().astype(np.int32), 700, 2.0, 3)
+    np.testing.assert_allclose(part.reshape(30, 20), full_frame[250:280, 310:330], atol=1e-5)
+    fine = picture_paper_grain(np.arange(1400 * 600, dtype=np.int32), 1400, 2.0, 3, 2)
     np.testing.assert_allclose(
-        finer.reshape(300, 2, 700, 2), np.broadcast_to(whole[:, None, :, None], (300, 2, 700, 2))
+        fine.reshape(300, 2, 700, 2),
+        np.broadcast_to(full_frame[:, None, :, None], (300, 2, 700, 2)),
     )
     other = picture_paper_grain(np.arange(700 * 300, dtype=np.int32), 700, 2.0, 4)
-    assert abs(np.corrcoef(other[0], whole.ravel())[0, 1]) < 0.02
+    assert abs(np.corrcoef(other[0], full_frame.ravel())[0, 1]) < 0.02
 
 
 @pytest.mark.parametrize("anchor", ["surface", "picture"])
-@pytest.mark.parametrize("away", [4.0, 30.0])
-def test_a_hand_wavers_about_the_field(anchor, away):
-    """To both sides alike, slowly, and as far from afar as from near."""
-    gbuffer = project([instance(tube())], eye(away=away, zoom=away / 4))
-    found = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
-    assert abs(found.mean()) < 0.25 * WOBBLE_STD
-    assert 0.75 < found.std() / WOBBLE_STD < 1.25
+@pytest.mark.parametrize("distance", [4.0, 30.0])
+def test_statistics_of_the_wobble(anchor, distance):
+    """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
+    gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
+    actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
+    assert abs(actual.mean()) < 0.25 * WOBBLE_STD
+    assert 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
-    assert np.abs(np.diff(found)[right]).mean() < 0.15 * WOBBLE_STD
+    assert np.abs(np.diff(actual)[right]).mean() < 0.15 * WOBBLE_STD
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
-def test_a_course_that_wavers_turns_all_directions(degree):
-    flow = planar_pixel_field(np.linspace(-2, 2, 90).reshape(9, 10), degree)
+def test_wobble_rotates_all_directions(degree):
+    field = planar_pixel_field(np.linspace(-2, 2, 90).reshape(9, 10), degree)
     angle = np.linspace(-0.3, 0.3, 90).astype(np.float32)
     harmonics = {("deviation", j): np.full(90, c) for j, c in ((-1, 0.1j), (0, 1), (1, 0.2 + 0j))}
-    flow = replace(flow, channels=harmonics)
-    turned = rotate_pixel_field(flow, angle)
-    member = np.exp(1j * np.angle(flow.representation) / degree)
-    before = flow.member_direction(member)
+    field = replace(field, channels=harmonics)
+    turned = rotate_pixel_field(field, angle)
+    member = np.exp(1j * np.angle(field.representation) / degree)
+    before = field.member_direction(member)
     after = turned.member_direction(member * np.exp(1j * angle))
     np.testing.assert_allclose(after, before * np.exp(1j * angle), atol=1e-5)
     np.testing.assert_allclose(
-        turned.representation, flow.representation * np.exp(1j * degree * angle), atol=1e-5
+        turned.representation, field.representation * np.exp(1j * degree * angle), atol=1e-5
     )
 
 
 # --- inks --------------------------------------------------------------------------------------------
 
 
-def error_of_ramp(look):
-    """Mean difference, blurred, of the luminance of a ball from what its inks were to leave of it."""
-    thing, camera = instance(ball(), degree=6), eye()
-    rgba = drawn(thing, camera, look)
-    gbuffer = project([thing], camera)
-    asked = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
+def ramp_error(look):
+    """Mean error of the blurred luminance transmittance of a ball, relative to the target."""
+    instance, camera = make_instance(ball(), degree=6), make_camera()
+    rgba = render(instance, camera, look)
+    gbuffer = project([instance], camera)
+    target_tone = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     inks = inks_of(look, 3 if look.hue == "families" else 1)
-    left = asked if not inks.is_light else 1 - asked
-    seen, wanted = np.zeros(SIZE * SIZE), np.zeros(SIZE * SIZE)
-    seen[gbuffer.pixel], wanted[gbuffer.pixel] = 1, inks.target_transmittance(left)
-    seen, wanted = seen.reshape(SIZE, SIZE), wanted.reshape(SIZE, SIZE)
-    share = gaussian_filter(seen, 16)
-    inner = share > 0.98
-    got = np.where(seen > 0, inks.luminance_transmittance(rgba[..., :3]), 0)
-    error = gaussian_filter(got, 16)[inner] - gaussian_filter(wanted, 16)[inner]
-    return np.abs(error / share[inner]).mean()
+    target_light = target_tone if not inks.is_light else 1 - target_tone
+    visible, expected = np.zeros(SIZE * SIZE), np.zeros(SIZE * SIZE)
+    visible[gbuffer.pixel], expected[gbuffer.pixel] = 1, inks.target_transmittance(target_light)
+    visible, expected = visible.reshape(SIZE, SIZE), expected.reshape(SIZE, SIZE)
+    fraction = gaussian_filter(visible, 16)
+    inner = fraction > 0.98
+    rendered = np.where(visible > 0, inks.luminance_transmittance(rgba[..., :3]), 0)
+    error = gaussian_filter(rendered, 16)[inner] - gaussian_filter(expected, 16)[inner]
+    return np.abs(error / fraction[inner]).mean()
 
 
-COLOURED = {
-    "from one to another": {"ink_ramp": True, "ink_colour": "#201848"},
-    "from one to another, light": {
+COLORED_INKS = {
+    "ramp": {"ink_ramp": True, "ink_colour": "#201848"},
+    "ramp, light": {
         "ink_ramp": True,
         "ink_colour": "#c08050",
         "ink_colour_light": "#fff0c0",
         "paper_colour": "#182028",
     },
     "families": {"hue": "families"},
-    "families, coloured": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
+    "families, colored": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_colour": "#f0e8d0", "paper_colour": "#101418"},
-    "families from one to another": {"hue": "families", "ink_ramp": True},
-    "through a third": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
+    "families, ramp": {"hue": "families", "ink_ramp": True},
+    "ramp with a third ink": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
 }
 
 
-def test_a_third_ink_is_on_the_way_from_one_to_the_other():
+def test_a_third_ink_is_between_the_other_two():
     look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
     codes = [look.ink_colour, look.ink_colour_middle, look.ink_colour_light]
     dark, middle, light = (to_linear(from_hex(code)) for code in codes)
     tones = np.array([0.0, 0.125, 0.25, 0.625, 1.0], dtype=np.float32)
-    found = inks_of(look).ink_at_tone(np.zeros(5), tones)
-    wanted = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
-    np.testing.assert_allclose(found, wanted, atol=1e-6)
-    # Without one it is as light as both together half way.
-    found = inks_of(replace(look, ink_middle=0.0)).ink_at_tone(np.zeros(5), tones)
-    np.testing.assert_allclose(found, dark + tones[:, None] * (light - dark), atol=1e-6)
+    actual = inks_of(look).ink_at_tone(np.zeros(5), tones)
+    expected = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
+    np.testing.assert_allclose(actual, expected, atol=1e-6)
+    # Without a third ink, colors are interpolated linearly.
+    actual = inks_of(replace(look, ink_middle=0.0)).ink_at_tone(np.zeros(5), tones)
+    np.testing.assert_allclose(actual, dark + tones[:, None] * (light - dark), atol=1e-6)
 
 
 @pytest.mark.parametrize(
     "kind",
-    mainly(["families, light", "families from one to another", "through a third"], COLOURED),
+    mainly(["families, light", "families, ramp", "ramp with a third ink"], COLORED_INKS),
 )
-def test_coloured_inks_leave_the_light_that_was_asked_for(kind):
-    assert error_of_ramp(replace(INK, layers=3, **COLOURED[kind])) <= 0.04
+def test_colored_inks_reproduce_a_ramp(kind):
+    assert ramp_error(replace(INK, layers=3, **COLORED_INKS[kind])) <= 0.04
 
 
-@pytest.mark.parametrize("kind", COLOURED)
-def test_an_ink_covers_what_its_tone_takes(kind):
-    """Paper and ink side by side have the luminance that is wanted."""
-    look = replace(INK, **COLOURED[kind])
+@pytest.mark.parametrize("kind", COLORED_INKS)
+def test_required_coverage_has_the_target_luminance(kind):
+    """Paper with the required coverage of ink has the target luminance."""
+    look = replace(INK, **COLORED_INKS[kind])
     inks = inks_of(look, 4 if look.hue == "families" else 1)
     tone = np.linspace(0, 1, 101)
-    wanted = inks.target_transmittance(1 - tone if inks.is_light else tone)
-    for number in range(len(inks.dark)):
-        ink = inks.ink_at_tone(np.full(101, float(number)), tone)
-        covered = inks.required_coverage(wanted, ink)[:, None]
+    expected = inks.target_transmittance(1 - tone if inks.is_light else tone)
+    for index in range(len(inks.dark)):
+        ink = inks.ink_at_tone(np.full(101, float(index)), tone)
+        covered = inks.required_coverage(expected, ink)[:, None]
         mixed = inks.paper + covered * (ink - inks.paper)
-        np.testing.assert_allclose(inks.luminance_transmittance(mixed), wanted, atol=2e-3)
+        np.testing.assert_allclose(inks.luminance_transmittance(mixed), expected, atol=2e-3)
 
 
-def test_inks_of_families_are_told_apart():
+def test_inks_of_families_differ_visibly():
     for code in ("#101010", "#8a2020", "#f4f0e8"):
         paper = "#000000" if code == "#f4f0e8" else "#ffffff"
         look = replace(INK, ink_colour=code, paper_colour=paper, hue="families")
         inks = inks_of(look, 6)
         np.testing.assert_array_equal(inks.dark[0], to_linear(from_hex(code)))
         display = to_display(inks.dark)
-        apart = np.linalg.norm(display[:, None] - display, axis=2)
-        assert apart[np.triu_indices(6, 1)].min() > 0.15
+        difference = np.linalg.norm(display[:, None] - display, axis=2)
+        assert difference[np.triu_indices(6, 1)].min() > 0.15
         luminance = inks.dark[1:] @ LUMINANCE_WEIGHTS
         assert luminance.max() / luminance.min() < 2
 
 
 @pytest.mark.parametrize("degree", [3, 4, 6, 7])
-def test_inks_change_places_without_a_seam(degree):
-    """As the field turns under the guide, the inks in use go over from one to the next."""
-    flow = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
+def test_inks_swap_ranks_without_a_seam(degree):
+    """As the field rotates relative to the guiding angle, ink indices change without a jump."""
+    field = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
     look = replace(INK, hue="families", guiding_angle=0.3)
-    numbers = np.sort(np.array(line_ink_indices(flow, look)), axis=0)
-    assert np.abs(np.diff(numbers, axis=1)).max() < 0.03
-    assert (np.abs(numbers - np.arange(flow.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3).all()
-    assert line_ink_indices(flow, replace(look, hue="one")) is None
-    assert line_ink_indices(flow, replace(look, magnitude="colour")) is None
+    ink_indices = np.sort(np.array(line_ink_indices(field, look)), axis=0)
+    assert np.abs(np.diff(ink_indices, axis=1)).max() < 0.03
+    assert (
+        np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
+    ).all()
+    assert line_ink_indices(field, replace(look, hue="one")) is None
+    assert line_ink_indices(field, replace(look, magnitude="colour")) is None
 
 
-def test_families_that_are_told_apart_keep_their_inks():
-    """Whatever the guiding angle: it says which is drawn first, not in which ink."""
-    flow = planar_pixel_field(np.linspace(-1, 1, 101)[None], 4)
-    flow = replace(flow, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
+def test_families_keep_their_inks_at_any_guiding_angle():
+    """The guiding angle determines the order of the lines, not their inks."""
+    field = planar_pixel_field(np.linspace(-1, 1, 101)[None], 4)
+    field = replace(field, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
     for guide in (0.0, 0.6, -1.2):
         look = replace(INK, hue="families", guiding_angle=guide)
-        found, told = line_ink_indices(flow, look), line_families(flow, look)
-        np.testing.assert_array_equal(found, told)
-        assert {0, 1} == set(np.unique(found))
+        actual, families = line_ink_indices(field, look), line_families(field, look)
+        np.testing.assert_array_equal(actual, families)
+        assert {0, 1} == set(np.unique(actual))
 
 
-def test_ink_may_stand_for_the_magnitude():
-    """Pixels of nothing but ink have the colours of the map."""
+def test_ink_is_colored_by_magnitude():
+    """Pixels covered by ink have the colors of the color map."""
     look = replace(INK, magnitude="colour", colour_map="grey", clear_paper=True, shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]
     vectors = field.vectors / np.maximum(np.linalg.norm(field.vectors, axis=1), 1e-9)[:, None]
     field = replace(field, vectors=vectors * (1.5 + height)[:, None])
-    rgba = drawn(MeshInstance(surface, np.eye(4), field), eye(), look)
+    rgba = render(MeshInstance(surface, np.eye(4), field), make_camera(), look)
     row = np.nonzero(rgba[..., 3] > 0.5)[0]
     grey = rgba[..., 0][rgba[..., 3] > 0.5]
     assert np.corrcoef(row, to_display(grey))[0, 1] > 0.95
 
 
-# --- over-shoot --------------------------------------------------------------------------------------
+# --- overshoot ---------------------------------------------------------------------------------------
 
-#: Half the side of a wall, Blender units.
+#: Half the side of the wall of `render_half_dark_wall`, Blender units.
 HALF = 4.0
 
 
-def half_dark(method, overshoot):
-    """How light the columns and the single lines are of a wall whose left half is dark, the right white.
-
-    Lines run from left to right.
-    """
+def render_half_dark_wall(method, overshoot):
+    """(H, W - 1) lightness of a wall of horizontal lines, the left half dark, the right white."""
     points = HALF * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     image = np.repeat([[0.3, 1.0]], 2, axis=0).repeat(256, axis=1).astype(np.float32)
     uv = (wall.vertices[wall.corner_vertex][:, [0, 2]] / (2 * HALF) + 0.5).astype(np.float32)
     field = axis_field(wall, 2, (1.0, 0, 0))
-    thing = MeshInstance(wall, np.eye(4), field, SurfaceTone(uv, image))
+    instance = MeshInstance(wall, np.eye(4), field, SurfaceTone(uv, image))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
     look = replace(
         INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_colour="#000000"
     )
-    # Images repeat: at the last column it gets dark again.
-    return drawn(thing, camera, look)[..., :-1, 0]
+    # The image of tones repeats, so the last column is dark and is left out.
+    return render(instance, camera, look)[..., :-1, 0]
 
 
 @pytest.mark.parametrize("method", ["sheets", *long("members", "brute")])
-def test_lines_run_on_past_the_border_of_a_tone(method):
-    """So that each column has the mean tone of those as near: a ramp as wide as twice the over-shoot."""
-    reach = 24.0
-    light = half_dark(method, reach)
+def test_lines_overshoot_the_border_of_a_tone(method):
+    """The mean of a column is a ramp across the border, twice as wide as the overshoot."""
+    overshoot = 24.0
+    light = render_half_dark_wall(method, overshoot)
     from_border = np.arange(SIZE - 1) + 0.5 - SIZE / 2
-    wanted = 0.3 + 0.7 * np.clip(0.5 + from_border / (2 * reach), 0, 1)
-    off = np.abs(gaussian_filter(light.mean(axis=0), 3) - wanted)
+    expected = 0.3 + 0.7 * np.clip(0.5 + from_border / (2 * overshoot), 0, 1)
+    error = np.abs(gaussian_filter(light.mean(axis=0), 3) - expected)
     inner = np.abs(from_border) < SIZE / 2 - 20
-    assert off[inner].mean() < 0.03 and off[inner].max() < 0.12
-    beyond = (from_border > reach + 2) & (from_border < SIZE / 2 - reach - 4)
+    assert error[inner].mean() < 0.03 and error[inner].max() < 0.12
+    beyond = (from_border > overshoot + 2) & (from_border < SIZE / 2 - overshoot - 4)
     assert (light[:, beyond] > 0.999).all()
-    # Some run on farther than others.
-    past = [row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()]
-    ends = np.argmin(past, axis=1)
-    assert ends.max() > 0.5 * reach and np.std(ends) > 0.1 * reach
+    # Lines end at different distances from the border.
+    dark_beyond_border = [
+        row[SIZE // 2 :] < 0.5 for row in light if (row[SIZE // 2 - 4 : SIZE // 2] < 0.5).all()
+    ]
+    ends = np.argmin(dark_beyond_border, axis=1)
+    assert ends.max() > 0.5 * overshoot and np.std(ends) > 0.1 * overshoot
 
 
 def test_without_overshoot_lines_end_with_the_tone():
-    light = half_dark("sheets", 0.0)
+    light = render_half_dark_wall("sheets", 0.0)
     assert (light[:, SIZE // 2 + 2 :] > 0.999).all()
     assert abs(light[:, 20 : SIZE // 2 - 2].mean() - 0.3) < 0.04
 
 
-def test_lines_that_run_on_reproduce_a_ramp():
-    assert error_of_ramp(replace(INK, overshoot=12.0)) <= 0.04
+def test_overshooting_lines_reproduce_a_ramp():
+    assert ramp_error(replace(INK, overshoot=12.0)) <= 0.04
 
 
 # --- stability ---------------------------------------------------------------------------------------
 
 
-def likeness(thing, camera, other, other_camera, look):
-    """Correlation of two pictures, the second one warped by the true motion."""
-    first, second = drawn(thing, camera, look), drawn(other, other_camera, look)
-    here, there = project([thing], camera), project([other], other_camera)
-    corners = thing.surface.triangle_vertex[here.triangle]
-    moved = np.einsum("pi,pij->pj", here.barycentric, other.surface.vertices[corners])
-    matrix = other_camera.projection @ other_camera.view @ other.matrix
+def warped_correlation(instance, camera, other_instance, other_camera, look):
+    """Correlation of two pictures, after the second one is warped by the true motion."""
+    first, second = render(instance, camera, look), render(other_instance, other_camera, look)
+    gbuffer, other_gbuffer = project([instance], camera), project([other_instance], other_camera)
+    corners = instance.surface.triangle_vertex[gbuffer.triangle]
+    moved = np.einsum("pi,pij->pj", gbuffer.barycentric, other_instance.surface.vertices[corners])
+    matrix = other_camera.projection @ other_camera.view @ other_instance.matrix
     clip = np.concatenate([moved, np.ones((len(moved), 1))], axis=1) @ matrix.T
-    place = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * SIZE - 0.5
+    position = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * SIZE - 0.5
     depth = np.full((SIZE, SIZE), np.inf)
-    depth.reshape(-1)[there.pixel] = -there.position[:, 2]
-    near = np.rint(place).astype(int)
-    seen = ((near >= 2) & (near < SIZE - 2)).all(axis=1)
-    seen[seen] = np.abs(depth[near[seen, 1], near[seen, 0]] - clip[seen, 3]) < 0.01
-    assert seen.mean() > 0.5
-    tone, tone_there = (to_display(picture[..., 0]) for picture in (first, second))
-    warped = map_coordinates(tone_there, place[seen, ::-1].T, order=3, mode="nearest")
-    return np.corrcoef(tone.reshape(-1)[here.pixel[seen]], warped)[0, 1]
+    depth.reshape(-1)[other_gbuffer.pixel] = -other_gbuffer.position[:, 2]
+    nearest_pixel = np.rint(position).astype(int)
+    visible = ((nearest_pixel >= 2) & (nearest_pixel < SIZE - 2)).all(axis=1)
+    visible[visible] = (
+        np.abs(depth[nearest_pixel[visible, 1], nearest_pixel[visible, 0]] - clip[visible, 3])
+        < 0.01
+    )
+    assert visible.mean() > 0.5
+    tone, other_tone = (to_display(picture[..., 0]) for picture in (first, second))
+    warped = map_coordinates(other_tone, position[visible, ::-1].T, order=3, mode="nearest")
+    return np.corrcoef(tone.reshape(-1)[gbuffer.pixel[visible]], warped)[0, 1]
 
 
-def moved_by(pixels):
+def shift_by_pixels(pixels):
     matrix = np.eye(4)
-    matrix[0, 3] = pixels * 4.0 / eye().pixels_per_unit
+    matrix[0, 3] = pixels * 4.0 / make_camera().pixels_per_unit
     return matrix
 
 
 MOTIONS = {
-    "camera turned": lambda: (instance(tube()), eye(), instance(tube()), eye(np.radians(1))),
-    "object moved": lambda: (instance(tube()), eye(), instance(tube(), matrix=moved_by(2)), eye()),
-    "zoomed": lambda: (instance(tube()), eye(), instance(tube()), eye(zoom=1.1)),
-    "bent": lambda: (instance(tube()), eye(), instance(tube(bend=0.05)), eye()),
-    "bent far": lambda: (instance(tube(bend=0.8)), eye(), instance(tube(bend=0.81)), eye()),
+    "camera turned": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube()),
+        make_camera(np.radians(1)),
+    ),
+    "object moved": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube(), matrix=shift_by_pixels(2)),
+        make_camera(),
+    ),
+    "zoomed": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube()),
+        make_camera(zoom=1.1),
+    ),
+    "bent": lambda: (
+        make_instance(tube()),
+        make_camera(),
+        make_instance(tube(bend=0.05)),
+        make_camera(),
+    ),
+    "bent far": lambda: (
+        make_instance(tube(bend=0.8)),
+        make_camera(),
+        make_instance(tube(bend=0.81)),
+        make_camera(),
+    ),
 }
 
 
 @pytest.mark.parametrize("motion", mainly(["bent", "zoomed"], MOTIONS))
 @pytest.mark.parametrize("ink", ["hatch", *long("soft", "uneven")])
 def test_streaks_stay_on_the_surface(motion, ink):
-    # Even light: what moves with the lamp is not what is asked about.
+    # The light is even, because shading does not move with the surface.
     look = replace(INK, light="scene", shading=0.35, gain=1.2, crispness=0.5)
     if ink == "soft":
         look = replace(look, ink="soft", shading=0.0)
     if ink == "uneven":
         look = replace(look, wobble=1.0, breaks=0.3)
     first, camera, second, other_camera = MOTIONS[motion]()
-    assert likeness(first, camera, second, other_camera, look) >= 0.9
+    assert warped_correlation(first, camera, second, other_camera, look) >= 0.9
     if motion == "zoomed":
-        still = replace(look, anchor="picture")
-        assert likeness(first, camera, second, other_camera, still) < 0.5
+        picture_anchored = replace(look, anchor="picture")
+        assert warped_correlation(first, camera, second, other_camera, picture_anchored) < 0.5
 
 
 @pytest.mark.parametrize(
@@ -565,58 +611,58 @@ def test_streaks_stay_on_the_surface(motion, ink):
 @pytest.mark.parametrize("name", mainly(HATCHED[:1], HATCHED))
 def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
-    assert likeness(*MOTIONS[motion](), look) >= 0.9
+    assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
 @pytest.mark.parametrize("grain", [2.5, *long(4.0)])
 def test_lines_keep_their_width_through_a_zoom(grain):
-    """Of the lines across a wall, from one zoom to sixteen times as near."""
+    """Lines on a wall, at zooms from 1 to 16."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
-    thing = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
+    instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     widths = []
     for zoom in 2.0 ** np.array([0, 0.3, 0.7, 1.5, 2.75, 4]):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
-        rgba = drawn(thing, camera, replace(INK, light="scene", shading=0.4, grain=grain))
-        widths.append(width_of_lines(rgba[..., 0]))
+        rgba = render(instance, camera, replace(INK, light="scene", shading=0.4, grain=grain))
+        widths.append(line_width(rgba[..., 0]))
     assert max(widths) / min(widths) < 1.15
 
 
-def test_lines_in_blender_units_are_wider_from_near():
-    """In proportion, and as they are seen in the middle where a pixel is so many units wide."""
+def test_lines_in_blender_units_scale_with_the_zoom():
+    """The width is proportional to the zoom, and equals that in pixels at the scale of the unit."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
-    thing = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
+    instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     look = replace(INK, light="scene", shading=0.4)
-    inked = replace(look, unit="world", unit_size=4 / SIZE)
+    world_look = replace(look, unit="world", unit_size=4 / SIZE)
     widths = []
     for zoom in (1.0, 1.6, 4.0):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=4 / zoom
         )
-        widths.append(width_of_lines(drawn(thing, camera, inked)[..., 0]) / zoom)
+        widths.append(line_width(render(instance, camera, world_look)[..., 0]) / zoom)
         if zoom == 1:
-            seen = width_of_lines(drawn(thing, camera, look)[..., 0])
+            pixel_width = line_width(render(instance, camera, look)[..., 0])
     assert max(widths) / min(widths) < 1.15
-    assert abs(widths[0] / seen - 1) < 0.15
+    assert abs(widths[0] / pixel_width - 1) < 0.15
 
 
-def test_near_lines_are_wider_than_far_ones_of_one_picture():
-    """Of two walls, one twice as far away; both are as dark as they are to be."""
+def test_lines_in_blender_units_scale_with_the_distance():
+    """Two walls, one twice as far away as the other, both with the target tone."""
     points = np.array([[-1, 0, -2], [1, 0, -2], [1, 0, 2], [-1, 0, 2]], dtype=float)
     walls = []
-    for number, (left, away) in enumerate(((-1.0, 4.0), (2.0, 8.0))):
-        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {number}")
-        matrix = np.diag([away / 4, 1.0, away / 4, 1.0])
-        matrix[:3, 3] = left, away, 0
+    for index, (left, distance) in enumerate(((-1.0, 4.0), (2.0, 8.0))):
+        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {index}")
+        matrix = np.diag([distance / 4, 1.0, distance / 4, 1.0])
+        matrix[:3, 3] = left, distance, 0
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 2, (1.0, 0, 0))))
     camera = perspective_camera(look_at((0, 0, 0), (0, 1, 0)), SIZE, SIZE, fov=2 * np.arctan(0.5))
     look = replace(INK, light="scene", shading=0.5, unit="world", unit_size=0.04)
-    picture = compose(project(walls, finer(camera, 2)), look).rgba[..., 0]
+    picture = compose(project(walls, supersampled(camera, 2)), look).rgba[..., 0]
     near, far = picture[:, 8 : SIZE // 2 - 8], picture[:, SIZE // 2 + 8 : -8]
-    assert width_of_lines(near) / width_of_lines(far) == pytest.approx(2, rel=0.2)
+    assert line_width(near) / line_width(far) == pytest.approx(2, rel=0.2)
     assert abs(near.mean() - 0.5) < 0.05 and abs(far.mean() - 0.5) < 0.05
 
 
@@ -625,11 +671,11 @@ def test_near_lines_are_wider_than_far_ones_of_one_picture():
 )
 def test_lines_in_blender_units_stay_on_the_surface(motion):
     look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
-    assert likeness(*MOTIONS[motion](), look) >= 0.9
+    assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
-def width_of_lines(picture):
-    """Where the autocorrelation across horizontal lines has fallen to a half, pixels."""
+def line_width(picture):
+    """The lag in pixels at which the autocorrelation across horizontal lines is 1/2."""
     columns = picture - picture.mean()
     spectrum = np.abs(np.fft.fft(columns, axis=0)) ** 2
     correlation = np.fft.ifft(spectrum.mean(axis=1)).real
@@ -642,22 +688,22 @@ def width_of_lines(picture):
 # --- noise on the surface ---------------------------------------------------------------------------
 
 
-def test_places_at_rest_are_those_of_the_bodies():
-    thing = instance(tube(bend=0.8), matrix=np.diag([1.0, -1.0, 2.0, 1.0]))
-    gbuffer = project([thing], eye(away=9))
-    places = rest_coordinates(gbuffer)
-    corners = thing.surface.rest_vertices[thing.surface.triangle_vertex[gbuffer.triangle]]
-    wanted = np.einsum("pi,pij->pj", gbuffer.barycentric, corners)
-    np.testing.assert_allclose(places.at_offset(0, 0).T, wanted, atol=2e-4)
+def test_rest_coordinates_match_the_rest_shape():
+    instance = make_instance(tube(bend=0.8), matrix=np.diag([1.0, -1.0, 2.0, 1.0]))
+    gbuffer = project([instance], make_camera(distance=9))
+    rest = rest_coordinates(gbuffer)
+    corners = instance.surface.rest_vertices[instance.surface.triangle_vertex[gbuffer.triangle]]
+    expected = np.einsum("pi,pij->pj", gbuffer.barycentric, corners)
+    np.testing.assert_allclose(rest.at_offset(0, 0).T, expected, atol=2e-4)
     # A pixel to the right is the next pixel of the same triangle.
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
-    np.testing.assert_allclose(places.at_offset(1, 0).T[right], wanted[right + 1], atol=2e-4)
+    np.testing.assert_allclose(rest.at_offset(1, 0).T[right], expected[right + 1], atol=2e-4)
 
 
 @pytest.mark.parametrize("high_pass", [0.0, 16.0])
-@pytest.mark.parametrize("away", [3.0, 4.7, 11.0])
-def test_noise_is_as_varied_as_that_of_the_picture(high_pass, away):
-    gbuffer = project([instance(tube())], eye(away=away, zoom=away / 4))
+@pytest.mark.parametrize("distance", [3.0, 4.7, 11.0])
+def test_statistics_of_surface_noise(high_pass, distance):
+    gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
     noise = surface_noise(gbuffer, 2.0, 0, 3, density=0.3, high_pass=high_pass)
     assert np.abs(noise.mean(axis=0) - 0.5).max() < 0.02
     assert 0.3 < noise.std() < 0.5
@@ -665,20 +711,20 @@ def test_noise_is_as_varied_as_that_of_the_picture(high_pass, away):
     assert np.abs(channels[np.triu_indices(3, 1)]).max() < 0.03
 
 
-def test_bodies_have_noise_of_their_own():
+def test_instances_have_different_noise():
     names = ["a", "b", "a", "a", "c"]
     assert len(set(instance_hashes(names).tolist())) == 5
-    # A body that joins in does not change the others'.
+    # Another instance does not change the hashes of the others.
     assert instance_hashes(["z", *names])[1:].tolist() == instance_hashes(names).tolist()
     # A mesh file looks the same in every folder.
     assert instance_hashes(["some/ball.obj"]) == instance_hashes(["C:\\other\\ball.obj"])
 
 
-def test_clear_paper_is_ink_alone():
+def test_clear_paper_shows_only_ink():
     look = replace(INK, clear_paper=True, ink_colour="#204060")
     clear, full = (
-        drawn(instance(ball()), eye(), look),
-        drawn(instance(ball()), eye(), replace(look, clear_paper=False)),
+        render(make_instance(ball()), make_camera(), look),
+        render(make_instance(ball()), make_camera(), replace(look, clear_paper=False)),
     )
     inked = clear[..., 3] > 0
     np.testing.assert_allclose(
@@ -693,10 +739,10 @@ def test_clear_paper_is_ink_alone():
 
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 3.5, 6.0])
-def test_an_outline_is_as_wide_as_it_is_to_be(width):
-    """Around a ball: of so much ink is a ring of that width, and it lies along the border."""
+def test_the_width_of_outlines(width):
+    """The outline of a ball has the area of a ring of that width along the border."""
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
-    gbuffer = project([instance(ball())], camera)
+    gbuffer = project([make_instance(ball())], camera)
     covered = outline_coverage(gbuffer, Look(outline=width))
     radius = SIZE / 2.4
     ring = np.pi * (radius**2 - (radius - width) ** 2)
@@ -706,14 +752,14 @@ def test_an_outline_is_as_wide_as_it_is_to_be(width):
     assert (covered[(from_middle > radius - width + 2)] == 1).all()
 
 
-def test_outlines_are_of_what_is_nearer():
-    """Two walls, one before the other; the one behind has no line where the other hides it."""
+def test_outlines_are_drawn_on_the_nearer_surface():
+    """Two walls, one in front of the other: the far one has no line where it is occluded."""
     points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
     walls = []
-    for number, (left, away) in enumerate(((0.0, 0.0), (0.7, 1.0))):
-        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {number}")
+    for index, (left, distance) in enumerate(((0.0, 0.0), (0.7, 1.0))):
+        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {index}")
         matrix = np.eye(4)
-        matrix[:3, 3] = left, away, 0.3 * number
+        matrix[:3, 3] = left, distance, 0.3 * index
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
     gbuffer = project(walls, camera)
@@ -726,8 +772,8 @@ def test_outlines_are_of_what_is_nearer():
     assert hidden_by.sum() > 300 and (covered[hidden_by] == 0).all()
 
 
-def test_creases_have_lines_half_on_either_side():
-    """The edge of a cube that is seen at equal angles; none if streaks are to cross it."""
+def test_lines_of_creases_are_half_on_each_side():
+    """The line at an edge of a cube, seen symmetrically; no line if streaks cross creases."""
     soft = cube()
     box = build_surface(soft.vertices, soft.corner_vertex, soft.face_start, sharp_angle=1.0)
     camera = orthographic_camera(look_at((4.5, -3.5, 0.5), (0.5, 0.5, 0.5)), 240, 240, scale=2.0)
@@ -741,9 +787,10 @@ def test_creases_have_lines_half_on_either_side():
 
 
 def test_outlines_are_drawn_in_ink():
-    plain = replace(INK, light="scene", shading=0.0)  # no light that would ask for lines
+    plain = replace(INK, light="scene", shading=0.0)  # white, so that there are no lines
     bare, lined = (
-        drawn(instance(ball()), eye(), replace(plain, outline=width)) for width in (0.0, 2.0)
+        render(make_instance(ball()), make_camera(), replace(plain, outline=width))
+        for width in (0.0, 2.0)
     )
     changed = np.abs(lined - bare)[..., 0] > 1e-3
     assert changed.sum() > 500

@@ -1,4 +1,4 @@
-"""LIC images against integrators and statistics that were not written for them."""
+"""LIC images against independent integrators, theory and invariances."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long, mainly
-from planar_fields import pair_angle, pixel_centres, swirl_angle
+from planar_fields import pair_angle, pixel_centers, swirl_angle
 from scipy import ndimage
 
 from rosy_addon.compositor.compose import compose_planar
@@ -41,19 +41,19 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def own_noise(size, grain=1.5, seed=0):
+def make_noise(size, grain=1.5, seed=0):
     return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
 
 
-def window(length, taper):
-    """What the samples of a streamline weigh, from end to end."""
-    whole = np.arange(-length, length + 1)
-    return 1 - np.abs(whole) / (length + 1) if taper else np.ones(2 * length + 1)
+def kernel_window(length, taper):
+    """Weights of the samples of a streamline, from end to end."""
+    offset = np.arange(-length, length + 1)
+    return 1 - np.abs(offset) / (length + 1) if taper else np.ones(2 * length + 1)
 
 
-def plain_lic(angle, noise, size, length, step, taper=False):
-    """One-member LIC in double precision, each streamline by classic Runge-Kutta of order 4."""
-    x, y = pixel_centres(size)
+def runge_kutta_lic(angle, noise, size, length, step, taper=False):
+    """One-member LIC in double precision, by the classic Runge-Kutta method of order 4."""
+    x, y = pixel_centers(size)
     start = x + 1j * y
 
     def direction(p):
@@ -70,7 +70,7 @@ def plain_lic(angle, noise, size, length, step, taper=False):
     total, count = noise.copy(), np.ones_like(noise)
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
-        for weight in window(length, taper)[length + 1 :]:
+        for weight in kernel_window(length, taper)[length + 1 :]:
             h = sign * step
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
@@ -83,37 +83,37 @@ def plain_lic(angle, noise, size, length, step, taper=False):
     return total / count
 
 
-def whole(image, margin=50):
+def crop_margin(image, margin=50):
     return image[margin:-margin, margin:-margin]
 
 
 @pytest.mark.parametrize("taper", [False, True])
-def test_one_direction_agrees_with_a_plain_integrator(taper):
-    x, y = pixel_centres(SIZE)
-    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = plain_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
+def test_one_direction_agrees_with_a_runge_kutta_integrator(taper):
+    x, y = pixel_centers(SIZE)
+    noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, taper)
     look = plain(method="members", taper=taper)
-    found = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
-    assert correlation(whole(found), whole(expected)) > 0.99
+    actual = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
+    assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
 
 
 @pytest.mark.parametrize("taper", [False, True])
 def test_one_direction_resembles_another_library(taper):
     rlic = pytest.importorskip("rlic")
-    x, y = pixel_centres(SIZE)
+    x, y = pixel_centers(SIZE)
     angles = swirl_angle(x, y, SIZE)
-    noise = own_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
+    noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
     length = PLAIN.length
     expected = rlic.convolve(
-        noise, np.cos(angles), np.sin(angles), kernel=window(length, taper), iterations=1
+        noise, np.cos(angles), np.sin(angles), kernel=kernel_window(length, taper), iterations=1
     )
-    found = tone(angles, 1, plain(taper=taper), noise=noise)
-    assert correlation(whole(found), whole(expected)) > 0.7
+    actual = tone(angles, 1, plain(taper=taper), noise=noise)
+    assert correlation(crop_margin(actual), crop_margin(expected)) > 0.7
 
 
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
 def test_the_decomposition_agrees_with_brute_force(degree):
-    angles = pair_angle(*pixel_centres(SIZE), SIZE, degree)
+    angles = pair_angle(*pixel_centers(SIZE), SIZE, degree)
     members = tone(angles, degree, plain(method="members"))
     brute = tone(angles, degree, plain(method="brute"))
     assert correlation(members, brute) > 0.98
@@ -121,31 +121,31 @@ def test_the_decomposition_agrees_with_brute_force(degree):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("degree", range(1, 13))
-def test_any_member_stands_for_the_field(degree, method):
+def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     size = 64
-    angles = pair_angle(*pixel_centres(size), size, degree)
-    turns = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
+    angles = pair_angle(*pixel_centers(size), size, degree)
+    rotation = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
     look = plain(method=method, length=10)
-    # A float that rounds to the other side of a pixel's border moves one sample of twenty-one.
-    difference = np.abs(tone(angles, degree, look) - tone(angles + turns, degree, look))
+    # Where rounding moves a position across the border of a pixel, one sample of 21 differs.
+    difference = np.abs(tone(angles, degree, look) - tone(angles + rotation, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
 
 
 @pytest.mark.parametrize("noise", [{}, *long({"high_pass": 16.0, "density": 0.1}, {"taper": True})])
 @pytest.mark.parametrize("degree", [7, *long(2, 3, 4, 5, 6)])
 @pytest.mark.parametrize("method", ["members", "sheets"])
-def test_contrast_after_correction_is_that_of_one_member(method, degree, noise):
+def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
     size = 512
     angles = np.full((size, size), 0.2)
     layers = compose_planar(angles, degree, plain(method=method, **noise)).layers[0]
-    inner = whole(np.arange(size * size).reshape(size, size)).ravel()
-    one = np.mean([member[inner].std() for member in layers.images.members])
-    assert layers.tone[inner].std() == pytest.approx(one, rel=0.03)
+    inner = crop_margin(np.arange(size * size).reshape(size, size)).ravel()
+    member_std = np.mean([member[inner].std() for member in layers.images.members])
+    assert layers.tone[inner].std() == pytest.approx(member_std, rel=0.03)
     assert layers.tone[inner].mean() == pytest.approx(0.5, abs=0.01)
 
 
-def test_independence_alone_would_overstate_the_contrast_of_seven():
-    # Equation 6 takes the images for independent; the correction for their crossing is a tenth.
+def test_the_blend_gain_of_seven_lines_includes_correlations():
+    # Equation 6 assumes independent images; the correction for correlations is about a tenth.
     gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
@@ -167,26 +167,26 @@ def test_independence_alone_would_overstate_the_contrast_of_seven():
         product([False, True], [1.0, 1.5, 3.0], [20, 80], [0.0, 8.0, 24.0]),
     ),
 )
-def test_deviation_of_one_member_is_as_theory_says(taper, grain, length, high_pass):
+def test_the_standard_deviation_of_one_member_matches_theory(taper, grain, length, high_pass):
     size = 512
     look = plain(grain=grain, length=length, high_pass=high_pass, taper=taper)
-    spread = []
+    stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)
-        spread.append(whole(image, length + 5).std())
-    assert np.mean(spread) == pytest.approx(expected_std(look), rel=0.05)
+        stds.append(crop_margin(image, length + 5).std())
+    assert np.mean(stds) == pytest.approx(expected_std(look), rel=0.05)
 
 
 def along_field_autocorrelation(image, angles, chosen, lag):
     """Correlation of pixels with the points `lag` pixels away along the first member."""
     row, column = np.nonzero(chosen)
     r, c = row + lag * np.sin(angles[chosen]), column + lag * np.cos(angles[chosen])
-    there = ndimage.map_coordinates(image, [r, c], order=1, mode="nearest")
-    return correlation(image[row, column], there)
+    shifted = ndimage.map_coordinates(image, [r, c], order=1, mode="nearest")
+    return correlation(image[row, column], shifted)
 
 
 @pytest.mark.parametrize(
-    "way",
+    "settings",
     [
         {"method": "members", "weights": "cosine"},
         {"method": "members", "weights": "binary"},
@@ -194,27 +194,29 @@ def along_field_autocorrelation(image, angles, chosen, lag):
     ],
 )
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_breaking_points_do_not_show(degree, way):
+def test_breaking_points_are_not_visible(degree, settings):
     size, guides = 384, 4
-    x, _ = pixel_centres(size)
-    # Turns evenly from left to right: breaking lines every so many columns, all alike but there.
+    x, _ = pixel_centers(size)
+    # The field rotates evenly from left to right, so breaking points form evenly spaced columns.
     angles = 3 * 2 * np.pi / degree * x / size
-    spread, alike = np.zeros(2), np.zeros(2)
-    # Several guiding angles, so that a direction along the rows of pixels is not always breaking.
+    stds, similarity = np.zeros(2), np.zeros(2)
+    # Several guiding angles, so that breaking points occur at several directions.
     for guide in np.arange(guides) * 2 * np.pi / degree / guides:
-        image = tone(angles, degree, plain(guiding_angle=guide, **way))
-        turn = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
+        image = tone(angles, degree, plain(guiding_angle=guide, **settings))
+        angle_offset = np.abs(np.angle(np.exp(1j * degree * (angles - guide))))
         inner = np.zeros_like(x, dtype=bool)
         inner[50:-50, 50:-50] = True
-        for place, chosen in enumerate((inner & (turn > 2.7), inner & (turn < 2.2))):
-            spread[place] += image[chosen].std()
-            alike[place] += along_field_autocorrelation(image, angles, chosen, 4)
-    assert spread[0] == pytest.approx(spread[1], rel=0.05)
-    assert alike[0] == pytest.approx(alike[1], rel=0.05)
+        for group, chosen in enumerate(
+            (inner & (angle_offset > 2.7), inner & (angle_offset < 2.2))
+        ):
+            stds[group] += image[chosen].std()
+            similarity[group] += along_field_autocorrelation(image, angles, chosen, 4)
+    assert stds[0] == pytest.approx(stds[1], rel=0.05)
+    assert similarity[0] == pytest.approx(similarity[1], rel=0.05)
 
 
-def test_one_set_alone_shows_the_breaking_points():
-    angles = pair_angle(*pixel_centres(SIZE), SIZE, 4)
+def test_breaking_points_are_visible_in_one_set_alone():
+    angles = pair_angle(*pixel_centers(SIZE), SIZE, 4)
     brute = tone(angles, 4, plain(method="brute"))
     both = tone(angles, 4, plain(method="members"))
     one = tone(angles, 4, plain(method="members", weights="none"))
@@ -222,24 +224,24 @@ def test_one_set_alone_shows_the_breaking_points():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_short_streamlines_have_the_contrast_of_whole_ones(method):
+def test_short_streamlines_have_the_contrast_of_full_ones(method):
     look = plain(method=method)
     size = 256
     angles = np.full((size, size), 0.0)
     angles[:, 100:112] = np.nan
     image = tone(angles, 1, look)
-    # Ten pixels from a gap half of a streamline is missing.
-    beside, away = image[:, 112:122], image[:, 170:200]
-    assert beside.std() == pytest.approx(away.std(), rel=0.1)
+    # Near the gap, about half of each streamline is missing.
+    near_gap, far_from_gap = image[:, 112:122], image[:, 170:200]
+    assert near_gap.std() == pytest.approx(far_from_gap.std(), rel=0.1)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_undefined_pixels_end_streamlines_and_stay_grey(method):
+def test_streamlines_end_at_undefined_pixels(method):
     look = plain(method=method)
     angles = np.full((64, 64), 0.0)
     angles[:, 32:] = np.nan
     changed = np.full((64, 64), 0.0)
-    noise = own_noise(64).reshape(64, 64)
+    noise = make_noise(64).reshape(64, 64)
     other = noise.copy()
     other[:, 32:] = 1 - other[:, 32:]
     assert np.array_equal(
@@ -266,8 +268,8 @@ def test_magnitude_drives_the_length_of_streaks(method):
     assert along(slice(136, 256), 3) > 0.5
 
 
-def test_colour_noise_is_three_pictures():
-    angles = pair_angle(*pixel_centres(128), 128, 4)
+def test_color_noise_has_three_channels():
+    angles = pair_angle(*pixel_centers(128), 128, 4)
     picture = compose_planar(angles, 4, plain(noise="colour"))
     channels = picture.layers[0].tone
     assert channels.shape == (128 * 128, 3)
@@ -277,17 +279,17 @@ def test_colour_noise_is_three_pictures():
 
 
 def test_the_same_settings_give_the_same_bytes():
-    angles = pair_angle(*pixel_centres(128), 128, 4)
+    angles = pair_angle(*pixel_centers(128), 128, 4)
     first, second = (compose_planar(angles, 4, Look()).rgba.tobytes() for _ in range(2))
     assert first == second
     assert compose_planar(angles, 4, Look(seed=1)).rgba.tobytes() != first
 
 
 def orientation_spectrum(image, bins=360):
-    """Power by direction of the streaks (a half turn from the wave vectors), smoothed a little."""
+    """(bins,) power by direction of the streaks, perpendicular to the wave vectors; smoothed."""
     size = image.shape[0]
-    window = np.hanning(size)
-    power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(window, window))) ** 2
+    hann_window = np.hanning(size)
+    power = np.abs(np.fft.fft2((image - image.mean()) * np.outer(hann_window, hann_window))) ** 2
     k = np.fft.fftfreq(size)
     kx, ky = np.meshgrid(k, k)
     ring = (np.hypot(kx, ky) > 0.05) & (np.hypot(kx, ky) < 0.35)
@@ -313,8 +315,8 @@ def test_the_spectrum_peaks_at_the_members(degree):
         peak = int(remaining.argmax())
         peaks.append(peak)
         remaining[np.arange(peak - 12, peak + 13) % bins] = 0
-    apart = np.abs((np.sort(peaks) - np.sort(expected) + bins // 2) % bins - bins // 2)
-    assert apart.max() <= 4  # 2 degrees
+    offset = np.abs((np.sort(peaks) - np.sort(expected) + bins // 2) % bins - bins // 2)
+    assert offset.max() <= 4  # 2 degrees
     assert remaining.max() < 0.2 * spectrum.max()
 
 

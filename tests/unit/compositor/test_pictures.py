@@ -1,4 +1,4 @@
-"""Pictures of surfaces: what the compositor makes of a G-buffer."""
+"""Pictures of surfaces, composed from a G-buffer."""
 
 from __future__ import annotations
 
@@ -34,24 +34,26 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def seen(surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0), display="smooth"):
+def project_surface(
+    surface, field, size=256, eye=(0, 0, 4), scale=2.4, up=(0, 1, 0), display="smooth"
+):
     """A G-buffer of one surface under an orthographic camera."""
     camera = orthographic_camera(look_at(eye, (0, 0, 0), up), size, size, scale=scale)
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
 
-def members_turned(surface, field, seed):
+def with_other_members(surface, field, seed):
     """The same field with another member stored on each face."""
-    turns = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
-    angle = (2 * np.pi / field.degree * turns)[:, None]
-    across = np.cross(surface.face_normal, field.vectors)
-    return RosyField(field.degree, np.cos(angle) * field.vectors + np.sin(angle) * across)
+    member_index = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
+    angle = (2 * np.pi / field.degree * member_index)[:, None]
+    perpendicular = np.cross(surface.face_normal, field.vectors)
+    return RosyField(field.degree, np.cos(angle) * field.vectors + np.sin(angle) * perpendicular)
 
 
 @pytest.mark.parametrize("degree", [4, *long(2, 3, 5, 6)])
 def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
     sphere = icosphere(5)
-    gbuffer = seen(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
+    gbuffer = project_surface(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
     members, brute = (
         compose(gbuffer, plain(method=method)).layers[0].tone for method in ("members", "brute")
     )
@@ -60,12 +62,14 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
 
 @pytest.mark.parametrize("method", ["members", "sheets"])
 @pytest.mark.parametrize("degree", [1, 4, 7])
-def test_the_stored_member_makes_no_difference_to_the_picture(degree, method):
+def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     surface, look = torus(48, 24), plain(method=method)
     field = axis_field(surface, degree, (0.2, 0.3, 1.0))
-    one = compose(seen(surface, field, 96, (2, 1, 4), 3.2), look)
-    other = compose(seen(surface, members_turned(surface, field, 1), 96, (2, 1, 4), 3.2), look)
-    difference = np.abs(one.layers[0].tone - other.layers[0].tone)
+    first = compose(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
+    second = compose(
+        project_surface(surface, with_other_members(surface, field, 1), 96, (2, 1, 4), 3.2), look
+    )
+    difference = np.abs(first.layers[0].tone - second.layers[0].tone)
     assert np.mean(difference > 1e-5) < 0.005
 
 
@@ -84,17 +88,17 @@ def test_two_degrees_in_one_picture():
     assert covered == np.count_nonzero(picture.rgba[..., 3])
 
 
-def test_streaks_of_a_tilted_plane_run_where_it_is_projected():
-    # One direction on a plane seen at 60 degrees: autocorrelation is highest along the image of it.
+def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
+    # The autocorrelation is largest along the projected direction.
     surface = plane(2, 2, 4.0)
     direction = np.array([0.6, 0.8, 0.0])
     field = RosyField(1, np.tile(direction, (surface.face_count, 1)))
     eye = (0, -4 * np.sin(np.pi / 3), 4 * np.cos(np.pi / 3))
-    gbuffer = seen(surface, field, 256, eye, 1.6, (0, 0, 1))
+    gbuffer = project_surface(surface, field, 256, eye, 1.6, (0, 0, 1))
     tone = np.zeros(256 * 256)
     tone[gbuffer.pixel] = compose(gbuffer, PLAIN).layers[0].tone[:, 0] - 0.5
     power = np.abs(np.fft.fft2(tone.reshape(256, 256))) ** 2
-    alike = np.fft.fftshift(np.fft.ifft2(power).real)
+    autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
     on_screen = gbuffer.camera.view[:2, :3] @ direction
     expected = np.degrees(np.arctan2(on_screen[1], on_screen[0]))
     angles = np.arange(0, 180, 0.25)
@@ -103,19 +107,19 @@ def test_streaks_of_a_tilted_plane_run_where_it_is_projected():
     y = 128 + lag * np.sin(np.radians(angles))
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
     fx, fy = x - x0, y - y0
-    along = (alike[y0, x0] * (1 - fx) + alike[y0, x0 + 1] * fx) * (1 - fy)
-    along += (alike[y0 + 1, x0] * (1 - fx) + alike[y0 + 1, x0 + 1] * fx) * fy
+    along = (autocorrelation[y0, x0] * (1 - fx) + autocorrelation[y0, x0 + 1] * fx) * (1 - fy)
+    along += (autocorrelation[y0 + 1, x0] * (1 - fx) + autocorrelation[y0 + 1, x0 + 1] * fx) * fy
     assert angles[np.argmax(along)] == pytest.approx(expected % 180, abs=1.5)
 
 
-def test_without_the_view_plane_breaking_points_show_on_a_tilted_surface():
+def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane():
     """Figures 7 and 8 of the paper, measured against brute force."""
     surface = plane(128, 128, 4.0)
     angle = 1.5 * surface.face_center[:, 0] + 0.8 * surface.face_center[:, 1]
     field = RosyField(4, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
     tilt = np.radians(65)
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
-    gbuffer = seen(surface, field, 300, eye, 1.5, (0, 0, 1))
+    gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
     brute = compose(gbuffer, plain(method="brute")).layers[0].tone
     error = [
         1
@@ -129,69 +133,69 @@ def test_without_the_view_plane_breaking_points_show_on_a_tilted_surface():
 
 
 def test_silhouettes_end_streamlines():
-    """A torus' tube before its far side: what is drawn on one does not depend on the other."""
+    """The near and the far side of a torus are not linked at the silhouette between them."""
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
-    gbuffer = seen(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
-    flow = surface_pixel_field(gbuffer, 1, 0.7, False)
-    linked = flow.neighbors[:, :-1].T
+    gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
+    pixel_field = surface_pixel_field(gbuffer, 1, 0.7, False)
+    linked = pixel_field.neighbors[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
-    # The tube is 0.8 across; at the two cusps, where a silhouette begins, a pixel can span half.
+    # The tube is 0.8 wide. At the two cusps where a silhouette ends, a pixel can span half of it.
     assert gap[valid].max() < 0.55
     assert np.mean(gap[valid] > 0.3) < 0.001
 
 
-def test_supersampling_keeps_size_contrast_and_covers_edges_in_part():
+def test_supersampling_keeps_size_and_contrast_and_smooths_edges():
     sphere = icosphere(4)
     field = axis_field(sphere, 2, (0.2, 1, 0))
-    spread = {}
+    std = {}
     for s in (1, 2, 3):
-        gbuffer = seen(sphere, field, 180 * s)
+        gbuffer = project_surface(sphere, field, 180 * s)
         picture = compose(gbuffer, plain(supersampling=s, gain=2.0))
         assert picture.rgba.shape == (180, 180, 4)
         y, x = np.mgrid[0:180, 0:180] - 89.5
         inner = np.hypot(x, y) < 45
-        spread[s] = to_display(picture.rgba[inner, 0]).std()
-        part = (picture.rgba[..., 3] > 0) & (picture.rgba[..., 3] < 1)
-        assert part.any() == (s > 1)
+        std[s] = to_display(picture.rgba[inner, 0]).std()
+        partly_covered = (picture.rgba[..., 3] > 0) & (picture.rgba[..., 3] < 1)
+        assert partly_covered.any() == (s > 1)
         assert np.isfinite(picture.rgba).all()
-    assert spread[2] == pytest.approx(spread[1], rel=0.08)
-    assert spread[3] == pytest.approx(spread[1], rel=0.08)
+    assert std[2] == pytest.approx(std[1], rel=0.08)
+    assert std[3] == pytest.approx(std[1], rel=0.08)
 
 
-def test_borders_do_not_glare():
+def test_contrast_at_borders_is_that_of_the_center():
     sphere = icosphere(4)
     y, x = np.mgrid[0:256, 0:256] - 127.5
     radius = np.hypot(x, y) / (256 / 2.4)
-    rim, middle = [], []
+    rim, inner = [], []
     for seed in range(4):
-        gbuffer = seen(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
+        gbuffer = project_surface(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
         image = np.full(256 * 256, np.nan)
         image[gbuffer.pixel] = compose(gbuffer, plain(seed=seed)).layers[0].tone[:, 0]
         image = image.reshape(256, 256)
         rim.append(np.nanstd(image[(radius > 0.93) & (radius < 0.99)]))
-        middle.append(np.nanstd(image[radius < 0.5]))
-    assert np.mean(rim) == pytest.approx(np.mean(middle), rel=0.15)
+        inner.append(np.nanstd(image[radius < 0.5]))
+    assert np.mean(rim) == pytest.approx(np.mean(inner), rel=0.15)
 
 
-def test_undefined_faces_are_grey_and_not_followed():
+def test_undefined_faces_have_no_excess_contrast():
     surface = plane(8, 8)
     vectors = np.tile([1.0, 0, 0], (surface.face_count, 1))
     vectors[surface.face_center[:, 0] > 0] = 0
-    gbuffer = seen(surface, RosyField(4, vectors), 96, display="flat")
+    gbuffer = project_surface(surface, RosyField(4, vectors), 96, display="flat")
     picture = compose(gbuffer, Look(shading=0.0))
     assert np.isfinite(picture.rgba).all()
     undefined = gbuffer.representation == 0
     assert undefined.any()
-    # A streamline of one sample has the spread of a whole one, no more.
+    # A streamline of one sample has about the standard deviation of a full one.
     tone = picture.layers[0].tone[:, 0]
     assert tone[undefined].std() < 1.6 * tone[~undefined].std()
 
 
 def test_headlight_is_lamberts_law():
     sphere = icosphere(5)
-    gbuffer = seen(sphere, axis_field(sphere, 1))
+    gbuffer = project_surface(sphere, axis_field(sphere, 1))
     full = diffuse(gbuffer, plain(shading=1.0))
     radius = np.hypot(*(gbuffer.position[:, :2].T))
     inner = radius < 0.9
@@ -207,27 +211,27 @@ def test_lights_of_the_scene():
     white = np.ones(3)
     sun = Light("sun", normalize(np.array([0.0, 1.0, 1.0])), white, 2.0)
     assert np.allclose(diffuse(gbuffer, look, [sun]), np.sqrt(2), atol=1e-5)
-    # A point two units above the middle of the plane: 1 / r^2 and the cosine.
+    # A point light two units above the center of the plane: 1 / r^2 and the cosine.
     lamp = Light("point", np.array([0.0, 0.0, -1.0]), np.array([1.0, 0.5, 0.0]), 4.0)
-    shown = diffuse(gbuffer, look, [lamp])
+    lighting = diffuse(gbuffer, look, [lamp])
     across = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1])
     expected = 4 / (4 + across**2) * 2 / np.sqrt(4 + across**2)
-    assert np.allclose(shown[:, 0], expected, atol=1e-4)
-    assert np.allclose(shown[:, 1], expected / 2, atol=1e-4)
+    assert np.allclose(lighting[:, 0], expected, atol=1e-4)
+    assert np.allclose(lighting[:, 1], expected / 2, atol=1e-4)
     assert not diffuse(gbuffer, look).any()
 
 
-def test_magnitude_is_coloured():
+def test_magnitude_is_colored():
     surface = plane(32, 2)
     rho = (surface.face_center[:, :1] + 1) / 2
     field = RosyField(1, rho * [1.0, 0, 0])
-    gbuffer = seen(surface, field, 128)
+    gbuffer = project_surface(surface, field, 128)
     picture = compose(gbuffer, plain(magnitude="colour", magnitude_range=1.0, gain=0.0))
     x = gbuffer.position[:, 0]
-    found = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
+    actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
     expected = map_colors((x + 1) / 2, "viridis")
-    middle = np.abs(x) < 0.9
-    assert np.abs(found - expected)[middle].max() < 0.03
+    inner = np.abs(x) < 0.9
+    assert np.abs(actual - expected)[inner].max() < 0.03
 
 
 def test_display_curve_is_its_own_inverse():

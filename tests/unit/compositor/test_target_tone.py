@@ -1,4 +1,4 @@
-"""Where tones come from: attributes, images, pictures and shadows, and what hatching makes of them."""
+"""Target tones from attributes, images, reference renders and shadows, and their hatching."""
 
 from __future__ import annotations
 
@@ -34,28 +34,28 @@ HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
 BALL = icosphere(5)
 
 
-def moved(x, y, z, scale=1.0):
+def moved_and_scaled(x, y, z, scale=1.0):
     matrix = np.diag([scale, scale, scale, 1.0])
     matrix[:3, 3] = x, y, z
     return matrix
 
 
-def instance(surface, matrix=None, tone=None):
+def make_instance(surface, matrix=None, tone=None):
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field, tone)
 
 
-def eye(size=SIZE, place=(0.0, -4.0, 1.2), at=(0.0, 0.0, 0.0), fov=0.56):
-    return perspective_camera(look_at(place, at), size, size, fov=fov)
+def make_camera(size=SIZE, position=(0.0, -4.0, 1.2), target=(0.0, 0.0, 0.0), fov=0.56):
+    return perspective_camera(look_at(position, target), size, size, fov=fov)
 
 
-def at_corners(surface, values):
-    """A tone of the values of vertices."""
+def tone_from_vertices(surface, values):
+    """A `SurfaceTone` from values at the vertices."""
     return SurfaceTone(np.asarray(values, dtype=np.float32)[surface.corner_vertex, None])
 
 
-def places(gbuffer):
-    """(P, 3) world space."""
+def world_positions(gbuffer):
+    """(P, 3) positions of pixels in world space."""
     view = gbuffer.camera.view
     return (gbuffer.position - view[:3, 3]) @ view[:3, :3]
 
@@ -63,8 +63,8 @@ def places(gbuffer):
 # --- attributes -----------------------------------------------------------------------------------
 
 
-def left_of(rgba, look):
-    """(H, W) how much of the light from the darker of ink and paper to the lighter there is."""
+def relative_lightness(rgba, look):
+    """(H, W) lightness, from 0 at the darker of ink and paper to 1 at the lighter."""
     paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
@@ -72,86 +72,96 @@ def left_of(rgba, look):
 
 
 def blurred(gbuffer, values, sigma=16):
-    """(H, W) means over the pixels that see something, and which of them see hardly anything else."""
+    """(n,) blurred values of covered pixels, where the blur contains almost only such pixels."""
     size = gbuffer.camera.height, gbuffer.camera.width
-    seen = np.zeros(size[0] * size[1])
-    seen[gbuffer.pixel] = 1
-    seen = seen.reshape(size)
-    share = gaussian_filter(seen, sigma)
-    inner = share > 0.98
-    return gaussian_filter(np.where(seen > 0, values, 0), sigma)[inner] / share[inner]
+    visible = np.zeros(size[0] * size[1])
+    visible[gbuffer.pixel] = 1
+    visible = visible.reshape(size)
+    fraction = gaussian_filter(visible, sigma)
+    inner = fraction > 0.98
+    return gaussian_filter(np.where(visible > 0, values, 0), sigma)[inner] / fraction[inner]
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[2:3], HATCHED))
 def test_presets_reproduce_a_ramp_on_the_surface(name):
-    """Ink on paper, blurred over 16 pixels, is as light as the attribute says: 0 to 1 over a ball.
+    """Ink on paper, blurred over 16 pixels, has the tone of an attribute from 0 to 1 on a ball.
 
-    Of broad streaks few are in a blur: it is the mean over some drawings that is small, and what
-    they have in common that is smaller still.
+    A blur contains few broad streaks. So the mean absolute error over several seeds is bounded, and
+    the mean error, without its random part, is bounded more tightly.
     """
     ramp = np.clip(BALL.vertices[:, 0] * 0.62 + 0.5, 0, 1)
-    thing = instance(BALL, tone=at_corners(BALL, ramp))
-    camera = eye()
-    gbuffer = project([thing], camera)
-    wanted = np.zeros(SIZE * SIZE)
-    wanted[gbuffer.pixel] = np.clip(places(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
-    wanted = blurred(gbuffer, wanted.reshape(SIZE, SIZE))
-    assert wanted.min() < 0.15 and wanted.max() > 0.85
-    fine = project([thing], camera.scaled(PRESETS[name].supersampling))
-    off = []
+    instance = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
+    camera = make_camera()
+    gbuffer = project([instance], camera)
+    expected = np.zeros(SIZE * SIZE)
+    expected[gbuffer.pixel] = np.clip(world_positions(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
+    expected = blurred(gbuffer, expected.reshape(SIZE, SIZE))
+    assert expected.min() < 0.15 and expected.max() > 0.85
+    fine = project([instance], camera.scaled(PRESETS[name].supersampling))
+    errors = []
     for seed in range(3):
         look = replace(PRESETS[name], tone="attribute", seed=seed)
-        off.append(blurred(gbuffer, left_of(compose(fine, look).rgba, look)) - wanted)
-    assert np.abs(off).mean() <= 0.04
-    assert abs(np.mean(off)) <= 0.02
+        errors.append(
+            blurred(gbuffer, relative_lightness(compose(fine, look).rgba, look)) - expected
+        )
+    assert np.abs(errors).mean() <= 0.04
+    assert abs(np.mean(errors)) <= 0.02
 
 
 def contrast(look, tone):
-    """The deviation of what is on screen of a wall of one tone."""
+    """The standard deviation of display values on a wall of one tone."""
     surface = plane(1, 1, 4.0)
-    own = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
-    thing = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), own)
-    camera = above(128, scale=3.0).scaled(look.supersampling)
-    rgba = compose(project([thing], camera), replace(look, tone="attribute")).rgba
-    left = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
-    return to_display(left).std()
+    surface_tone = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
+    instance = MeshInstance(
+        surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), surface_tone
+    )
+    camera = camera_above(128, scale=3.0).scaled(look.supersampling)
+    rgba = compose(project([instance], camera), replace(look, tone="attribute")).rgba
+    luminance = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
+    return to_display(luminance).std()
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::4], HATCHED))
-def test_lines_are_as_legible_in_the_dark_as_in_the_light(name):
+def test_lines_have_contrast_in_dark_tones(name):
     assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.08
 
 
-def test_soft_streaks_lose_contrast_in_the_dark():
-    """What lines are compared with: light is multiplied with them."""
+def test_soft_streaks_lose_contrast_in_dark_tones():
+    """Soft streaks are multiplied by the light, in contrast to lines of hatching."""
     soft = Look(gain=1.5)
     assert contrast(soft, 0.1) < 0.6 * contrast(soft, 0.9)
 
 
 def test_attributes_are_interpolated_over_triangles():
-    """A number that is linear in space is so at the pixels, whatever the perspective."""
+    """An attribute that is linear in space is linear at the pixels, under perspective too."""
     surface = plane(3, 3, 4.0)
     linear = 0.3 * surface.vertices[:, 0] - 0.2 * surface.vertices[:, 1] + 0.5
-    matrix = moved(0.3, 0.2, -0.4, 1.5)
-    gbuffer = project([instance(surface, matrix, at_corners(surface, linear))], eye(fov=0.9))
-    x, y, _ = ((places(gbuffer) - matrix[:3, 3]) / 1.5).T
+    matrix = moved_and_scaled(0.3, 0.2, -0.4, 1.5)
+    gbuffer = project(
+        [make_instance(surface, matrix, tone_from_vertices(surface, linear))], make_camera(fov=0.9)
+    )
+    x, y, _ = ((world_positions(gbuffer) - matrix[:3, 3]) / 1.5).T
     np.testing.assert_allclose(surface_tones(gbuffer), 0.3 * x - 0.2 * y + 0.5, atol=2e-5)
 
 
-def test_numbers_of_corners_may_jump_between_faces():
+def test_corner_values_may_differ_between_faces():
     surface = plane(2, 1, 2.0)
     values = np.repeat([0.2, 0.9], 4)[:, None].astype(np.float32)
-    gbuffer = project([instance(surface, tone=SurfaceTone(values))], eye(place=(0, -0.5, 5)))
+    gbuffer = project(
+        [make_instance(surface, tone=SurfaceTone(values))], make_camera(position=(0, -0.5, 5))
+    )
     tones = surface_tones(gbuffer)
     np.testing.assert_allclose(tones, np.where(gbuffer.face == 0, 0.2, 0.9), atol=1e-6)
 
 
-def test_bodies_without_a_tone_have_the_light():
-    other = instance(BALL, moved(1.2, 0, 0, 0.5))
-    painted = instance(
-        BALL, moved(-1.2, 0, 0, 0.5), at_corners(BALL, np.full(len(BALL.vertices), 0.7))
+def test_instances_without_a_tone_use_the_light():
+    other = make_instance(BALL, moved_and_scaled(1.2, 0, 0, 0.5))
+    painted = make_instance(
+        BALL,
+        moved_and_scaled(-1.2, 0, 0, 0.5),
+        tone_from_vertices(BALL, np.full(len(BALL.vertices), 0.7)),
     )
-    gbuffer = project([painted, other], eye(fov=1.2))
+    gbuffer = project([painted, other], make_camera(fov=1.2))
     look = Look(tone="attribute", light="lamp")
     tone = target_tone(gbuffer, look)
     light = diffuse(gbuffer, look)
@@ -165,14 +175,16 @@ def test_bodies_without_a_tone_have_the_light():
 
 
 @pytest.mark.parametrize("tone", ["attribute", "image", "picture"])
-def test_tones_that_are_not_there(tone, error_of):
-    gbuffer = project([instance(BALL)], eye(64))
+def test_missing_tones_are_refused(tone, error_of):
+    gbuffer = project([make_instance(BALL)], make_camera(64))
     assert tone in error_of(target_tone, gbuffer, Look(tone=tone))
 
 
-def test_other_tones_do_not_make_other_streaks():
-    """What a look's tone is has no say in the LIC: it is not done again."""
-    gbuffer = project([instance(BALL, tone=at_corners(BALL, BALL.vertices[:, 0]))], eye(96))
+def test_lic_images_do_not_depend_on_the_tone():
+    """Changes of the tone reuse the cached LIC images."""
+    gbuffer = project(
+        [make_instance(BALL, tone=tone_from_vertices(BALL, BALL.vertices[:, 0]))], make_camera(96)
+    )
     cache = Cache()
     first = compose(gbuffer, Look(), cache=cache).layers[0].images
     for other in ({"tone": "attribute"}, {"tone_gamma": 2.0}, {"shadows": True, "light": "lamp"}):
@@ -182,7 +194,7 @@ def test_other_tones_do_not_make_other_streaks():
 # --- the curve -------------------------------------------------------------------------------------
 
 
-def test_the_curve_is_nothing_by_default():
+def test_the_default_tone_curve_is_the_identity():
     tone = np.array([0.0, 0.3, 1.0, 1.7], dtype=np.float32)
     np.testing.assert_array_equal(apply_tone_curve(tone, Look()), tone)
 
@@ -195,61 +207,63 @@ def test_black_white_and_gamma():
     )
 
 
-def test_black_above_white_turns_tones_over():
+def test_black_above_white_inverts_tones():
     look = Look(tone_black=1.0, tone_white=0.0)
     tones = np.array([0.0, 0.25, 1.0], dtype=np.float32)
     np.testing.assert_allclose(apply_tone_curve(tones, look), [1, 0.75, 0], atol=1e-6)
 
 
-def test_black_and_white_in_one_place_part_light_from_dark():
+def test_equal_black_and_white_are_a_threshold():
     look = Look(tone_black=0.5, tone_white=0.5)
-    found = apply_tone_curve(np.array([0.2, 0.49, 0.51, 0.9], dtype=np.float32), look)
-    assert (found[:2] == 0).all() and (found[2:] >= 1).all()
+    actual = apply_tone_curve(np.array([0.2, 0.49, 0.51, 0.9], dtype=np.float32), look)
+    assert (actual[:2] == 0).all() and (actual[2:] >= 1).all()
 
 
 # --- images -----------------------------------------------------------------------------------------
 
 
 def mapped_plane(image, repeat=1.0, cells=4):
-    """A square whose UV map lays an image over it, so many times."""
+    """A square whose UV map repeats an image `repeat` times in each direction."""
     surface = plane(cells, cells, 2.0)
     uv = (surface.vertices[surface.corner_vertex, :2] * 0.5 + 0.5) * repeat
-    return instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
+    return make_instance(surface, tone=SurfaceTone(uv.astype(np.float32), image.astype(np.float32)))
 
 
-def above(size, scale=2.0):
+def camera_above(size, scale=2.0):
     return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), size, size, scale=scale)
 
 
-def test_images_lie_as_their_map_says():
-    """Pixel for pixel, where they are as wide as those of the picture, rows from the bottom."""
+def test_images_follow_the_uv_map():
+    """An image with pixels of the size of the picture's is reproduced, rows from the bottom."""
     image = np.random.default_rng(1).random((32, 32))
-    gbuffer = project([mapped_plane(image)], above(32))
+    gbuffer = project([mapped_plane(image)], camera_above(32))
     assert len(gbuffer.pixel) == 32 * 32
     np.testing.assert_allclose(surface_tones(gbuffer).reshape(32, 32), image, atol=2e-4)
 
 
-def test_images_between_their_pixels():
+def test_images_are_interpolated():
     ramp = np.tile((np.arange(8) + 0.5) / 8, (8, 1))
-    tones = surface_tones(project([mapped_plane(ramp)], above(128))).reshape(128, 128)
-    wanted = (np.arange(128) + 0.5) / 128
-    np.testing.assert_allclose(tones[:, 8:-8], np.tile(wanted[8:-8], (128, 1)), atol=1e-3)
+    tones = surface_tones(project([mapped_plane(ramp)], camera_above(128))).reshape(128, 128)
+    expected = (np.arange(128) + 0.5) / 128
+    np.testing.assert_allclose(tones[:, 8:-8], np.tile(expected[8:-8], (128, 1)), atol=1e-3)
 
 
 def test_images_finer_than_the_picture_are_averaged():
-    """A board of single pixels, sixteen of them to one of the picture, is grey."""
+    """A checkerboard with sixteen squares per pixel of the picture is gray."""
     board = np.indices((256, 256)).sum(axis=0) % 2
-    tones = surface_tones(project([mapped_plane(board)], above(64)))
+    tones = surface_tones(project([mapped_plane(board)], camera_above(64)))
     np.testing.assert_allclose(tones, 0.5, atol=1e-3)
-    # Odd sides, too, and one that is repeated.
+    # The same for an image with odd sides that is repeated.
     odd = np.random.default_rng(2).random((255, 131))
-    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], above(8)))
+    tones = surface_tones(project([mapped_plane(odd, repeat=3.0)], camera_above(8)))
     np.testing.assert_allclose(tones, odd.mean(), atol=0.05)
 
 
-def test_images_begin_anew_at_their_borders():
+def test_images_repeat():
     image = np.random.default_rng(3).random((16, 16))
-    tones = surface_tones(project([mapped_plane(image, repeat=2.0)], above(32))).reshape(32, 32)
+    tones = surface_tones(project([mapped_plane(image, repeat=2.0)], camera_above(32))).reshape(
+        32, 32
+    )
     np.testing.assert_allclose(tones, np.tile(image, (2, 2)), atol=2e-4)
 
 
@@ -257,61 +271,65 @@ def test_images_begin_anew_at_their_borders():
 
 
 @pytest.mark.parametrize("perspective", [True, False])
-def test_pictures_are_taken_at_the_pixel(perspective):
-    camera = eye(96)
+def test_reference_renders_are_sampled_at_the_pixel(perspective):
+    camera = make_camera(96)
     if not perspective:
         camera = orthographic_camera(look_at((0, -4, 1), (0, 0, 0)), 96, 96, scale=2.6)
-    shown = np.random.default_rng(4).random((96, 96)).astype(np.float32)
-    gbuffer = project([instance(BALL)], camera)
-    found = ReferenceRender(shown, camera).sample(gbuffer)
-    np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
-    # Twice as fine: the mean of the four.
-    fine = np.repeat(np.repeat(shown, 2, axis=0), 2, axis=1)
-    found = ReferenceRender(fine, camera).sample(gbuffer)
-    np.testing.assert_allclose(found, shown.ravel()[gbuffer.pixel], atol=2e-4)
+    luminance = np.random.default_rng(4).random((96, 96)).astype(np.float32)
+    gbuffer = project([make_instance(BALL)], camera)
+    actual = ReferenceRender(luminance, camera).sample(gbuffer)
+    np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
+    # At twice the resolution, the mean of four pixels.
+    fine = np.repeat(np.repeat(luminance, 2, axis=0), 2, axis=1)
+    actual = ReferenceRender(fine, camera).sample(gbuffer)
+    np.testing.assert_allclose(actual, luminance.ravel()[gbuffer.pixel], atol=2e-4)
 
 
-def test_pictures_stay_on_what_they_show():
-    """From elsewhere, the surface has the tone that the camera of the picture saw there."""
-    camera = eye(256)
-    gbuffer = project([instance(BALL)], camera)
-    shown = np.zeros(256 * 256, dtype=np.float32)
-    shown[gbuffer.pixel] = places(gbuffer)[:, 2] * 0.5 + 0.5
-    rendered = ReferenceRender(shown.reshape(256, 256), camera)
-    other = project([instance(BALL)], eye(256, place=(1.5, -3.8, 0.6)))
-    point = places(other)
-    seen = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
-    facing = -np.einsum("pi,pi->p", seen, point @ camera.view[:3, :3].T) > 0.8
-    found = rendered.sample(other)[facing]
-    np.testing.assert_allclose(found, point[facing, 2] * 0.5 + 0.5, atol=0.01)
+def test_reference_renders_are_reprojected():
+    """From another camera, a point has the tone that it has in the reference render."""
+    camera = make_camera(256)
+    gbuffer = project([make_instance(BALL)], camera)
+    luminance = np.zeros(256 * 256, dtype=np.float32)
+    luminance[gbuffer.pixel] = world_positions(gbuffer)[:, 2] * 0.5 + 0.5
+    rendered = ReferenceRender(luminance.reshape(256, 256), camera)
+    other = project([make_instance(BALL)], make_camera(256, position=(1.5, -3.8, 0.6)))
+    point = world_positions(other)
+    in_reference_camera = (camera.view[:3, :3] @ point.T + camera.view[:3, 3:]).T
+    facing = -np.einsum("pi,pi->p", in_reference_camera, point @ camera.view[:3, :3].T) > 0.8
+    actual = rendered.sample(other)[facing]
+    np.testing.assert_allclose(actual, point[facing, 2] * 0.5 + 0.5, atol=0.01)
 
 
-def test_pictures_of_another_shape_are_refused(error_of):
-    said = error_of(ReferenceRender, np.zeros((90, 160), dtype=np.float32), eye(64), "shot.png")
-    assert "shot.png" in said and "160 x 90" in said and "64 x 64" in said
+def test_reference_renders_of_another_aspect_ratio_are_refused(error_of):
+    message = error_of(
+        ReferenceRender, np.zeros((90, 160), dtype=np.float32), make_camera(64), "shot.png"
+    )
+    assert "shot.png" in message and "160 x 90" in message and "64 x 64" in message
 
 
 # --- shadows ------------------------------------------------------------------------------------------
 
 
-def light_at(camera, place, strength=1.0):
-    """A point, in the space of a camera."""
-    vector = camera.view[:3, :3] @ np.asarray(place, dtype=float) + camera.view[:3, 3]
+def point_light(camera, position, strength=1.0):
+    """A point light at a position in world space, in the space of a camera."""
+    vector = camera.view[:3, :3] @ np.asarray(position, dtype=float) + camera.view[:3, 3]
     return Light("point", vector, np.ones(3), strength)
 
 
-def sun_from(camera, direction, strength=1.0):
+def sun_light(camera, direction, strength=1.0):
     direction = np.asarray(direction, dtype=float)
     direction = camera.view[:3, :3] @ (direction / np.linalg.norm(direction))
     return Light("sun", direction, np.ones(3), strength)
 
 
-def behind_ball(points, toward, centre, radius, most=np.inf):
-    """By how much rays from points pass inside a ball (below 0) or outside; `toward` is unit."""
-    way = centre - points
-    along = np.einsum("pi,pi->p", way, toward)
-    beside = np.sqrt(np.maximum(np.einsum("pi,pi->p", way, way) - along**2, 0)) - radius
-    return np.where((along > 0) & (along < most), beside, np.inf)
+def clearance_from_ball(points, toward, center, radius, max_distance=np.inf):
+    """(n,) distances of rays from a ball, negative if they hit it; `toward` are unit directions."""
+    to_center = center - points
+    along = np.einsum("pi,pi->p", to_center, toward)
+    clearance = (
+        np.sqrt(np.maximum(np.einsum("pi,pi->p", to_center, to_center) - along**2, 0)) - radius
+    )
+    return np.where((along > 0) & (along < max_distance), clearance, np.inf)
 
 
 LIGHTS = {
@@ -324,56 +342,64 @@ LIGHTS = {
 
 @pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
 def test_the_shadow_of_a_ball_on_a_plane(name):
-    """In closed form: what a ray to the light meets. Only at the very border may it differ."""
+    """The shadow is known in closed form. It may differ only close to its border."""
     kind, where = LIGHTS[name]
-    ground, ball = instance(plane(8, 8, 8.0)), instance(icosphere(6), moved(0, 0, 1.0, 0.8))
-    camera = eye(256, place=(3, -6, 4), at=(0, 0, 0.6), fov=0.7)
-    light = (sun_from if kind == "sun" else light_at)(camera, where)
+    ground, ball = (
+        make_instance(plane(8, 8, 8.0)),
+        make_instance(icosphere(6), moved_and_scaled(0, 0, 1.0, 0.8)),
+    )
+    camera = make_camera(256, position=(3, -6, 4), target=(0, 0, 0.6), fov=0.7)
+    light = (sun_light if kind == "sun" else point_light)(camera, where)
     gbuffer = project([ground, ball], camera)
-    share = shadow_visibility(gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector))
+    visibility = shadow_visibility(
+        gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
+    )
     on_ground = gbuffer.instance_id == 0
-    point = places(gbuffer)[on_ground].astype(float)
+    point = world_positions(gbuffer)[on_ground].astype(float)
     if kind == "sun":
         toward = np.broadcast_to(np.divide(where, np.linalg.norm(where)), point.shape)
-        reach = np.inf
+        light_distance = np.inf
     else:
-        way = where - point
-        reach = np.linalg.norm(way, axis=1)
-        toward = way / reach[:, None]
-    beside = behind_ball(point, toward, np.array([0, 0, 1.0]), 0.8, reach)
-    sure = np.abs(beside) > 0.04
-    assert sure.mean() > 0.9 and (beside < 0).mean() > 0.02
-    np.testing.assert_allclose(share[on_ground][sure], (beside > 0)[sure], atol=1e-6)
-    # On the border of what is lit there is everything from 0 to 1.
-    assert ((share > 0.1) & (share < 0.9)).any()
+        to_light = where - point
+        light_distance = np.linalg.norm(to_light, axis=1)
+        toward = to_light / light_distance[:, None]
+    clearance = clearance_from_ball(point, toward, np.array([0, 0, 1.0]), 0.8, light_distance)
+    certain = np.abs(clearance) > 0.04
+    assert certain.mean() > 0.9 and (clearance < 0).mean() > 0.02
+    np.testing.assert_allclose(visibility[on_ground][certain], (clearance > 0)[certain], atol=1e-6)
+    # The border of the shadow is soft.
+    assert ((visibility > 0.1) & (visibility < 0.9)).any()
 
 
 @pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
-def test_surfaces_do_not_shade_themselves_where_they_face_the_light(name):
+def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
     kind, where = LIGHTS[name]
     for surface in (icosphere(3), BALL, plane(3, 3, 2.0)):
-        camera = eye(256, place=(1.0, -4, 1.8))
-        gbuffer = project([instance(surface)], camera)
-        light = (sun_from if kind == "sun" else light_at)(camera, where)
-        share = shadow_visibility(
+        camera = make_camera(256, position=(1.0, -4, 1.8))
+        gbuffer = project([make_instance(surface)], camera)
+        light = (sun_light if kind == "sun" else point_light)(camera, where)
+        visibility = shadow_visibility(
             gbuffer, light_cameras(gbuffer.instances, camera, kind, light.vector)
         )
-        way = light.vector - gbuffer.position if kind == "point" else light.vector
-        way = way / np.linalg.norm(way, axis=-1, keepdims=True)
-        # The triangles themselves: a smooth normal may face what they do not.
+        to_light = light.vector - gbuffer.position if kind == "point" else light.vector
+        to_light = to_light / np.linalg.norm(to_light, axis=-1, keepdims=True)
+        # Normals of triangles, because smooth normals may face the light where triangles do not.
         facing = np.einsum(
-            "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(way, gbuffer.normal.shape)
+            "pi,pi->p", gbuffer.geometric_normal, np.broadcast_to(to_light, gbuffer.normal.shape)
         )
-        assert (share[facing > 0.05] == 1).mean() > 0.999
+        assert (visibility[facing > 0.05] == 1).mean() > 0.999
         if surface is BALL:
-            assert share[facing < -0.3].max() < 1e-6
+            assert visibility[facing < -0.3].max() < 1e-6
 
 
-def test_what_has_no_field_casts_shadows_too():
-    ground, ball = instance(plane(2, 2, 4.0)), MeshInstance(BALL, moved(0, 0, 2.0, 0.5))
+def test_instances_without_a_field_cast_shadows():
+    ground, ball = (
+        make_instance(plane(2, 2, 4.0)),
+        MeshInstance(BALL, moved_and_scaled(0, 0, 2.0, 0.5)),
+    )
     camera = perspective_camera(look_at((0, -5, 5), (0, 0, 0)), 128, 128, fov=0.9)
     look = Look(light="scene", shading=1.0)
-    sun = sun_from(camera, (0, 0.01, 1))
+    sun = sun_light(camera, (0, 0.01, 1))
     bare, both = project([ground], camera), project([ground, ball], camera)
     shadows = replace(look, shadows=True)
     assert diffuse(bare, shadows, [sun]).min() > 0.9
@@ -382,49 +408,52 @@ def test_what_has_no_field_casts_shadows_too():
     assert diffuse(both, look, [sun]).min() > 0.9
 
 
-def test_the_eye_casts_no_shadows():
-    gbuffer = project([instance(BALL)], eye(64))
+def test_the_headlight_casts_no_shadows():
+    gbuffer = project([make_instance(BALL)], make_camera(64))
     np.testing.assert_array_equal(
         diffuse(gbuffer, Look(shadows=True)), diffuse(gbuffer, Look(shadows=False))
     )
 
 
-def meets(origin, direction, corners):
-    """(n,) whether rays from (n, 3) points meet one of (T, 3, 3) triangles."""
+def rays_hit_triangles(origin, direction, corners):
+    """(n,) whether rays from (n, 3) points hit any of (T, 3, 3) triangles."""
     a, b, c = corners.transpose(1, 0, 2)
     p = np.cross(direction, c - a)
     divisor = np.einsum("ti,ti->t", b - a, p)
-    met = np.zeros(len(origin), dtype=bool)
+    hit = np.zeros(len(origin), dtype=bool)
     for start in range(0, len(origin), 512):
-        way = origin[start : start + 512, None] - a
-        u = np.einsum("nti,ti->nt", way, p) / divisor
-        q = np.cross(way, b - a)
+        offset = origin[start : start + 512, None] - a
+        u = np.einsum("nti,ti->nt", offset, p) / divisor
+        q = np.cross(offset, b - a)
         v = q @ direction / divisor
         t = np.einsum("nti,ti->nt", q, c - a) / divisor
-        met[start : start + 512] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any(axis=1)
-    return met
+        hit[start : start + 512] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any(axis=1)
+    return hit
 
 
-def test_shadows_of_rays():
-    """Of a ring that stands on the ground and shades itself, against rays one by one."""
+def test_shadows_match_ray_casting():
+    """A torus that stands on the ground and shadows itself, against ray casting."""
     quads, count = grid_of_quads(48, 24, True, True)
     u, v = np.divmod(np.arange(count), 24)
     u, v = u * 2 * np.pi / 48, v * 2 * np.pi / 24
     out = 1.0 + 0.35 * np.cos(v)
     points = np.stack([out * np.cos(u), -0.35 * np.sin(v), out * np.sin(u)], axis=1)
     ring = from_quads(points, quads, name="ring")
-    instances = [instance(plane(2, 2, 6.0), moved(0, 0, -1.5)), instance(ring)]
-    camera = eye(128, place=(2.5, -6, 2.5), at=(0, 0, -0.4), fov=0.75)
+    instances = [make_instance(plane(2, 2, 6.0), moved_and_scaled(0, 0, -1.5)), make_instance(ring)]
+    camera = make_camera(128, position=(2.5, -6, 2.5), target=(0, 0, -0.4), fov=0.75)
     gbuffer = project(instances, camera)
     assert gbuffer.front_facing.all()
     direction = np.array([0.6, 0.3, 0.7]) / np.linalg.norm([0.6, 0.3, 0.7])
-    light = sun_from(camera, direction)
-    share = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
-    origin = places(gbuffer).astype(float) + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
-    met = meets(origin, direction, points[ring.triangle_vertex])
-    assert 0.1 < met.mean() < 0.7
-    # Light that grazes gives none, and borders are soft.
-    sure = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
-    sure &= (share < 0.01) | (share > 0.99)
-    assert sure.mean() > 0.9
-    assert ((share > 0.5) == ~met)[sure].mean() > 0.995
+    light = sun_light(camera, direction)
+    visibility = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
+    origin = (
+        world_positions(gbuffer).astype(float)
+        + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
+    )
+    hit = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
+    assert 0.1 < hit.mean() < 0.7
+    # Grazing light is left out, and so are the soft borders of shadows.
+    certain = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
+    certain &= (visibility < 0.01) | (visibility > 0.99)
+    assert certain.mean() > 0.9
+    assert ((visibility > 0.5) == ~hit)[certain].mean() > 0.995

@@ -1,4 +1,4 @@
-"""How smooth a field is, and how far from another."""
+"""The Dirichlet energy of fields, and angle errors between fields."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 
 
-def spin(surface, degree, rate):
-    """A field on a plane that turns by `rate` radians for each unit of x."""
+def rotating_field(surface, degree, rate):
+    """A field on a plane that rotates by `rate` radians per unit of x."""
     angle = rate * surface.face_center[:, 0]
     return RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
-def test_the_energy_of_a_field_that_turns_evenly(degree):
-    """|grad z|^2 is (N rate)^2: over the plane, but for the outer half rows, 4 of them."""
+def test_energy_of_a_field_that_rotates_evenly(degree):
+    """|grad z|^2 is (N rate)^2 on the area of 4, without half a column at two borders."""
     surface = plane(80, 80)
     rate = 0.7
-    energy = dirichlet_energy(surface, spin(surface, degree, rate))
+    energy = dirichlet_energy(surface, rotating_field(surface, degree, rate))
     assert np.isclose(energy, 4 * (degree * rate) ** 2, rtol=0.02)
-    assert dirichlet_energy(surface, spin(surface, degree, 0.0)) < 1e-12
+    assert dirichlet_energy(surface, rotating_field(surface, degree, 0.0)) < 1e-12
 
 
 def test_energy_does_not_depend_on_size_member_or_length():
@@ -35,10 +35,10 @@ def test_energy_does_not_depend_on_size_member_or_length():
     energy = dirichlet_energy(surface, field)
     large = from_triangles(7 * surface.vertices, surface.triangle_vertex)
     small = from_triangles(surface.vertices, surface.triangle_vertex)
-    same = [dirichlet_energy(one, axis_field(one, 4, (0.2, 0.3, 1.0))) for one in (large, small)]
+    same = [dirichlet_energy(mesh, axis_field(mesh, 4, (0.2, 0.3, 1.0))) for mesh in (large, small)]
     assert np.isclose(*same)
-    number = np.random.default_rng(0).integers(0, 4, surface.face_count)
-    other = rotate_field(surface, RosyField(4, 3 * field.vectors), number * np.pi / 2)
+    index = np.random.default_rng(0).integers(0, 4, surface.face_count)
+    other = rotate_field(surface, RosyField(4, 3 * field.vectors), index * np.pi / 2)
     assert np.isclose(dirichlet_energy(surface, other), energy)
 
 
@@ -47,7 +47,7 @@ def test_the_smoothest_field_has_less_energy_than_others():
     smoothest = dirichlet_energy(ball, generate(ball, "smoothest", 4))
     assert smoothest < dirichlet_energy(ball, generate(ball, "curvature", 4))
     assert smoothest < dirichlet_energy(ball, axis_field(ball, 4))
-    # 4 pi N, and what singularities of index 1/4 add on so coarse a mesh.
+    # 4 pi N, plus the energy of singularities of index 1/4 on such a coarse mesh.
     assert 4 * np.pi * 4 < smoothest < 3 * 4 * np.pi * 4
 
 
@@ -55,17 +55,17 @@ def test_the_smoothest_field_has_less_energy_than_others():
 def test_errors_are_angles_to_the_nearest_member(degree, error_of):
     ball = icosphere(2)
     field = RosyField(degree, normalize(axis_field(ball, degree).vectors))
-    number = np.arange(ball.face_count) % degree
+    index = np.arange(ball.face_count) % degree
     angle = 0.4 / degree
-    other = rotate_field(ball, field, angle + 2 * np.pi * number / degree)
+    other = rotate_field(ball, field, angle + 2 * np.pi * index / degree)
     error = angle_errors(ball, field, other)
     np.testing.assert_allclose(error, angle, atol=1e-9)
-    facts = error_statistics(ball, error)
+    statistics = error_statistics(ball, error)
     for name in ("mean", "rms", "max"):
-        assert np.isclose(facts[name], np.degrees(angle))
+        assert np.isclose(statistics[name], np.degrees(angle))
     vectors = field.vectors.copy()
     vectors[:10] = 0
-    part = angle_errors(ball, RosyField(degree, vectors), other)
-    assert np.isnan(part[:10]).all() and np.isfinite(part[10:]).all()
-    assert np.isclose(error_statistics(ball, part)["compared"], 1 - 10 / ball.face_count)
+    partial = angle_errors(ball, RosyField(degree, vectors), other)
+    assert np.isnan(partial[:10]).all() and np.isfinite(partial[10:]).all()
+    assert np.isclose(error_statistics(ball, partial)["compared"], 1 - 10 / ball.face_count)
     assert "cannot be compared" in error_of(angle_errors, ball, field, axis_field(ball, 12))

@@ -1,4 +1,4 @@
-"""The nearest triangle to points, against looking at all of them and against another library."""
+"""The triangle closest to a point, against exhaustive search and dense samples."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from shapes import from_triangles, icosphere, torus
 from rosy_addon.field.closest_point import closest_triangles, point_triangle_distances
 
 
-def everywhere(surface, points):
-    """Distances from all triangles: (n, T)."""
+def distances_to_all_triangles(surface, points):
+    """(n, T) distances of points from all triangles."""
     corners = surface.vertices[surface.triangle_vertex]
     pairs = np.repeat(points, len(corners), axis=0), np.tile(corners, (len(points), 1, 1))
     return point_triangle_distances(*pairs).reshape(len(points), -1)
@@ -20,13 +20,13 @@ def everywhere(surface, points):
 
 @pytest.mark.parametrize("surface", [icosphere(3), torus(24, 12)], ids=["sphere", "torus"])
 @pytest.mark.parametrize("far", [0.02, 0.5, 8.0])
-def test_none_is_nearer(surface, far):
+def test_the_result_matches_an_exhaustive_search(surface, far):
     points = np.random.default_rng(1).standard_normal((200, 3)) * far + (0.9, 0.1, 0.2)
     triangle, distance = closest_triangles(surface, points)
-    every = everywhere(surface, points)
-    assert np.allclose(distance, every.min(axis=1))
-    assert np.array_equal(triangle, np.argmin(every, axis=1)) or np.allclose(
-        every[np.arange(200), triangle], distance
+    distances = distances_to_all_triangles(surface, points)
+    assert np.allclose(distance, distances.min(axis=1))
+    assert np.array_equal(triangle, np.argmin(distances, axis=1)) or np.allclose(
+        distances[np.arange(200), triangle], distance
     )
 
 
@@ -45,7 +45,7 @@ def test_large_triangles_among_small_ones():
 
 @settings(max_examples=100)
 @given(st.lists(st.floats(-3, 3), min_size=12, max_size=12))
-def test_distances_are_those_of_a_fine_net_of_points(numbers):
+def test_distances_match_dense_samples_of_the_triangle(numbers):
     point, corners = np.array(numbers[:3]), np.array(numbers[3:]).reshape(3, 3)
     u, v = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 41))
     u, v = u[u + v <= 1], v[u + v <= 1]
@@ -53,7 +53,7 @@ def test_distances_are_those_of_a_fine_net_of_points(numbers):
         corners[0] + u[:, None] * (corners[1] - corners[0]) + v[:, None] * (corners[2] - corners[0])
     )
     nearest = np.linalg.norm(net - point, axis=1).min()
-    found = point_triangle_distances(point[None], corners[None])[0]
+    actual = point_triangle_distances(point[None], corners[None])[0]
     size = np.abs(corners - corners[0]).max()
-    assert found <= nearest + 1e-9
-    assert found >= nearest - size / 10
+    assert actual <= nearest + 1e-9
+    assert actual >= nearest - size / 10

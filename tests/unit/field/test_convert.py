@@ -1,4 +1,4 @@
-"""Fields made of other fields: degrees, turns, diffusion, magnitudes."""
+"""Conversion of fields: degree, rotation, diffusion and magnitude."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from rosy_addon.field.singularities import find_singularities
 BALL = icosphere(3)
 
 
-def scrambled(surface, field, seed=0):
-    """The same RoSys, another member of each stored."""
+def with_random_members(surface, field, seed=0):
+    """The same RoSys, with a random member of each stored."""
     random = np.random.default_rng(seed)
-    number = random.integers(0, field.degree, surface.face_count)
-    return rotate_field(surface, field, 2 * np.pi * number / field.degree)
+    member_index = random.integers(0, field.degree, surface.face_count)
+    return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
 
 
 # --- degrees -------------------------------------------------------------------------------------
@@ -35,44 +35,46 @@ def scrambled(surface, field, seed=0):
 @pytest.mark.parametrize(("degree", "multiple"), [(1, 6), (2, 4), (3, 12), (4, 4)])
 def test_a_multiple_has_the_member_and_the_power_of_z(degree, multiple):
     field = axis_field(BALL, degree, (0.2, 0.1, 1.0))
-    more = change_degree(BALL, field, multiple)
-    assert more.degree == multiple
+    converted = change_degree(BALL, field, multiple)
+    assert converted.degree == multiple
     z = power(
         face_representation(BALL, RosyField(degree, normalize(field.vectors))), multiple // degree
     )
-    wanted = z * field.magnitude
-    np.testing.assert_allclose(face_representation(BALL, more), wanted, atol=1e-9)
+    expected = z * field.magnitude
+    np.testing.assert_allclose(face_representation(BALL, converted), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("degree", "divisor"), [(4, 2), (4, 1), (6, 2), (6, 3), (12, 1)])
-def test_a_divisor_is_one_field_all_over_where_there_is_one(degree, divisor):
-    """A torus' field without singularities that goes round the way of the torus."""
+def test_a_divisor_is_consistent_without_singularities(degree, divisor):
+    """A field without singularities, around the axis of a torus."""
     surface = torus(48, 24)
     line = axis_field(surface, divisor, (0.0, 0.0, 1.0))
     around = np.cross((0.0, 0.0, 1.0), surface.face_center * (1, 1, 0))
     line = RosyField(
         divisor, normalize(around - dot(around, surface.face_normal)[:, None] * surface.face_normal)
     )
-    less = change_degree(surface, scrambled(surface, RosyField(degree, line.vectors)), divisor)
-    assert less.degree == divisor
-    # One of the fields that the members make up, the same everywhere.
-    turn = face_representation(surface, less) * face_representation(surface, line).conj()
-    np.testing.assert_allclose(turn, turn[0], atol=1e-6)
-    np.testing.assert_allclose(turn[0] ** (degree // divisor), 1, atol=1e-6)
+    converted = change_degree(
+        surface, with_random_members(surface, RosyField(degree, line.vectors)), divisor
+    )
+    assert converted.degree == divisor
+    # The result is the same one of the fields of degree `divisor` everywhere.
+    ratio = face_representation(surface, converted) * face_representation(surface, line).conj()
+    np.testing.assert_allclose(ratio, ratio[0], atol=1e-6)
+    np.testing.assert_allclose(ratio[0] ** (degree // divisor), 1, atol=1e-6)
 
 
-def test_seams_stay_where_the_field_is_singular():
+def test_a_divisor_has_seams_between_singularities():
     field = generate(BALL, "smoothest", 4)
-    less = change_degree(BALL, scrambled(BALL, field), 1)
-    _, slip = field_matching(BALL, RosyField(4, less.vectors))
-    seam = slip != 0
-    assert 0 < seam.sum() < 0.2 * len(slip)
-    # Eight singularities of index 1/4: around each an odd seam comes to an end.
+    converted = change_degree(BALL, with_random_members(BALL, field), 1)
+    _, matching = field_matching(BALL, RosyField(4, converted.vectors))
+    seam = matching != 0
+    assert 0 < seam.sum() < 0.2 * len(matching)
+    # There are eight singularities of index 1/4, at which seams end.
     assert len(find_singularities(BALL, field)[0]) == 8
 
 
 @pytest.mark.parametrize("degree", [3, 8])
-def test_what_is_neither_is_refused(degree, error_of):
+def test_other_degrees_are_refused(degree, error_of):
     field = axis_field(BALL, 6 if degree == 8 else 4)
     assert "neither a multiple nor a divisor" in error_of(change_degree, BALL, field, degree)
 
@@ -82,12 +84,12 @@ def test_what_is_neither_is_refused(degree, error_of):
 
 @settings(max_examples=50)
 @given(st.integers(1, 12), st.floats(-7, 7))
-def test_a_turn_multiplies_z(degree, angle):
+def test_rotation_multiplies_z(degree, angle):
     surface = plane(3, 3)
     field = axis_field(surface, degree, (1.0, 0.5, 0.3))
     z = face_representation(surface, rotate_field(surface, field, angle))
-    wanted = face_representation(surface, field) * np.exp(1j * degree * angle)
-    np.testing.assert_allclose(z, wanted, atol=1e-9)
+    expected = face_representation(surface, field) * np.exp(1j * degree * angle)
+    np.testing.assert_allclose(z, expected, atol=1e-9)
 
 
 # --- diffusion -----------------------------------------------------------------------------------
@@ -95,11 +97,11 @@ def test_a_turn_multiplies_z(degree, angle):
 
 @pytest.mark.parametrize("degree", [1, 4])
 def test_diffusion_against_scipy(degree):
-    field = scrambled(BALL, axis_field(BALL, degree, (0.3, 0.2, 1.0)))
+    field = with_random_members(BALL, axis_field(BALL, degree, (0.3, 0.2, 1.0)))
     noise = np.random.default_rng(0).normal(0, 0.4, BALL.face_count)
     field = rotate_field(BALL, field, noise)
-    found = diffuse_field(BALL, field, 0.02)
-    # The same step, put together and solved by others.
+    actual = diffuse_field(BALL, field, 0.02)
+    # The same step, with other code to assemble the right-hand side and SciPy's solver.
     connection = build_connection(BALL)
     rows = laplacian(connection, degree)
     matrix = csr_matrix((rows.data, rows.indices, rows.indptr), (len(rows), len(rows)))
@@ -107,30 +109,36 @@ def test_diffusion_against_scipy(degree):
     triangles = BALL.triangle_vertex
     corner = np.roll(BALL.vertices[triangles], -1, axis=1) - BALL.vertices[triangles]
     direction = np.arctan2(dot(corner, y[:, None]), dot(corner, x[:, None])).ravel()
-    turn = direction + connection.corner_angle / 2 - connection.bisector_direction
-    share = np.repeat(connection.area / 3, 3)
-    on_corner = np.repeat(face_representation(BALL, field), 3) * np.exp(-1j * degree * turn) * share
-    right = np.zeros(connection.node_count, dtype=complex)
-    np.add.at(right, connection.corner_node, on_corner)
-    z = spsolve((diags(connection.mass) + 0.02 * matrix).tocsc(), right)
-    wanted = (z[connection.corner_node] * np.exp(1j * degree * turn)).reshape(-1, 3).mean(axis=1)
-    np.testing.assert_allclose(face_representation(BALL, found), wanted, atol=1e-7)
+    frame_angle = direction + connection.corner_angle / 2 - connection.bisector_direction
+    corner_area = np.repeat(connection.area / 3, 3)
+    corner_z = (
+        np.repeat(face_representation(BALL, field), 3)
+        * np.exp(-1j * degree * frame_angle)
+        * corner_area
+    )
+    rhs = np.zeros(connection.node_count, dtype=complex)
+    np.add.at(rhs, connection.corner_node, corner_z)
+    z = spsolve((diags(connection.mass) + 0.02 * matrix).tocsc(), rhs)
+    expected = (
+        (z[connection.corner_node] * np.exp(1j * degree * frame_angle)).reshape(-1, 3).mean(axis=1)
+    )
+    np.testing.assert_allclose(face_representation(BALL, actual), expected, atol=1e-7)
 
 
-def test_diffusion_takes_noise_away_and_leaves_what_is_constant():
+def test_diffusion_removes_noise_and_keeps_constant_fields():
     surface = plane(40, 40)
     straight = RosyField(4, np.tile((1.0, 0.0, 0.0), (surface.face_count, 1)))
     same = diffuse_field(surface, straight, 1.0)
     np.testing.assert_allclose(face_representation(surface, same), 1, atol=1e-7)
     noise = np.random.default_rng(0).normal(0, 0.2, surface.face_count)
     rough = rotate_field(surface, straight, noise)
-    calm = diffuse_field(surface, rough, 0.05)
-    off = np.abs(np.angle(face_representation(surface, calm))) / 4
-    assert np.sqrt(np.mean(off**2)) < 0.25 * 0.2
-    assert calm.magnitude.mean() < 0.9
+    smooth = diffuse_field(surface, rough, 0.05)
+    error = np.abs(np.angle(face_representation(surface, smooth))) / 4
+    assert np.sqrt(np.mean(error**2)) < 0.25 * 0.2
+    assert smooth.magnitude.mean() < 0.9
 
 
-def test_a_time_must_be_positive(error_of):
+def test_the_diffusion_time_must_be_positive(error_of):
     assert "the diffusion time must be above 0" in error_of(
         diffuse_field, BALL, axis_field(BALL, 4), 0.0
     )
@@ -139,12 +147,12 @@ def test_a_time_must_be_positive(error_of):
 # --- magnitudes ----------------------------------------------------------------------------------
 
 
-def test_magnitudes_leave_directions_and_what_is_undefined():
+def test_magnitudes_keep_directions_and_undefined_faces():
     vectors = np.array(axis_field(BALL, 4).vectors)
     vectors[::7] = 0
     field = with_magnitude(RosyField(4, vectors), np.arange(BALL.face_count))
-    wanted = np.arange(BALL.face_count) * vectors.any(axis=1)
-    np.testing.assert_allclose(field.magnitude, wanted)
+    expected = np.arange(BALL.face_count) * vectors.any(axis=1)
+    np.testing.assert_allclose(field.magnitude, expected)
     np.testing.assert_allclose(
         dot(normalize(field.vectors), normalize(vectors))[field.magnitude > 0], 1
     )

@@ -1,4 +1,4 @@
-"""Directions that are no RoSy: what they deviate by, how they are carried, and how they are drawn."""
+"""Directions that are not a RoSy: harmonics, matching, families, and streaks along them."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ from tools.gallery.measure import orientation_spectrum, peaks
 WEAVE = Look(shading=0.0, grain=1.5, length=30)
 
 
-def turned(vectors, normal, angle):
+def rotate(vectors, normal, angle):
     return np.cos(angle) * vectors + np.sin(angle) * np.cross(normal, vectors)
 
 
-def fan_of(surface, angles, lengths):
-    """(F, N, 3): on each face the same angles from its first edge."""
+def directions_at_angles(surface, angles, lengths):
+    """(F, N, 3) directions with the same angles from the first edge on each face."""
     x, _ = face_frames(surface)
     return np.stack(
         [
-            length * turned(x, surface.face_normal, angle)
+            length * rotate(x, surface.face_normal, angle)
             for angle, length in zip(angles, lengths, strict=True)
         ],
         axis=1,
@@ -58,7 +58,7 @@ def fan_of(surface, angles, lengths):
 
 @settings(max_examples=200)
 @given(st.integers(2, 7), st.integers(0, 10**6), st.integers(0, 6))
-def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
+def test_harmonics_do_not_depend_on_the_first_direction(degree, seed, shift):
     random = np.random.default_rng(seed)
     w = np.exp(2j * np.pi * random.random((1, degree))) * (0.2 + random.random((1, degree)))
     first, rho, deviations = closest_rosy(w)
@@ -70,7 +70,7 @@ def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
     assert np.allclose(rho, other_rho)
     for j in {*ours, *theirs}:
         if 2 * j == degree:
-            continue  # known up to the sign that exp(i N t / 2) has
+            continue  # only defined up to the sign of exp(i N t / 2)
         a = ours.get(j, np.zeros(1)) * np.exp(-1j * j * first)
         b = theirs.get(j, np.zeros(1)) * np.exp(-1j * j * other_first)
         assert np.allclose(a, b, atol=2e-4)
@@ -78,18 +78,18 @@ def test_harmonics_are_the_same_from_whichever_member(degree, seed, shift):
 
 @settings(max_examples=200)
 @given(st.integers(1, 7), st.integers(0, 10**6))
-def test_what_is_taken_apart_comes_together(degree, seed):
+def test_directions_are_restored_from_the_field(degree, seed):
     surface = icosphere(1)
     random = np.random.default_rng(seed)
     angles, lengths = 6.28 * random.random(degree), 0.2 + random.random(degree)
-    given_ones = fan_of(surface, angles, lengths)
-    field = field_from_directions(surface, given_ones)
-    found = field_directions(surface, field)
+    directions = directions_at_angles(surface, angles, lengths)
+    field = field_from_directions(surface, directions)
+    actual = field_directions(surface, field)
     order = np.argsort((angles - angles[0]) % (2 * np.pi))
-    assert np.allclose(found, given_ones[:, order], atol=1e-9)
+    assert np.allclose(actual, directions[:, order], atol=1e-9)
     if field.direction_ratios is not None:
-        again = ratios_from_harmonics(field_harmonics(field), degree)
-        assert np.abs(again - field.direction_ratios).max() < 1e-3
+        restored = ratios_from_harmonics(field_harmonics(field), degree)
+        assert np.abs(restored - field.direction_ratios).max() < 1e-3
 
 
 def test_the_representation_is_the_product_of_the_directions():
@@ -100,36 +100,36 @@ def test_the_representation_is_the_product_of_the_directions():
         assert np.allclose(np.exp(1j * degree * first), (-1) ** (degree - 1) * w.prod(axis=1))
 
 
-def test_a_rosy_stays_one():
+def test_a_rosy_has_no_direction_ratios():
     surface = icosphere(2)
     angles = 0.3 + 2 * np.pi * np.arange(6) / 6
-    field = field_from_directions(surface, fan_of(surface, angles, np.full(6, 2.0)))
+    field = field_from_directions(surface, directions_at_angles(surface, angles, np.full(6, 2.0)))
     assert field.direction_ratios is None
     assert np.allclose(field.magnitude, 2)
 
 
-def test_opposite_directions_are_paired():
+def test_opposite_directions_are_detected():
     surface = plane()
     pairs = np.array([0.0, 0.6, np.pi, np.pi + 0.6])
-    even = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 2)))
+    even = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 2)))
     assert field_symmetry(even).has_opposites
-    uneven = field_from_directions(surface, fan_of(surface, pairs, (1, 2, 1, 3)))
+    uneven = field_from_directions(surface, directions_at_angles(surface, pairs, (1, 2, 1, 3)))
     assert not field_symmetry(uneven).has_opposites
-    odd = field_from_directions(surface, fan_of(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
+    odd = field_from_directions(surface, directions_at_angles(surface, (0.0, 1.0, 3.0), (1, 1, 1)))
     assert not field_symmetry(odd).has_opposites
 
 
 def test_directions_on_vertices_are_averaged_onto_faces():
     surface = plane(6, 6)
     angles = (0.1, 0.9, 0.1 + np.pi, 0.9 + np.pi)
-    here = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
-    given_ones = np.tile(here, (len(surface.vertices), 1, 1))
-    # Whichever is listed first.
-    for vertex in range(len(given_ones)):
-        given_ones[vertex] = np.roll(given_ones[vertex], vertex, axis=0)
-    field = validated_directions(surface, given_ones, "test", domain="vertex")
-    for found in field_directions(surface, field):
-        nearest = np.abs(found[:, None] - here).max(axis=2).min(axis=1)
+    directions = np.array([(2 * np.cos(a), 2 * np.sin(a), 0) for a in angles])
+    vertex_directions = np.tile(directions, (len(surface.vertices), 1, 1))
+    # The order of the directions differs between vertices.
+    for vertex in range(len(vertex_directions)):
+        vertex_directions[vertex] = np.roll(vertex_directions[vertex], vertex, axis=0)
+    field = validated_directions(surface, vertex_directions, "test", domain="vertex")
+    for actual in field_directions(surface, field):
+        nearest = np.abs(actual[:, None] - directions).max(axis=2).min(axis=1)
         assert nearest.max() < 1e-9
 
 
@@ -139,12 +139,12 @@ def test_directions_on_vertices_are_averaged_onto_faces():
 def test_matching_follows_the_stored_members():
     surface = plane(5, 5)
     random = np.random.default_rng(3)
-    number = random.integers(0, 4, surface.face_count)
-    vectors = turned(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
-    angle = number * np.pi / 2
+    member_index = random.integers(0, 4, surface.face_count)
+    vectors = rotate(np.tile((1.0, 0, 0), (25, 1)), surface.face_normal, 0.0)
+    angle = member_index * np.pi / 2
     vectors = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    faces, slip = field_matching(surface, RosyField(4, vectors))
-    assert np.array_equal(slip, (number[faces[:, 0]] - number[faces[:, 1]]) % 4)
+    faces, matching = field_matching(surface, RosyField(4, vectors))
+    assert np.array_equal(matching, (member_index[faces[:, 0]] - member_index[faces[:, 1]]) % 4)
 
 
 def test_eigenvectors_of_a_tensor():
@@ -164,19 +164,19 @@ def test_eigenvectors_of_a_tensor():
         assert np.isclose(np.linalg.norm(minor), abs(values[0]), rtol=1e-2)
 
 
-def test_lines_are_told_apart_where_their_numbers_are_consistent():
+def test_families_need_a_consistent_order_of_directions():
     surface = plane(8, 8)
     angles, lengths = (0.0, 1.0, np.pi, np.pi + 1.0), (1, 1, 1, 1)
-    given_ones = fan_of(surface, angles, lengths)
-    assert field_from_directions(surface, given_ones).family_count == 2
-    given_ones[::2] = np.roll(given_ones[::2], 1, axis=1)
-    assert field_from_directions(surface, given_ones).family_count == 1
+    directions = directions_at_angles(surface, angles, lengths)
+    assert field_from_directions(surface, directions).family_count == 2
+    directions[::2] = np.roll(directions[::2], 1, axis=1)
+    assert field_from_directions(surface, directions).family_count == 1
 
 
 # --- drawing -------------------------------------------------------------------------------------
 
 
-def from_above(surface, field, size, display="smooth"):
+def project_from_above(surface, field, size, display="smooth"):
     camera = orthographic_camera(np.eye(4), size, size, scale=2.0, clip=(-10, 10))
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
@@ -192,15 +192,17 @@ def test_streaks_run_along_free_directions(method, angles):
     radians = np.radians(angles)
     directions = np.stack([np.cos(radians), np.sin(radians), 0 * radians], axis=1)
     directions = np.tile(directions, (surface.face_count, 1, 1))
-    for face in range(surface.face_count):  # no order may matter
+    for face in range(surface.face_count):  # the order must not matter
         directions[face] = np.roll(directions[face], face, axis=0)
     field = field_from_directions(surface, directions)
-    picture = compose(from_above(surface, field, 256), WEAVE.with_settings({"method": method}))
+    picture = compose(
+        project_from_above(surface, field, 256), WEAVE.with_settings({"method": method})
+    )
     tone = picture.layers[0].tone.reshape(256, 256)[32:-32, 32:-32]
-    found = np.array(peaks(orientation_spectrum(tone)))
-    wanted = np.unique(np.mod(angles, 180))
-    assert len(found) == len(wanted)
-    assert np.abs((found - wanted + 90) % 180 - 90).max() < 2
+    actual = np.array(peaks(orientation_spectrum(tone)))
+    expected = np.unique(np.mod(angles, 180))
+    assert len(actual) == len(expected)
+    assert np.abs((actual - expected + 90) % 180 - 90).max() < 2
 
 
 @pytest.mark.slow
@@ -213,38 +215,40 @@ def test_a_conjugate_field_of_another_library(method, shared_data):
         and field_symmetry(field).has_opposites
         and field.direction_ratios is not None
     )
-    for face in calm_faces(surface, field, 10):
-        found, wanted = drawn_and_stored(surface, field, face, method)
-        assert len(found) == len(wanted), face
-        assert np.abs((found - wanted + 90) % 180 - 90).max() < 2, face
+    for face in nearly_constant_faces(surface, field, 10):
+        actual, expected = drawn_and_stored_angles(surface, field, face, method)
+        assert len(actual) == len(expected), face
+        assert np.abs((actual - expected + 90) % 180 - 90).max() < 2, face
 
 
-def calm_faces(surface, field, count):
-    """Faces around which the field is the same within a degree and a half, all over the mesh."""
+def nearly_constant_faces(surface, field, count):
+    """Random faces whose neighbors have the same field within 1.5 degrees."""
     from rosy_addon.field.surface import build_edges
 
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    one, other = surface.corner_face[edges.halfedges].T
+    first, second = surface.corner_face[edges.halfedges].T
     stored = normalize(field_directions(surface, field))
-    across = np.abs(np.einsum("ika,ila->ikl", stored[one], stored[other])).max(axis=2).min(axis=1)
-    turn = np.degrees(np.arccos(np.minimum(across, 1)))
+    cosine = (
+        np.abs(np.einsum("ika,ila->ikl", stored[first], stored[second])).max(axis=2).min(axis=1)
+    )
+    change = np.degrees(np.arccos(np.minimum(cosine, 1)))
     worst = np.zeros(surface.face_count)
-    np.maximum.at(worst, one, turn)
-    np.maximum.at(worst, other, turn)
-    between = np.degrees(np.arccos(np.clip(np.abs(dot(stored[:, 0], stored[:, 1])), 0, 1)))
-    calm = np.flatnonzero((worst < 1.5) & (between > 25))
-    assert len(calm) >= count
-    return np.random.default_rng(4).choice(calm, count, replace=False)
+    np.maximum.at(worst, first, change)
+    np.maximum.at(worst, second, change)
+    line_angle = np.degrees(np.arccos(np.clip(np.abs(dot(stored[:, 0], stored[:, 1])), 0, 1)))
+    selected = np.flatnonzero((worst < 1.5) & (line_angle > 25))
+    assert len(selected) >= count
+    return np.random.default_rng(4).choice(selected, count, replace=False)
 
 
-def drawn_and_stored(surface, field, face, method):
-    """Orientations, in degrees, of the streaks on a face and of its stored vectors, as projected."""
+def drawn_and_stored_angles(surface, field, face, method):
+    """Angles of the streaks drawn on a face, and of its stored directions on screen; degrees."""
     normal = surface.face_normal[face]
-    centre = surface.face_center[face]
+    center = surface.face_center[face]
     x, _ = face_frames(surface)
-    back = normalize(normal + 0.4 * x[face])  # not straight from above
+    back = normalize(normal + 0.4 * x[face])  # a slanted view of the face
     size = np.ptp(surface.vertices[surface.corner_vertex[3 * face : 3 * face + 3]], axis=0).max()
-    view = look_at(centre + 10 * back, centre)
+    view = look_at(center + 10 * back, center)
     camera = orthographic_camera(view, 320, 320, scale=1.2 * size, clip=(0.1, 20))
     instance = MeshInstance(surface, np.eye(4), field)
     look = WEAVE.with_settings({"method": method})
@@ -253,45 +257,47 @@ def drawn_and_stored(surface, field, face, method):
     frame[picture.layers[0].pixel] = picture.layers[0].tone[:, 0]
     tone = frame.reshape(320, 320)[96:-96, 96:-96]
     assert np.isfinite(tone).all()
-    found = np.array(peaks(orientation_spectrum(tone)))
+    actual = np.array(peaks(orientation_spectrum(tone)))
     screen = field_directions(surface, field)[face] @ view[:3, :3].T
-    wanted = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
-    # The two of each pair differ by rounding.
-    wanted = np.sort(wanted[:2])
-    return found, wanted
+    expected = np.degrees(np.arctan2(screen[:, 1], screen[:, 0])) % 180
+    # The directions are two opposite pairs, equal up to rounding.
+    expected = np.sort(expected[:2])
+    return actual, expected
 
 
 # --- hues ----------------------------------------------------------------------------------------
 
 
-def test_hues_tell_families_apart_and_leave_the_brightness_alone():
+def test_family_hues_keep_the_brightness():
     surface = plane(7, 7, 2.2)
     tensor = np.diag([3.0, -1.0, 0.0])
     field = tensor_field(surface, np.tile(tensor, (surface.face_count, 1, 1)))
-    seen = from_above(surface, field, 256)
-    grey = compose(seen, WEAVE).rgba[..., :3]
-    hues = compose(seen, WEAVE.with_settings({"hue": "families"}))
+    gbuffer = project_from_above(surface, field, 256)
+    grey = compose(gbuffer, WEAVE).rgba[..., :3]
+    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"}))
     luminance = [
-        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, hues.rgba[..., :3])
+        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, colored.rgba[..., :3])
     ]
-    # Equation 6 for the grey picture; the hues leave it as it is.
+    # Hues do not change the contrast of the gray picture.
     relative = [image.std() / image.mean() for image in luminance]
     assert 0.7 < relative[1] / relative[0] < 1.1
     assert np.corrcoef(luminance[0].ravel(), luminance[1].ravel())[0, 1] > 0.97
     # The major direction runs along x: its streaks are orange, those along y blue.
-    warm = (hues.rgba[..., 0] - hues.rgba[..., 2]).astype(float)
-    orange, blue = np.clip(warm, 0, None), np.clip(-warm, 0, None)
-    along = [peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)]
-    assert np.abs((np.array(along[0]) + 90) % 180 - 90).max() < 3
-    assert np.abs(np.array(along[1]) - 90).max() < 3
-    # As much of the one as of the other, and clearly coloured.
-    shares = [np.mean(warm > 0.05), np.mean(warm < -0.05)]
-    assert min(shares) > 0.3
+    orange_minus_blue = (colored.rgba[..., 0] - colored.rgba[..., 2]).astype(float)
+    orange, blue = np.clip(orange_minus_blue, 0, None), np.clip(-orange_minus_blue, 0, None)
+    directions = [
+        peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)
+    ]
+    assert np.abs((np.array(directions[0]) + 90) % 180 - 90).max() < 3
+    assert np.abs(np.array(directions[1]) - 90).max() < 3
+    # About as much of one hue as of the other, and clearly colored.
+    fractions = [np.mean(orange_minus_blue > 0.05), np.mean(orange_minus_blue < -0.05)]
+    assert min(fractions) > 0.3
 
 
-def test_one_family_stays_grey():
+def test_a_single_family_is_gray():
     surface = plane(7, 7, 2.2)
     field = RosyField(4, np.tile((1.0, 0, 0), (surface.face_count, 1)))
-    seen = from_above(surface, field, 64)
-    colours = compose(seen, WEAVE.with_settings({"hue": "families"})).rgba
-    assert np.array_equal(colours, compose(seen, WEAVE).rgba)
+    gbuffer = project_from_above(surface, field, 64)
+    colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"})).rgba
+    assert np.array_equal(colored, compose(gbuffer, WEAVE).rgba)

@@ -1,4 +1,4 @@
-"""Every kind of field on every awkward mesh, from the command line."""
+"""Every generator on every awkward mesh, through the command line."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from awkward import AWKWARD
 from rosy_addon.cli import main
 from rosy_addon.field.generate import GENERATORS
 
-#: Degrees of which the edges around each square, or each equilateral triangle, cancel out.
+#: Degrees in which the edges around each square, or each equilateral triangle, cancel.
 CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
 
 
 @pytest.fixture(scope="module")
 def meshes(tmp_path_factory):
-    """.obj files, with a UV map that looks at them askew from above."""
+    """The folder of the .obj files, each with a UV map that is an oblique projection from above."""
     folder = tmp_path_factory.mktemp("awkward")
     for name, make in AWKWARD.items():
         points, faces = make()
@@ -37,33 +37,33 @@ def test_every_kind_on_every_mesh(meshes, tmp_path, capsys, kind, name, degree):
     options = ["--uv", "--reach", "0.1"] if kind == "guided" else []
     command = ["field", mesh, "-o", out, "--generate", kind, "--degree", str(degree), *options]
     status = main(command)
-    said = capsys.readouterr()
+    captured = capsys.readouterr()
     if kind == "curvature" and degree % 2:
-        assert status == 2 and "a curvature field needs an even degree" in said.err
+        assert status == 2 and "a curvature field needs an even degree" in captured.err
         return
     if kind == "features" and degree in CANCELLED.get(name, ()):
-        assert status == 2 and "the edges cancel each other" in said.err
+        assert status == 2 and "the edges cancel each other" in captured.err
         return
-    assert status == 0, said.err
-    assert ("Möbius" in said.err) == (name == "moebius")
-    assert said.err.count("\n") == (name == "moebius")
+    assert status == 0, captured.err
+    assert ("Möbius" in captured.err) == (name == "moebius")
+    assert captured.err.count("\n") == (name == "moebius")
     assert main(["info", mesh, out, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["degree"] == degree and np.isfinite(facts["energy"])
     low, high = facts["magnitude"]
     assert 0 <= low <= high <= 1 + 1e-6
-    flat = 1000 if name == "faces_without_area" else 0
+    degenerate_count = 1000 if name == "faces_without_area" else 0
     if kind == "smoothest":
-        assert facts["undefined_faces"] == flat
-    assert facts["undefined_faces"] >= flat
+        assert facts["undefined_faces"] == degenerate_count
+    assert facts["undefined_faces"] >= degenerate_count
 
 
 @pytest.mark.parametrize("name", ["cube", "moebius", "grid", "pieces", "triangle"])
 def test_strokes_on_every_mesh(meshes, tmp_path, capsys, name):
     mesh, out = str(meshes / f"{name}.obj"), str(tmp_path / "a.rosy")
     status = main(["field", mesh, "-o", out, "--strokes", str(meshes / "stroke.txt")])
-    said = capsys.readouterr()
-    if name == "moebius":  # around which the stroke is far away
-        assert status == 2 and "no stroke is near the surface" in said.err
+    captured = capsys.readouterr()
+    if name == "moebius":  # its band is far from the stroke
+        assert status == 2 and "no stroke is near the surface" in captured.err
     else:
-        assert status == 0, said.err
+        assert status == 0, captured.err

@@ -1,4 +1,4 @@
-"""Fields in the formats of other programs: there and back, and from a mesh to one like it."""
+"""Fields in the formats of other programs: round trips, and transfer to another mesh."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ BALL = icosphere(2)
 
 
 def free_directions(degree, seed=0):
-    """(F, N, 3) on the ball, no RoSy."""
+    """(F, N, 3) directions on the ball that are not a RoSy."""
     random = np.random.default_rng(seed)
     field = axis_field(BALL, 1, (0.1, 0.2, 1.0))
-    across = np.cross(BALL.face_normal, field.vectors)
+    perpendicular = np.cross(BALL.face_normal, field.vectors)
     angle = np.sort(random.random(degree)) * 2 * np.pi
     length = 0.5 + random.random((BALL.face_count, degree))
-    turn = (np.exp(1j * angle) * length)[..., None]
-    return turn.real * field.vectors[:, None] + turn.imag * across[:, None]
+    factor = (np.exp(1j * angle) * length)[..., None]
+    return factor.real * field.vectors[:, None] + factor.imag * perpendicular[:, None]
 
 
 def write_off(path, surface):
@@ -50,7 +50,7 @@ def write_off(path, surface):
 
 @pytest.mark.parametrize("ending", [".rosy", ".rawfield", ".txt", ".npy"])
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 7, 12])
-def test_members_come_back_to_the_last_bit(ending, degree, tmp_path):
+def test_members_round_trip_exactly(ending, degree, tmp_path):
     field = axis_field(BALL, degree, (0.3, -0.2, 1.0))
     path = tmp_path / f"a{ending}"
     write_field(path, field, BALL)
@@ -61,7 +61,7 @@ def test_members_come_back_to_the_last_bit(ending, degree, tmp_path):
 
 @pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
 @pytest.mark.parametrize("degree", [2, 4, 5])
-def test_free_directions_come_back_to_the_last_bit(ending, degree, tmp_path):
+def test_free_directions_round_trip_exactly(ending, degree, tmp_path):
     stored = free_directions(degree)
     np.save(tmp_path / "first.npy", stored)
     field = read_field(tmp_path / "first.npy", BALL)
@@ -75,17 +75,17 @@ def test_free_directions_come_back_to_the_last_bit(ending, degree, tmp_path):
 
 @pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka-cf"])
 @pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
-def test_files_of_others_keep_every_number(name, ending, shared_data, tmp_path):
+def test_files_of_other_programs_round_trip_exactly(name, ending, shared_data, tmp_path):
     surface = read_mesh(shared_data / "meshes" / f"{name.partition('-')[0]}.off")
     source = shared_data / "fields" / f"{name}.rawfield"
     write_field(tmp_path / f"a{ending}", read_field(source, surface), surface)
-    wanted = np.array(source.read_text().split(), dtype=float)[2:]
+    expected = np.array(source.read_text().split(), dtype=float)[2:]
     if ending == ".npy":
-        found = np.load(tmp_path / "a.npy").ravel()
+        actual = np.load(tmp_path / "a.npy").ravel()
     else:
         words = (tmp_path / f"a{ending}").read_text().split()
-        found = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
-    assert np.array_equal(found, wanted)
+        actual = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
+    assert np.array_equal(actual, expected)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -100,13 +100,13 @@ def test_fieldgen_files_hold_the_mesh_and_a_field_on_vertices(degree, tmp_path):
     assert np.array_equal(mesh.corner_vertex, surface.corner_vertex)
     again = read_field(path, mesh)
     assert again.degree == degree
-    z, wanted = face_representation(surface, again), face_representation(surface, field)
-    away = np.abs(surface.face_center[:, 2]) < 0.9  # of the poles, where it is singular
-    off = np.abs(np.angle(z[away] * wanted[away].conj())) / degree
-    assert np.degrees(off).max() < 1
+    z, expected = face_representation(surface, again), face_representation(surface, field)
+    away_from_poles = np.abs(surface.face_center[:, 2]) < 0.9  # where the field is singular
+    error = np.abs(np.angle(z[away_from_poles] * expected[away_from_poles].conj())) / degree
+    assert np.degrees(error).max() < 1
 
 
-def test_what_fieldgen_explains_at_its_top_is_no_field(tmp_path, error_of):
+def test_the_comment_header_of_fieldgen_is_ignored(tmp_path, error_of):
     path = tmp_path / "a.obj"
     write_field(path, axis_field(BALL, 2), BALL)
     head = "# written as\n#    degree n\n#    field i x y z\n#    singularity i s\n"
@@ -118,19 +118,21 @@ def test_what_fieldgen_explains_at_its_top_is_no_field(tmp_path, error_of):
     assert "has no field" in error_of(read_field, path, BALL)
 
 
-def test_singularities_come_back(tmp_path, error_of):
+def test_singularities_round_trip(tmp_path, error_of):
     surface = torus(32, 16)
     field = curvature_field(BALL, 4)
     write_field(tmp_path / "a.sings", field, BALL)
     degree, vertex, index = read_sings(tmp_path / "a.sings")
-    wanted = find_singularities(BALL, field)
-    assert degree == 4 and np.array_equal(vertex, wanted[0]) and np.array_equal(index, wanted[1])
+    expected = find_singularities(BALL, field)
+    assert (
+        degree == 4 and np.array_equal(vertex, expected[0]) and np.array_equal(index, expected[1])
+    )
     assert "contains singularities" in error_of(read_field, tmp_path / "a.sings", surface)
     (tmp_path / "b.sings").write_text("4 3\n1 1\n2 1\n")
     assert "declares 3 singularities, but contains 2" in error_of(read_sings, tmp_path / "b.sings")
 
 
-def test_tensors_are_told_from_three_directions(tmp_path):
+def test_tensors_are_distinguished_from_three_directions(tmp_path):
     random = np.random.default_rng(0)
     matrices = random.standard_normal((BALL.face_count, 3, 3))
     matrices += matrices.swapaxes(1, 2)
@@ -143,7 +145,7 @@ def test_tensors_are_told_from_three_directions(tmp_path):
     assert read_field(tmp_path / "b.npy", BALL).degree == 3
 
 
-WRONG = {
+DAMAGED = {
     "a.txt": ("1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
     "b.txt": ("1 2\n3 4\n", "has 2 numbers per row"),
     "c.txt": ("", "contains no numbers"),
@@ -153,21 +155,21 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
-    text, wanted = WRONG[name]
+@pytest.mark.parametrize("name", DAMAGED)
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
+    text, expected = DAMAGED[name]
     (tmp_path / name).write_text(text)
     message = error_of(read_field, tmp_path / name, BALL)
-    assert wanted in message and str(tmp_path / name) in message and "\n" not in message
+    assert expected in message and str(tmp_path / name) in message and "\n" not in message
 
 
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([".obj", ".txt", ".npy"]))
-def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path, garbage, place, ending):
+def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):
     path = tmp_path / f"damaged{ending}"
     write_field(path, axis_field(BALL, 4), BALL)
     data = path.read_bytes()
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_field(path, BALL)
     except RosyError as error:
@@ -178,7 +180,7 @@ def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path, garbage, place, endi
 
 
 def quads_and_triangles():
-    """A torus of quads, and the same triangulated, its vertices and faces in another order."""
+    """A torus of quads, and the same triangulated, with its vertices and faces reordered."""
     quads = torus(48, 24)
     random = np.random.default_rng(5)
     new = random.permutation(len(quads.vertices))
@@ -189,21 +191,21 @@ def quads_and_triangles():
 
 
 @pytest.mark.parametrize("degree", [1, 4, 6])
-def test_a_field_follows_by_position_and_says_so(degree, tmp_path):
+def test_a_field_is_transferred_by_position_with_a_note(degree, tmp_path):
     quads, triangles = quads_and_triangles()
     field = axis_field(quads, degree, (0.0, 0.0, 1.0))
     write_off(tmp_path / "a.off", quads)
     write_field(tmp_path / "a.rosy", field, quads)
     again, note = load_field(tmp_path / "a.rosy", triangles)
     assert "transferred by position from a.off" in note and "1,152" in note and "2,304" in note
-    wanted = axis_field(triangles, degree, (0.0, 0.0, 1.0))
-    z, right = (face_representation(triangles, one) for one in (again, wanted))
-    certain = wanted.magnitude > 0.3  # where the axis is steep, a tilt of the face is a turn
-    assert np.degrees(np.abs(np.angle(z * right.conj()))[certain]).max() / degree < 8
-    assert np.median(np.abs(np.angle(z * right.conj()))[certain]) / degree < np.radians(1)
+    expected = axis_field(triangles, degree, (0.0, 0.0, 1.0))
+    z, expected_z = (face_representation(triangles, f) for f in (again, expected))
+    certain = expected.magnitude > 0.3  # elsewhere small tilts of a face rotate the projected axis
+    assert np.degrees(np.abs(np.angle(z * expected_z.conj()))[certain]).max() / degree < 8
+    assert np.median(np.abs(np.angle(z * expected_z.conj()))[certain]) / degree < np.radians(1)
 
 
-def test_other_faces_of_the_same_number_follow_a_mesh_that_is_named(tmp_path):
+def test_reordered_faces_are_transferred_from_a_given_mesh(tmp_path):
     order = np.random.default_rng(1).permutation(BALL.face_count)
     mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
     field = axis_field(BALL, 4, (0.0, 0.0, 1.0))
@@ -213,15 +215,15 @@ def test_other_faces_of_the_same_number_follow_a_mesh_that_is_named(tmp_path):
     assert np.allclose(again.vectors, field.vectors[order], atol=1e-12)
 
 
-def test_free_directions_follow_too(tmp_path):
+def test_free_directions_are_transferred(tmp_path):
     order = np.random.default_rng(1).permutation(BALL.face_count)[:-2]
     mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
     np.save(tmp_path / "a.npy", free_directions(3))
     write_off(tmp_path / "a.off", BALL)
     again = read_field(tmp_path / "a.npy", mixed)
-    whole = read_field(tmp_path / "a.npy", BALL)
+    original = read_field(tmp_path / "a.npy", BALL)
     assert np.allclose(
-        field_directions(mixed, again), field_directions(BALL, whole)[order], atol=1e-9
+        field_directions(mixed, again), field_directions(BALL, original)[order], atol=1e-9
     )
 
 
@@ -233,7 +235,7 @@ def test_another_shape_is_refused(tmp_path, error_of):
     assert "must have the same shape and position" in message
 
 
-def test_vectors_that_follow_lie_in_their_planes(tmp_path):
+def test_transferred_vectors_are_tangent(tmp_path):
     quads, triangles = quads_and_triangles()
     write_off(tmp_path / "a.off", quads)
     write_field(tmp_path / "a.rosy", axis_field(quads, 2), quads)

@@ -1,4 +1,4 @@
-"""Fields from files and to files, and the check of vectors that come from outside."""
+"""Reading and writing of fields, and the validation of vectors from outside."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
 @pytest.mark.parametrize(
     "form", ["{count}\n{degree}\n", "{count} {degree}\n", "\t{count}\r\n\n {degree} "]
 )
-def test_count_and_degree_may_stand_on_one_line_or_two(form, tmp_path):
+def test_count_and_degree_may_be_on_one_line_or_two(form, tmp_path):
     (tmp_path / "a.rosy").write_text(rosy_text(WEST, form=form))
     field = read_field(tmp_path / "a.rosy", SQUARES)
     assert field.degree == 4
     assert np.array_equal(field.vectors, WEST)
 
 
-def test_rows_may_be_broken_anywhere(tmp_path):
+def test_line_breaks_have_no_meaning(tmp_path):
     words = rosy_text(WEST).split()
     (tmp_path / "a.rosy").write_text("\n".join(words))
     assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
 
 
-def test_rows_tell_when_the_vertex_count_stands_over_face_rows(tmp_path, error_of):
+def test_a_vertex_count_is_accepted_above_face_rows(tmp_path, error_of):
     (tmp_path / "a.rosy").write_text(rosy_text(WEST, count=12))
     assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
     (tmp_path / "b.rosy").write_text(rosy_text(np.tile(WEST, (2, 1)), count=6))
@@ -61,12 +61,12 @@ def test_rows_tell_when_the_vertex_count_stands_over_face_rows(tmp_path, error_o
 
 
 def test_rows_for_vertices_are_averaged_onto_faces(tmp_path):
-    # Members of a vertex may be any: those of a square alternate between two of the four.
+    # Any member may be stored at a vertex: here they alternate between two of the four.
     members = np.where(np.arange(12)[:, None] % 2, (0.0, 3.0, 0.0), (3.0, 0.0, 0.0))
     (tmp_path / "a.rosy").write_text(rosy_text(members))
     field = read_field(tmp_path / "a.rosy", SQUARES)
     assert field.vectors.shape == (6, 3)
-    # A mean of the vectors would be shorter, and at 45 degrees to all of them.
+    # The mean of the vectors would be shorter, and at 45 degrees to all of them.
     assert np.allclose(face_representation(SQUARES, field), 3)
 
 
@@ -79,7 +79,7 @@ finite = st.floats(-1e150, 1e150, allow_subnormal=False)
     st.lists(st.tuples(finite, finite), min_size=6, max_size=6),
     st.sampled_from([".rosy", ".rawfield"]),
 )
-def test_what_is_written_is_read_to_the_last_bit(tmp_path, degree, vectors, ending):
+def test_written_fields_are_read_back_exactly(tmp_path, degree, vectors, ending):
     vectors = np.concatenate([np.array(vectors), np.zeros((6, 1))], axis=1)
     field = RosyField(degree, vectors)
     path = tmp_path / f"field{ending}"
@@ -115,19 +115,19 @@ def test_members_may_be_listed_in_any_order(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka"])
-def test_fields_of_others(name, shared_data):
+def test_fields_of_other_programs(name, shared_data):
     mesh, _, degree = name.partition("-")
     surface = read_mesh(shared_data / "meshes" / f"{mesh}.off")
     field = read_field(shared_data / "fields" / f"{name}.rawfield", surface)
     assert field.degree == int(degree or 4)
     assert np.allclose(field.magnitude, 1, atol=1e-4)
     assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
-    if name == "cheburashka":  # the one that is closed
+    if name == "cheburashka":  # the only closed mesh
         _, index = find_singularities(surface, field)
         assert index.sum() == field.degree * euler_characteristic(surface)
 
 
-def test_directions_that_are_no_rosy_keep_their_angles_and_lengths(shared_data, tmp_path, error_of):
+def test_free_directions_keep_their_angles_and_lengths(shared_data, tmp_path, error_of):
     surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
     path = shared_data / "fields" / "cheburashka-cf.rawfield"
     field = read_field(path, surface)
@@ -140,9 +140,9 @@ def test_directions_that_are_no_rosy_keep_their_angles_and_lengths(shared_data, 
 @pytest.mark.parametrize(
     ("angle", "longer", "rosy"), [(0.9, 0.009, True), (1.2, 0.0, False), (0.0, 0.02, False)]
 )
-def test_a_degree_and_a_hundredth_are_allowed(angle, longer, rosy, tmp_path):
-    turn = np.radians([0, 120 + angle, 240])
-    members = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+def test_tolerances_of_a_rosy(angle, longer, rosy, tmp_path):
+    angles = np.radians([0, 120 + angle, 240])
+    members = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
     members[2] *= 1 + longer
     rows = np.tile(members.reshape(1, 9), (6, 1))
     (tmp_path / "a.rawfield").write_text(rosy_text(rows, degree=3, form="{degree} {count}\n"))
@@ -179,22 +179,22 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
-    data, wanted = DAMAGED[name]
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
+    data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
-    SQUARES.face_normal  # noqa: B018  not to be counted below
+    SQUARES.face_normal  # noqa: B018  computed before memory is measured
     tracemalloc.start()
     message = error_of(read_field, tmp_path / name, SQUARES)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert wanted in message
+    assert expected in message
     assert str(tmp_path / name) in message
     assert peak < 1e6, "a claim in a header must not be believed"
 
 
 def test_a_huge_binary_file_is_refused_before_it_is_read(tmp_path, error_of):
     with open(tmp_path / "huge.rosy", "wb") as file:
-        file.truncate(2 << 30)  # a hole: takes no space
+        file.truncate(2 << 30)  # a sparse file, which takes no space
     tracemalloc.start()
     assert "binary data" in error_of(read_field, tmp_path / "huge.rosy", SQUARES)
     assert tracemalloc.get_traced_memory()[1] < 1e6
@@ -209,18 +209,18 @@ def test_missing_file_and_conflicting_degree(tmp_path, error_of):
 
 
 @given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
-def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, place, ending):
+def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, offset, ending):
     path = tmp_path_factory.getbasetemp() / f"damaged{ending}"
     write_field(path, RosyField(4, WEST), SQUARES)
     data = path.read_bytes()
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_field(path, SQUARES)
     except RosyError as error:
         assert "\n" not in str(error) and str(path) in str(error)
 
 
-def test_unwritable_output_is_an_error_and_leaves_what_was_there(tmp_path, error_of, monkeypatch):
+def test_unwritable_output_is_an_error_and_keeps_the_old_file(tmp_path, error_of, monkeypatch):
     field = RosyField(4, WEST)
     assert "does not exist" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
     (tmp_path / "b.rosy").mkdir()
@@ -243,13 +243,13 @@ def test_unwritable_output_is_an_error_and_leaves_what_was_there(tmp_path, error
 # --- vectors from outside ----------------------------------------------------------------------
 
 
-def test_small_deviations_are_turned_into_the_plane_with_their_length():
+def test_small_deviations_are_projected_and_keep_their_length():
     vectors = WEST + (0, 0, 0.1)
     field = validated_field(SQUARES, vectors, 4, "here")
     assert np.allclose(field.vectors, (-np.hypot(2, 0.1), 0, 0), atol=1e-14)
 
 
-def test_vectors_clearly_off_the_surface_are_refused_naming_the_worst(error_of):
+def test_vectors_off_the_surface_are_refused(error_of):
     surface = torus()
     field = axis_field(surface, 4)
     vectors = field.vectors + surface.face_normal * 0.05 * field.magnitude[:, None]
@@ -269,14 +269,14 @@ def test_vectors_clearly_off_the_surface_are_refused_naming_the_worst(error_of):
     assert f"{np.degrees(np.arctan(2.35)):.1f} degrees" in message
 
 
-def test_not_finite_vectors_are_undefined_on_request():
+def test_nonfinite_vectors_are_undefined_on_request():
     vectors = WEST.copy()
     vectors[1, 2], vectors[4] = np.nan, np.inf
     field = validated_field(SQUARES, vectors, 3, "here", nonfinite="zero")
     assert field.magnitude.tolist() == [2, 0, 2, 2, 0, 2]
 
 
-def test_on_faces_without_area_the_field_is_undefined():
+def test_the_field_is_undefined_on_faces_without_area():
     quads = np.array([(0, 1, 2, 3), (1, 1, 2, 2)])
     surface = from_quads(np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.0)]), quads)
     field = validated_field(surface, np.ones((2, 3)) * (1, 1, 0), 4, "here")
@@ -293,7 +293,7 @@ def test_wrong_count_and_wrong_degree(error_of):
         assert f"degree {degree} is not" in error_of(validated_field, SQUARES, WEST, degree, "here")
 
 
-def test_where_counts_agree_the_domain_decides(error_of):
+def test_the_domain_decides_if_both_counts_agree(error_of):
     surface = torus(24, 12)  # as many faces as vertices
     assert surface.face_count == len(surface.vertices)
     angle = np.arctan2(surface.vertices[:, 1], surface.vertices[:, 0])
@@ -301,28 +301,28 @@ def test_where_counts_agree_the_domain_decides(error_of):
     exact = np.cross((0, 0, 1.0), surface.face_center)
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     field = validated_field(surface, around, 4, "here", domain="vertex")
-    z, wanted = (face_representation(surface, some) for some in (field, RosyField(4, exact)))
-    assert np.abs(np.angle(z / wanted)).max() < 1e-9
+    z, expected = (face_representation(surface, f) for f in (field, RosyField(4, exact)))
+    assert np.abs(np.angle(z / expected)).max() < 1e-9
     assert "not tangent to the surface" in error_of(validated_field, surface, around, 4, "here")
 
 
-def test_vertex_members_do_not_matter_to_the_mean():
+def test_the_mean_does_not_depend_on_the_members_at_vertices():
     surface = icosphere(2)
     normal = surface.vertices
     tangent = np.cross(normal, (0.2, 0.5, 1.0))
     generator = np.random.default_rng(1)
     for degree in (2, 3, 4, 5):
-        turn = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
-        others = np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent)
+        angle = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
+        others = np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent)
         first, second = (
             face_representation(surface, validated_field(surface, vectors, degree, "here"))
             for vectors in (tangent, others)
         )
-        # The vertex normals are those of the polyhedron, so the turns are off by a little.
+        # The vertex normals are those of the polyhedron, so the rotations are not quite exact.
         assert np.abs(first - second).max() < 2e-3
 
 
-def test_a_field_belongs_to_the_shape_at_rest():
+def test_a_field_belongs_to_the_rest_shape():
     tube = cylinder(24, 4)
     field = axis_field(tube, 4)
     bent = replace(

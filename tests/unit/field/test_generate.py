@@ -1,4 +1,4 @@
-"""Fields against closed forms, invariances and the theorem of Poincare and Hopf."""
+"""Transport, singularities and generators, against closed forms, invariances and Poincaré-Hopf."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ coordinate = st.floats(-1, 1, allow_nan=False)
 vector = st.tuples(coordinate, coordinate, coordinate).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
-def rotated(field: RosyField, surface, turns) -> RosyField:
-    """The same field, another member stored on each face."""
+def with_other_members(field: RosyField, surface, member_index) -> RosyField:
+    """The same field, with another member stored on each face."""
     normal = surface.face_normal
-    angle = (2 * np.pi / field.degree * turns)[:, None]
+    angle = (2 * np.pi / field.degree * member_index)[:, None]
     vectors = np.cos(angle) * field.vectors + np.sin(angle) * np.cross(normal, field.vectors)
     return RosyField(field.degree, vectors)
 
@@ -45,7 +45,7 @@ def random_field(surface, degree, seed=0) -> RosyField:
 
 
 @given(vector, vector, coordinate)
-def test_carrying_is_the_shortest_rotation(a, b, angle):
+def test_transport_is_the_minimal_rotation(a, b, angle):
     s, t = normalize(np.array(a)), normalize(np.array(b))
     if s @ t < -0.9:
         return
@@ -55,7 +55,7 @@ def test_carrying_is_the_shortest_rotation(a, b, angle):
     assert abs(moved @ t) < 1e-12
     assert np.linalg.norm(moved) == pytest.approx(1)
     assert np.allclose(transport(moved, t, s), v)
-    axis = np.cross(s, t)  # left alone by the rotation that takes s to t
+    axis = np.cross(s, t)  # invariant under the rotation that takes s to t
     assert moved @ axis == pytest.approx(v @ axis, abs=1e-9)
 
 
@@ -68,7 +68,7 @@ def test_tangent_frames_are_right_handed(a):
 
 
 @given(vector.filter(lambda v: v[2] / np.linalg.norm(v) > -0.5))
-def test_view_frames_are_the_cameras_axes_carried(a):
+def test_view_frames_are_the_transported_camera_axes(a):
     w = normalize(np.array(a))
     x, y = view_frame(w)
     camera = np.array([0.0, 0.0, 1.0])
@@ -88,24 +88,24 @@ def test_all_members_have_one_representation(angle, rho, degree, k):
 
 
 @given(st.integers(1, 40))
-def test_powers_are_powers(degree):
-    number = np.exp(0.7j) * np.ones(1)
-    assert power(number, degree) == pytest.approx(number**degree)
+def test_power(degree):
+    index = np.exp(0.7j) * np.ones(1)
+    assert power(index, degree) == pytest.approx(index**degree)
 
 
-def test_corner_turns_are_what_carrying_does():
+def test_corner_rotations_match_transport():
     surface = torus(12, 8)
     x, y = face_frames(surface)
     face = surface.corner_face
-    turn = corner_rotations(surface.face_normal, x, face, surface.corner_normal)
+    rotation = corner_rotations(surface.face_normal, x, face, surface.corner_normal)
     member = normalize(0.3 * x + 0.8 * y)
     moved = transport(member[face], surface.face_normal[face], surface.corner_normal)
     cx, cy = tangent_frame(surface.corner_normal)
     w = dot(member, x) + 1j * dot(member, y)
-    assert np.allclose(w[face] * turn, dot(moved, cx) + 1j * dot(moved, cy))
+    assert np.allclose(w[face] * rotation, dot(moved, cx) + 1j * dot(moved, cy))
 
 
-def test_fans_mix_within_themselves_only():
+def test_values_are_averaged_only_within_fans():
     box = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], dtype=float)
     quads = np.array(
         [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -114,13 +114,13 @@ def test_fans_mix_within_themselves_only():
     sharp = from_quads(box, quads, sharp_angle=0.5)
     assert np.array_equal(average_over_fans(values, np.ones(24), sharp.corner_fan), values)
     smooth = from_quads(box, quads)
-    mixed = average_over_fans(values, np.ones(24), smooth.corner_fan)
+    averaged = average_over_fans(values, np.ones(24), smooth.corner_fan)
     for v in range(8):
-        at = smooth.corner_vertex == v
-        assert np.allclose(mixed[at], values[at].mean())
+        at_vertex = smooth.corner_vertex == v
+        assert np.allclose(averaged[at_vertex], values[at_vertex].mean())
 
 
-def test_sharp_edges_and_flat_faces_part_the_fans():
+def test_sharp_edges_and_flat_faces_separate_fans():
     quads = plane(2, 1)
     ends = quads.corner_vertex
     arrays = (quads.vertices, ends, quads.face_start)
@@ -148,22 +148,22 @@ def test_indices_sum_to_the_euler_characteristic(degree):
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_planar_singularity_has_its_index(degree, sign):
     surface = plane(21, 21)
-    # The singular point stands on a vertex near the middle.
+    # The singularity is at a vertex near the center.
     vertex = int(np.argmin(np.linalg.norm(surface.vertices - [0.02, 0.03, 0], axis=1)))
-    way = surface.face_center - surface.vertices[vertex]
-    angle = sign * np.arctan2(way[:, 1], way[:, 0]) / degree + 0.4
+    direction = surface.face_center - surface.vertices[vertex]
+    angle = sign * np.arctan2(direction[:, 1], direction[:, 0]) / degree + 0.4
     field = RosyField(degree, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
-    found, index = find_singularities(surface, field)
-    assert found.tolist() == [vertex]
+    vertices, index = find_singularities(surface, field)
+    assert vertices.tolist() == [vertex]
     assert index.tolist() == [sign]
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 7])
-def test_the_stored_member_makes_no_difference(degree):
+def test_results_do_not_depend_on_the_stored_member(degree):
     surface = torus(20, 12)
     field = random_field(surface, degree)
-    turns = np.random.default_rng(3).integers(0, degree, surface.face_count)
-    other = rotated(field, surface, turns)
+    member_index = np.random.default_rng(3).integers(0, degree, surface.face_count)
+    other = with_other_members(field, surface, member_index)
     assert np.allclose(face_representation(surface, field), face_representation(surface, other))
     for a, b in zip(
         find_singularities(surface, field), find_singularities(surface, other), strict=True
@@ -173,21 +173,21 @@ def test_the_stored_member_makes_no_difference(degree):
 
 def test_principal_directions_of_a_torus():
     surface = torus(128, 64, 1.0, 0.4)
-    centre = surface.face_center
-    along = normalize(np.stack([-centre[:, 1], centre[:, 0], 0 * centre[:, 0]], axis=1))
+    center = surface.face_center
+    along = normalize(np.stack([-center[:, 1], center[:, 0], 0 * center[:, 0]], axis=1))
     across = np.cross(surface.face_normal, along)
-    two = curvature_field(surface, 2)
-    # The tube bends more than the ring everywhere.
-    angle = np.degrees(np.arccos(np.abs(dot(normalize(two.vectors), across)).clip(0, 1)))
+    degree_2 = curvature_field(surface, 2)
+    # The curvature around the tube is larger than along the ring everywhere.
+    angle = np.degrees(np.arccos(np.abs(dot(normalize(degree_2.vectors), across)).clip(0, 1)))
     assert angle.max() < 0.5
     # |k1 - k2| / (|k1| + |k2|) with k1 = 1 / r, k2 = cos v / (R + r cos v)
-    ring = np.hypot(centre[:, 0], centre[:, 1])
+    ring = np.hypot(center[:, 0], center[:, 1])
     k1, k2 = 1 / 0.4, (ring - 1) / 0.4 / ring
     expected = np.abs(k1 - k2) / (np.abs(k1) + np.abs(k2))
-    assert np.abs(two.magnitude - expected).max() < 0.03
-    four = curvature_field(surface, 4)
+    assert np.abs(degree_2.magnitude - expected).max() < 0.03
+    degree_4 = curvature_field(surface, 4)
     x, y = along, across
-    z = to_representation(four.vectors, x, y, 4)
+    z = to_representation(degree_4.vectors, x, y, 4)
     assert np.degrees(np.abs(np.angle(z)).max() / 4) < 0.5
 
 
@@ -205,12 +205,14 @@ def test_curvature_follows_a_rotation_of_the_mesh():
     surface = torus(24, 12)
     rotation = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
     rotation *= np.sign(np.linalg.det(rotation))
-    turned = build_surface(surface.vertices @ rotation.T, surface.corner_vertex, surface.face_start)
+    rotated = build_surface(
+        surface.vertices @ rotation.T, surface.corner_vertex, surface.face_start
+    )
     for degree in (2, 4):
-        here = curvature_field(surface, degree)
-        there = RosyField(degree, curvature_field(turned, degree).vectors @ rotation)
-        z = face_representation(surface, here)
-        assert np.allclose(face_representation(surface, there), z, atol=1e-9)
+        original = curvature_field(surface, degree)
+        rotated_back = RosyField(degree, curvature_field(rotated, degree).vectors @ rotation)
+        z = face_representation(surface, original)
+        assert np.allclose(face_representation(surface, rotated_back), z, atol=1e-9)
 
 
 def test_an_axis_is_projected():
@@ -227,7 +229,7 @@ def test_an_axis_without_a_direction_is_refused(axis):
         axis_field(plane(), 4, axis)
 
 
-def test_generators_are_refused_by_name():
+def test_unknown_generators_and_odd_degrees_are_refused():
     with pytest.raises(RosyError, match="even degree, not 3"):
         generate(plane(), "curvature", 3)
     with pytest.raises(RosyError, match="magic"):

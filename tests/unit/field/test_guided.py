@@ -1,11 +1,11 @@
-"""Fields that follow guides: exactly, nearly, and the same however a mesh is numbered."""
+"""Guided fields: exact and soft guides, edges, features, and invariance to numbering."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import scipy.sparse as sparse
-from field_helpers import MESHES, angles_apart, as_scipy, bumpy
+from field_helpers import MESHES, angle_differences, as_scipy, bumpy
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 from shapes import cube, from_quads, from_triangles, icosphere, plane, torus
@@ -24,8 +24,8 @@ from rosy_addon.field.smoothest import corner_frame_angles
 BUNNY = MESHES / "stanford-bunny.obj"
 
 
-def some_guides(surface, count, seed=0):
-    """Unit tangents on a few faces that are far from each other."""
+def random_guides(surface, count, seed=0):
+    """Random unit tangents on `count` random faces, zero on the others."""
     random = np.random.default_rng(seed)
     chosen = random.choice(surface.face_count, count, replace=False)
     guides = np.zeros((surface.face_count, 3))
@@ -38,113 +38,119 @@ def some_guides(surface, count, seed=0):
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 def test_hard_guides_are_met_exactly(degree):
     for surface in (bumpy(icosphere(4)), torus(40, 20)):
-        guides = some_guides(surface, 12)
+        guides = random_guides(surface, 12)
         hard = guides.any(axis=1)
         field = guided_field(surface, degree, guides, 0.0, hard)
-        assert angles_apart(surface, field.vectors, guides, degree)[hard].max() < 1e-9
+        assert angle_differences(surface, field.vectors, guides, degree)[hard].max() < 1e-9
         np.testing.assert_allclose(np.linalg.norm(field.vectors, axis=1), 1, atol=1e-9)
         assert find_singularities(surface, field)[1].sum() == degree * euler_characteristic(surface)
 
 
 @pytest.mark.parametrize("degree", [1, 4])
-def test_soft_guides_are_a_linear_system(degree):
+def test_soft_guides_match_a_direct_solver(degree):
     surface = bumpy(icosphere(4))
-    guides, weight = some_guides(surface, 30), 40.0
+    guides, weight = random_guides(surface, 30), 40.0
     x, y = face_frames(surface)
     connection = build_connection(surface)
-    turn = corner_frame_angles(surface, connection, x, y)
-    # A column for each corner of a face with a guide, a row for each node: the normal equations.
+    frame_angle = corner_frame_angles(surface, connection, x, y)
+    # One row for each corner of a face with a guide, one column for each node.
     corner = np.flatnonzero(np.repeat(guides.any(axis=1), 3))
     shape = len(corner), connection.node_count
-    ends = np.arange(len(corner)), connection.corner_node[corner]
-    root = np.sqrt(weight * np.repeat(connection.area / 3, 3)[corner])
-    carry = sparse.csr_matrix((root * np.exp(1j * degree * turn[corner]), ends), shape)
-    wish = root * np.repeat(to_representation(guides, x, y, degree), 3)[corner]
-    matrix = as_scipy(laplacian(connection, degree)) + carry.getH() @ carry
-    z = spsolve(matrix.tocsc(), carry.getH() @ wish)
-    on_corner = (z[connection.corner_node] * np.exp(1j * degree * turn)).reshape(-1, 3)
-    found = guided_field(surface, degree, guides, weight).vectors
-    angle = np.angle(to_representation(found, x, y, degree) * on_corner.mean(axis=1).conj())
+    entries = np.arange(len(corner)), connection.corner_node[corner]
+    root_weight = np.sqrt(weight * np.repeat(connection.area / 3, 3)[corner])
+    transport_matrix = sparse.csr_matrix(
+        (root_weight * np.exp(1j * degree * frame_angle[corner]), entries), shape
+    )
+    target = root_weight * np.repeat(to_representation(guides, x, y, degree), 3)[corner]
+    matrix = as_scipy(laplacian(connection, degree)) + transport_matrix.getH() @ transport_matrix
+    z = spsolve(matrix.tocsc(), transport_matrix.getH() @ target)
+    on_corner = (z[connection.corner_node] * np.exp(1j * degree * frame_angle)).reshape(-1, 3)
+    actual = guided_field(surface, degree, guides, weight).vectors
+    angle = np.angle(to_representation(actual, x, y, degree) * on_corner.mean(axis=1).conj())
     assert np.abs(angle).max() < 1e-5
 
 
 def test_a_field_follows_strokes_within_two_degrees():
     surface = icosphere(5)
-    centre = normalize(surface.face_center)
+    center = normalize(surface.face_center)
     random = np.random.default_rng(2)
     guides = np.zeros((surface.face_count, 3))
     stroke = np.full(surface.face_count, -1)
     for start in normalize(random.standard_normal((40, 3))):
         axis = normalize(np.cross(start, random.standard_normal(3))[None])[0]
-        near = (np.abs(centre @ axis) < 0.02) & (centre @ start > np.cos(0.25))
-        around = (np.abs(centre @ axis) < 0.2) & (centre @ start > np.cos(0.5))
+        near = (np.abs(center @ axis) < 0.02) & (center @ start > np.cos(0.25))
+        around = (np.abs(center @ axis) < 0.2) & (center @ start > np.cos(0.5))
         if stroke.max() < 9 and (stroke[around] < 0).all():
-            guides[near] = normalize(np.cross(axis, centre[near]))
+            guides[near] = normalize(np.cross(axis, center[near]))
             stroke[near] = stroke.max() + 1
     assert stroke.max() == 9
     for degree in (1, 4):
         field = guided_field(surface, degree, guides, 1 / 0.01**2)
-        apart = angles_apart(surface, field.vectors, guides, degree)
-        for number in range(10):
-            assert np.degrees(apart[stroke == number]).mean() < 2
+        difference = angle_differences(surface, field.vectors, guides, degree)
+        for index in range(10):
+            assert np.degrees(difference[stroke == index]).mean() < 2
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not BUNNY.exists(), reason="the bunny is not here")
+@pytest.mark.skipif(not BUNNY.exists(), reason="needs ../shared/data")
 @pytest.mark.long
 def test_ten_strokes_on_the_bunny():
     surface = read_mesh(BUNNY)
-    centre, size = surface.face_center, np.ptp(surface.vertices, axis=0).max()
+    center, size = surface.face_center, np.ptp(surface.vertices, axis=0).max()
     random = np.random.default_rng(0)
     guides = np.zeros((surface.face_count, 3))
     stroke = np.full(surface.face_count, -1)
     while stroke.max() < 9:
         start = random.integers(surface.face_count)
         normal = surface.face_normal[start]
-        along = normalize(np.cross(normal, random.standard_normal(3))[None])[0]
-        away = centre - centre[start]
-        length = np.sqrt(dot(away, away))
-        aside = np.abs(away @ np.cross(normal, along))
+        direction = normalize(np.cross(normal, random.standard_normal(3))[None])[0]
+        offset = center - center[start]
+        length = np.sqrt(dot(offset, offset))
+        lateral = np.abs(offset @ np.cross(normal, direction))
         near = (
-            (aside < 0.004 * size) & (length < 0.05 * size) & (surface.face_normal @ normal > 0.5)
+            (lateral < 0.004 * size) & (length < 0.05 * size) & (surface.face_normal @ normal > 0.5)
         )
         if near.sum() < 20 or (stroke[length < 0.1 * size] >= 0).any():
             continue
-        tangent = along - (surface.face_normal[near] @ along)[:, None] * surface.face_normal[near]
+        tangent = (
+            direction - (surface.face_normal[near] @ direction)[:, None] * surface.face_normal[near]
+        )
         guides[near], stroke[near] = normalize(tangent), stroke.max() + 1
     for degree in (1, 4):
         field = guided_field(surface, degree, guides, 1 / (0.002 * size) ** 2)
-        apart = np.degrees(angles_apart(surface, field.vectors, guides, degree))
-        for number in range(10):
-            assert apart[stroke == number].mean() < 2
+        difference = np.degrees(angle_differences(surface, field.vectors, guides, degree))
+        for index in range(10):
+            assert difference[stroke == index].mean() < 2
         field = guided_field(surface, degree, guides, 0.0, stroke >= 0)
-        assert angles_apart(surface, field.vectors, guides, degree)[stroke >= 0].max() < 1e-6
+        assert angle_differences(surface, field.vectors, guides, degree)[stroke >= 0].max() < 1e-6
 
 
 @pytest.mark.parametrize("degree", [2, 5])
 @pytest.mark.parametrize("hard", [False, True])
-def test_the_field_does_not_depend_on_numbers_or_place(degree, hard):
+def test_the_field_does_not_depend_on_numbering_or_position(degree, hard):
     surface = bumpy(icosphere(3))
-    guides = some_guides(surface, 10)
+    guides = random_guides(surface, 10)
     chosen = guides.any(axis=1) if hard else None
 
-    def found(other, turned=None):
-        vectors = guides if turned is None else guides @ turned.T
-        return guided_field(other, degree, vectors, 10.0, chosen).vectors
+    def solve(mesh, rotation=None):
+        vectors = guides if rotation is None else guides @ rotation.T
+        return guided_field(mesh, degree, vectors, 10.0, chosen).vectors
 
-    expected = found(surface)
+    expected = solve(surface)
     triangles = surface.corner_vertex.reshape(-1, 3)
     order = np.random.default_rng(5).permutation(len(surface.vertices))
     renumbered = from_triangles(surface.vertices[order], np.argsort(order)[triangles])
-    assert angles_apart(surface, found(renumbered), expected, degree).max() < 1e-5
+    assert angle_differences(surface, solve(renumbered), expected, degree).max() < 1e-5
     first = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
-    assert angles_apart(surface, found(first), expected, degree).max() < 1e-5
-    turn = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
-    moved = from_triangles(surface.vertices @ turn.T + (1, 2, 3), triangles)
-    assert angles_apart(surface, found(moved, turn) @ turn, expected, degree).max() < 1e-5
+    assert angle_differences(surface, solve(first), expected, degree).max() < 1e-5
+    rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+    moved = from_triangles(surface.vertices @ rotation.T + (1, 2, 3), triangles)
+    assert (
+        angle_differences(surface, solve(moved, rotation) @ rotation, expected, degree).max() < 1e-5
+    )
 
 
-def test_a_piece_without_guides_has_no_field():
+def test_a_component_without_guides_has_no_field():
     ball = icosphere(2)
     points = np.concatenate([ball.vertices, ball.vertices + 5])
     triangles = ball.corner_vertex.reshape(-1, 3)
@@ -171,7 +177,7 @@ def test_the_edges_of_a_cube_are_sharp_and_guide_all_its_faces():
     guides = guides_from_edges(box, ends, 4)
     along = np.abs(guides).max(axis=1)
     np.testing.assert_allclose(along, 1, atol=1e-12)
-    # Of degree 2 the edges of a square contradict each other.
+    # In degree 2 the edges of a square cancel.
     assert not guides_from_edges(box, ends, 2).any()
     assert not len(feature_edges(box, 2.0))
 
@@ -193,17 +199,17 @@ def test_guides_lie_in_their_faces():
     assert guides[0] @ [1, 0, 0] > 0.9
 
 
-def test_curvature_reaches_into_what_is_flat():
-    """A cylinder between two flat caps' worth of plane: the flat parts take its directions."""
+def test_curvature_spreads_into_flat_regions():
+    """A quarter of a tube between two flat parts, which take its directions."""
     count, turns = 60, np.linspace(0, np.pi / 2, 13)
-    # A quarter of a tube along y, with flat flaps on both sides, three units long.
+    # The tube is along y. The flat parts are three units long.
     flap = np.linspace(3, 0, 16)[:-1]
     x = np.concatenate([-flap, np.sin(turns), np.full(15, 1.0)])
     z = np.concatenate([np.full(15, 1.0), np.cos(turns), -flap[::-1]])
     y = np.linspace(0, 6, count)
     points = np.stack(np.broadcast_arrays(x[:, None], y, z[:, None]), axis=-1).reshape(-1, 3)
-    here = np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)
-    quads = np.stack([here, here + 1, here + count + 1, here + count], axis=-1).reshape(-1, 4)
+    first = np.arange(len(x) - 1)[:, None] * count + np.arange(count - 1)
+    quads = np.stack([first, first + 1, first + count + 1, first + count], axis=-1).reshape(-1, 4)
     surface = from_quads(points, quads)
     flat = surface.face_center[:, 0] < -1
     plain = generate(surface, "curvature", 4)
@@ -219,7 +225,7 @@ def test_features_of_a_cube(degree):
     points = box.vertices / np.abs(box.vertices).max(axis=1)[:, None]
     cubic = from_triangles(points, box.corner_vertex.reshape(-1, 3))
     field = generate(cubic, GeneratorSettings("features", sharp_angle=0.9), degree)
-    # The corners are cut off, and on the triangles there it is singular by symmetry.
+    # The corners are triangles, on which the field is singular by symmetry.
     assert (field.magnitude < 0.5).sum() in (0, 8)
     with pytest.raises(RosyError, match="no border or sharp edge"):
         generate(icosphere(3), "features", degree)

@@ -1,4 +1,4 @@
-"""What is at hand as guides: strokes, empties' axes, UV maps, vectors."""
+"""Guides from strokes, axes of empties, UV maps and vectors; and one-sided surfaces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BALL = icosphere(4)
 
 
 def great_circles(count, seed=2, tremble=0.0):
-    """Arcs on the unit sphere, as an artist might draw them."""
+    """Arcs of great circles on the unit sphere, with normally distributed jitter."""
     random = np.random.default_rng(seed)
     strokes = []
     for _ in range(count):
@@ -32,25 +32,25 @@ def great_circles(count, seed=2, tremble=0.0):
     return strokes
 
 
-def off_stroke(surface, field, stroke):
-    """Mean angle, degrees, between a stroke and the field along it."""
-    middle, way = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
-    face = surface.triangle_face[closest_triangles(surface, middle)[0]]
+def stroke_error(surface, field, stroke):
+    """The angle between a stroke and the mean field along it, degrees."""
+    midpoint, direction = (stroke[1:] + stroke[:-1]) / 2, np.diff(stroke, axis=0)
+    face = surface.triangle_face[closest_triangles(surface, midpoint)[0]]
     x, y = face_frames(surface)
-    wish = to_representation(normalize(way), x[face], y[face], field.degree)
+    target = to_representation(normalize(direction), x[face], y[face], field.degree)
     z = to_representation(field.vectors[face], x[face], y[face], field.degree)
-    return abs(np.degrees(np.angle((z * wish.conj()).sum())) / field.degree)
+    return abs(np.degrees(np.angle((z * target.conj()).sum())) / field.degree)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
 def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
     field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)
-    assert max(off_stroke(BALL, field, stroke) for stroke in strokes) < 2
+    assert max(stroke_error(BALL, field, stroke) for stroke in strokes) < 2
     soft = generate(
         BALL, GeneratorSettings("guided", strokes=strokes, smoothing_length=0.005), degree
     )
-    assert max(off_stroke(BALL, soft, stroke) for stroke in strokes) < 2
+    assert max(stroke_error(BALL, soft, stroke) for stroke in strokes) < 2
 
 
 @pytest.mark.parametrize("reach", long(0.0, 0.003))
@@ -61,9 +61,9 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
     strokes = []
     while len(strokes) < 10:
         face = random.integers(bunny.face_count)
-        # Straight on, put down on the surface point by point, where it does not leave it.
-        way = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
-        line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * way
+        # A straight line, projected to the surface; only where it stays close to the surface.
+        direction = normalize(np.cross(bunny.face_normal[face], random.standard_normal(3)))
+        line = bunny.face_center[face] + np.linspace(0, 0.08 * size, 30)[:, None] * direction
         triangle, distance = closest_triangles(bunny, line)
         if distance.max() > 0.006 * size:
             continue
@@ -71,11 +71,11 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
         corner = bunny.vertices[bunny.triangle_vertex[triangle, 0]]
         strokes.append(line - dot(line - corner, normal)[:, None] * normal)
     field = generate(bunny, GeneratorSettings("guided", strokes=strokes, smoothing_length=reach), 4)
-    off = [off_stroke(bunny, field, stroke) for stroke in strokes]
-    assert max(off) < 2, off
+    errors = [stroke_error(bunny, field, stroke) for stroke in strokes]
+    assert max(errors) < 2, errors
 
 
-def test_a_trembling_hand_is_smoothed():
+def test_jitter_of_strokes_is_smoothed():
     strokes, trembling = great_circles(1), great_circles(1, tremble=0.004)
     straight, shaken = (guides_from_strokes(BALL, some, 2) for some in (strokes, trembling))
     both = straight.any(axis=1) & shaken.any(axis=1)
@@ -83,7 +83,7 @@ def test_a_trembling_hand_is_smoothed():
     assert both.sum() > 5 and np.median(off) < 8
 
 
-def test_pieces_without_a_guide_are_smooth():
+def test_components_without_a_guide_get_the_smoothest_field():
     points = np.concatenate([BALL.vertices, BALL.vertices + 5])
     triangles = np.concatenate([BALL.triangle_vertex, BALL.triangle_vertex + len(BALL.vertices)])
     both = from_triangles(points, triangles)
@@ -93,10 +93,10 @@ def test_pieces_without_a_guide_are_smooth():
     other = RosyField(4, field.vectors[BALL.face_count :])
     assert np.isclose(
         dirichlet_energy(BALL, other), dirichlet_energy(BALL, alone), rtol=0.1
-    )  # several are
+    )  # several fields are about equally smooth
 
 
-def test_strokes_elsewhere_are_refused(error_of):
+def test_strokes_far_from_the_surface_are_refused(error_of):
     assert "no stroke is near the surface" in error_of(
         guides_from_strokes, BALL, [np.ones((4, 3)) * 9], 4
     )
@@ -105,21 +105,21 @@ def test_strokes_elsewhere_are_refused(error_of):
     )
 
 
-def test_handles_guide_around_them():
-    place, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
-    guides = guides_from_axes(BALL, place, axis, np.array([0.3, 0.0]), 2)
-    near = np.linalg.norm(BALL.face_center - place[0], axis=1) < 0.3
+def test_axes_guide_the_faces_around_them():
+    position, axis = np.array([(0, 0, 1.0), (1.0, 0, 0)]), np.array([(1.0, 0, 0), (0, 1.0, 1.0)])
+    guides = guides_from_axes(BALL, position, axis, np.array([0.3, 0.0]), 2)
+    near = np.linalg.norm(BALL.face_center - position[0], axis=1) < 0.3
     assert guides[near].any(axis=1).all() and guides.any(axis=1).sum() == near.sum() + 1
     assert (np.abs(guides[near, 0]) > 0.9).all()
-    recipe = GeneratorSettings(
-        "guided", axis_guides=list(zip(place, axis, (0.3, 0.0), strict=True))
+    generator_settings = GeneratorSettings(
+        "guided", axis_guides=list(zip(position, axis, (0.3, 0.0), strict=True))
     )
-    field = generate(BALL, recipe, 2)
+    field = generate(BALL, generator_settings, 2)
     np.testing.assert_allclose(np.abs(dot(field.vectors, guides))[near], 1, atol=1e-9)
 
 
 def uv_of(surface, matrix):
-    """A map of a plane: (u, v) = matrix (x, y) + an offset."""
+    """The UV map (u, v) = matrix (x, y) + offset of a plane."""
     return surface.vertices[surface.corner_vertex][:, :2] @ np.transpose(matrix) + (3.0, -1.0)
 
 
@@ -127,17 +127,19 @@ def uv_of(surface, matrix):
 @pytest.mark.parametrize("degree", [1, 2, 4, 6, 8])
 def test_a_uv_map_is_followed(degree, mirrored):
     surface = plane(4, 3)
-    turn = np.array([(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))])  # u at 0.4 radians
-    matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ turn
+    rotation = np.array(
+        [(np.cos(0.4), np.sin(0.4)), (-np.sin(0.4), np.cos(0.4))]
+    )  # u at 0.4 radians
+    matrix = np.diag((5.0, -0.3 if mirrored else 0.3)) @ rotation
     guides = guides_from_uv(surface, uv_of(surface, matrix), degree)
     np.testing.assert_allclose(np.linalg.norm(guides, axis=1), 1)
     angle = np.arctan2(guides[:, 1], guides[:, 0])
     np.testing.assert_allclose(np.exp(1j * degree * angle), np.exp(1j * degree * 0.4), atol=1e-9)
 
 
-def test_a_skewed_map_is_followed_on_both_axes_alike():
+def test_a_skewed_map_is_followed_equally_along_both_axes():
     surface = plane(3, 3)
-    # dP/du = (1, 0), dP/dv = (1, 1): the nearest cross halves the difference.
+    # dP/du = (1, 0) and dP/dv = (1, 1): the closest cross halves the error of 45 degrees.
     guides = guides_from_uv(surface, uv_of(surface, np.linalg.inv([(1.0, 1.0), (0.0, 1.0)])), 4)
     angle = np.degrees(np.arctan2(guides[:, 1], guides[:, 0])) % 90
     np.testing.assert_allclose(np.minimum(angle, 90 - angle), 22.5, atol=1e-6)
@@ -155,13 +157,13 @@ def test_maps_without_area_are_undefined():
     assert guides.any(axis=1).tolist() == [False] * 3 + [True] * 6
 
 
-def test_guides_of_several_kinds_go_together(error_of):
+def test_guides_of_several_kinds_are_combined(error_of):
     surface = torus(48, 24)
     vectors = np.zeros((surface.face_count, 3))
     vectors[5] = 3 * face_frames(surface)[0][5]
     edges = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
-    recipe = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
-    field = generate(surface, recipe, 4)
+    generator_settings = GeneratorSettings("guided", vectors=vectors, edges=edges[800:801])
+    field = generate(surface, generator_settings, 4)
     assert np.isclose(abs(dot(normalize(vectors[5]), field.vectors[5])), 1)
     assert (field.magnitude > 0.99).all()
     assert "no guides are given" in error_of(generate, surface, "guided", 4)
@@ -172,13 +174,17 @@ def test_guides_of_several_kinds_go_together(error_of):
 
 
 def moebius(columns=60, rows=6):
-    turn = np.arange(columns) * (2 * np.pi / columns)
-    across = np.linspace(-0.3, 0.3, rows + 1)[:, None]
-    out = 1 + across * np.cos(turn / 2)
-    points = np.stack([out * np.cos(turn), out * np.sin(turn), across * np.sin(turn / 2)], axis=-1)
-    here = np.arange(rows)[:, None] * columns + np.arange(columns - 1)
-    quads = np.stack([here, here + 1, here + columns + 1, here + columns], axis=-1).reshape(-1, 4)
-    # Where it comes round, bottom and top change places.
+    angle = np.arange(columns) * (2 * np.pi / columns)
+    offset = np.linspace(-0.3, 0.3, rows + 1)[:, None]
+    radius = 1 + offset * np.cos(angle / 2)
+    points = np.stack(
+        [radius * np.cos(angle), radius * np.sin(angle), offset * np.sin(angle / 2)], axis=-1
+    )
+    corner = np.arange(rows)[:, None] * columns + np.arange(columns - 1)
+    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=-1).reshape(
+        -1, 4
+    )
+    # At the end of the strip, bottom and top are exchanged.
     last = np.arange(rows) * columns + columns - 1
     first = (rows - np.arange(rows)) * columns
     closing = np.stack([last, first, first - columns, last + columns], axis=-1)
@@ -196,7 +202,7 @@ def test_a_moebius_strip_is_named():
     assert not orientation_warning(BALL)
 
 
-def test_flipped_faces_are_told_too():
+def test_flipped_faces_are_counted():
     corners = BALL.corner_vertex.reshape(-1, 3).copy()
     corners[7] = corners[7][::-1]
     surface = build_surface(BALL.vertices, corners, BALL.face_start)

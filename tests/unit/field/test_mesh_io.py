@@ -1,4 +1,4 @@
-"""Meshes from files: every format, and what is wrong with damaged ones."""
+"""Reading of meshes: every format, and the errors for damaged files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shapes import torus
 from rosy_addon.field.formats.stl import weld
 from rosy_addon.field.mesh_io import read_mesh
 
-# A square, and a triangle that stands on its side from 1 to 2.
+# A square, and a triangle on its edge from vertex 1 to vertex 2.
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
 FACES = [(0, 1, 2, 3), (2, 1, 4)]
 
@@ -133,7 +133,7 @@ def text_stl() -> bytes:
 
 
 @pytest.mark.parametrize("data", [binary_stl(), text_stl()], ids=["binary", "text"])
-def test_stl_corners_at_one_place_are_one_vertex(data, tmp_path):
+def test_stl_corners_at_the_same_position_are_one_vertex(data, tmp_path):
     (tmp_path / "a.stl").write_bytes(data)
     surface = read_mesh(tmp_path / "a.stl")
     assert len(surface.vertices) == 5
@@ -142,7 +142,7 @@ def test_stl_corners_at_one_place_are_one_vertex(data, tmp_path):
 
 
 @given(st.lists(st.tuples(*3 * [st.sampled_from([-1.0, -0.0, 0.0, 1e-300, 2.5])]), max_size=40))
-def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
+def test_weld_keeps_positions_and_removes_duplicates(points):
     points = np.array(points, dtype=float).reshape(-1, 3)
     vertices, index = weld(points)
     assert np.array_equal(vertices[index], points)
@@ -152,21 +152,21 @@ def test_weld_keeps_every_point_in_place_and_no_two_vertices_alike(points):
 
 
 @pytest.mark.slow
-def test_meshes_of_others(shared_data):
-    found = {
+def test_meshes_of_other_programs(shared_data):
+    counts = {
         path.name: (len(surface.vertices), surface.face_count)
         for path in sorted((shared_data / "meshes").iterdir())
         for surface in [read_mesh(path)]
     }
-    assert found["stanford-bunny.obj"][1] == 69451
-    assert found["spot.obj"][1] == 5856
-    assert found["cheburashka.off"] == (6669, 13334)
-    assert found["vase.off"] == (1274, 2404)
-    assert found["dome.off"] == (5000, 9635)
+    assert counts["stanford-bunny.obj"][1] == 69451
+    assert counts["spot.obj"][1] == 5856
+    assert counts["cheburashka.off"] == (6669, 13334)
+    assert counts["vase.off"] == (1274, 2404)
+    assert counts["dome.off"] == (5000, 9635)
 
 
 def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
-    # Three squares around z, a corner of 90 degrees and one of 45.
+    # Three squares with edges along z, at angles of 90 and 45 degrees.
     (tmp_path / "bent.off").write_text(
         "OFF 8 3 0\n0 0 0\n0 0 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1\n0 2 0\n0 2 1\n"
         "4 0 2 3 1\n4 2 4 5 3\n4 4 6 7 5\n"
@@ -225,14 +225,14 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_what_is_wrong_is_said_in_one_line(name, tmp_path, error_of):
-    data, wanted = DAMAGED[name]
+def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
+    data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
     tracemalloc.start()
     message = error_of(read_mesh, tmp_path / name)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert wanted in message
+    assert expected in message
     assert str(tmp_path / name) in message
     assert peak < 10e6, "a claim in a header must not be believed"
 
@@ -244,12 +244,12 @@ def test_missing_files_and_folders(tmp_path, error_of):
 
 
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
-def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, name, place):
+def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     from rosy_addon.errors import RosyError
 
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     data = FILES[name]
-    path.write_bytes(data[:place] + garbage + data[place + len(garbage) :])
+    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
         read_mesh(path)
     except RosyError as error:
@@ -257,17 +257,17 @@ def test_nothing_but_a_rosy_error_comes_of_damage(tmp_path_factory, garbage, nam
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9))
-def test_off_coordinates_are_read_to_the_last_bit(tmp_path_factory, numbers):
+def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path = tmp_path_factory.getbasetemp() / "exact.off"
     rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    with np.errstate(all="ignore"):  # such extremes overflow in the normal
+    with np.errstate(all="ignore"):  # normals overflow for extreme coordinates
         surface = read_mesh(path)
     assert surface.vertices.ravel().tolist() == numbers
 
 
 def test_a_torus_is_closed_when_read_from_stl(tmp_path):
-    """Welding leaves no seam: every edge of the triangles has two sides."""
+    """Equal corners become one vertex: every edge has two triangles."""
     from rosy_addon.field.singularities import euler_characteristic
 
     shape = torus(12, 8)

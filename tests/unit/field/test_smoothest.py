@@ -1,4 +1,4 @@
-"""Smoothest fields: closed forms, SciPy's solvers, invariances, and meshes that nobody wants."""
+"""Smoothest fields, against closed forms, SciPy and another library; awkward meshes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sparse
 from awkward import AWKWARD
 from conftest import long
-from field_helpers import MESHES, angles_apart, as_scipy, bumpy
+from field_helpers import MESHES, angle_differences, as_scipy, bumpy
 from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import eigsh, spsolve
 from scipy.spatial import ConvexHull
@@ -38,7 +38,7 @@ def random_sphere(count, seed=1):
 # --- matrices --------------------------------------------------------------------------------------
 
 
-def random_rows(rows, columns, seed):
+def random_matrix(rows, columns, seed):
     random = np.random.default_rng(seed)
     count = 4 * rows
     row = np.concatenate([np.arange(rows), random.integers(rows, size=count)])
@@ -48,7 +48,7 @@ def random_rows(rows, columns, seed):
 
 
 def test_products_of_sparse_matrices():
-    a, b = random_rows(60, 40, 0), random_rows(40, 25, 1)
+    a, b = random_matrix(60, 40, 0), random_matrix(40, 25, 1)
     dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
     np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
     vector = np.arange(40) * (1 + 2j)
@@ -56,23 +56,23 @@ def test_products_of_sparse_matrices():
 
 
 def test_the_adjoint():
-    a = random_rows(60, 20, 2)
+    a = random_matrix(60, 20, 2)
     np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
 @pytest.mark.parametrize("degree", [4, *long(1, 6)])
-def test_cycles_of_multigrid_approach_the_solution(degree):
+def test_multigrid_cycles_converge(degree):
     connection = build_connection(bumpy(icosphere(5)))
     matrix = laplacian(connection, degree, 0.1)
     levels = run_to_completion(hierarchy_task(matrix))
     assert len(levels) > 2
     right = np.random.default_rng(0).standard_normal(len(matrix)) + 0j
     expected = spsolve(as_scipy(matrix).tocsc(), right)
-    found = np.zeros_like(right)
+    actual = np.zeros_like(right)
     errors = []
     for _ in range(12):
-        found += w_cycle(levels, right - matrix @ found)
-        errors.append(np.linalg.norm(found - expected))
+        actual += w_cycle(levels, right - matrix @ actual)
+        errors.append(np.linalg.norm(actual - expected))
     assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
 
 
@@ -80,16 +80,18 @@ def test_cycles_of_multigrid_approach_the_solution(degree):
 
 
 @pytest.mark.parametrize("degree", [1, 4, 7])
-def test_a_constant_direction_in_the_plane_costs_nothing(degree):
+def test_a_constant_direction_in_the_plane_has_no_energy(degree):
     surface = plane(6)
     random = np.random.default_rng(3)
-    inside = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
-    moved = surface.vertices + inside[:, None] * (0.05, 0.05, 0) * random.standard_normal((1, 3))
+    is_interior = np.abs(surface.vertices).max(axis=1) < np.abs(surface.vertices).max() - 1e-9
+    moved = surface.vertices + is_interior[:, None] * (0.05, 0.05, 0) * random.standard_normal(
+        (1, 3)
+    )
     surface = build_surface(moved, surface.corner_vertex, surface.face_start)
     connection = build_connection(surface)
     edge = np.roll(surface.vertices[surface.triangle_vertex], -1, axis=1)
     edge = (edge - surface.vertices[surface.triangle_vertex]).reshape(-1, 3)
-    # In the map of a node the x axis lies as far from an edge as it does in the plane.
+    # The angle of an edge in the map of its node, relative to its angle in the plane.
     angle = connection.edge_direction - np.arctan2(edge[:, 1], edge[:, 0])
     z = np.empty(connection.node_count, dtype=complex)
     z[connection.corner_node] = np.exp(1j * degree * angle)
@@ -97,7 +99,7 @@ def test_a_constant_direction_in_the_plane_costs_nothing(degree):
     np.testing.assert_allclose(laplacian(connection, degree) @ z, 0, atol=1e-9)
 
 
-def test_vertices_where_umbrellas_meet_are_cut():
+def test_each_umbrella_of_a_vertex_is_a_node():
     bowtie = from_triangles(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0]], [[0, 1, 2], [0, 3, 4]]
     )
@@ -121,7 +123,7 @@ def simple_shapes():
     yield "torus", bumpy(torus(60, 30))
 
 
-def shapes_of_others():
+def shapes_of_other_programs():
     for name in ("spot.obj", "vase.off", "dome.off", "cheburashka.off", "stanford-bunny.obj"):
         if (MESHES / name).exists():
             yield name, read_mesh(MESHES / name)
@@ -129,31 +131,31 @@ def shapes_of_others():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 4])
-@pytest.mark.parametrize("shapes", [simple_shapes, *long(shapes_of_others)])
-def test_the_eigenvector_is_that_of_scipy(shapes, degree):
+@pytest.mark.parametrize("shapes", [simple_shapes, *long(shapes_of_other_programs)])
+def test_the_eigenvector_matches_scipy(shapes, degree):
     for name, surface in shapes():
         connection = build_connection(surface)
         z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
         below = -1e-6 / connection.mass.sum()
-        found, vectors = eigsh(
+        actual, vectors = eigsh(
             as_scipy(laplacian(connection, degree)),
             k=2,
             M=sparse.diags(connection.mass),
             sigma=below,
         )
-        order = np.argsort(found)  # of complex matrices they come in any
-        found, vectors = found[order], vectors[:, order]
-        assert energy[0] == pytest.approx(found[0], rel=1e-4), name
-        if found[1] > 1.03 * found[0]:
+        order = np.argsort(actual)  # for complex matrices they are not sorted
+        actual, vectors = actual[order], vectors[:, order]
+        assert energy[0] == pytest.approx(actual[0], rel=1e-4), name
+        if actual[1] > 1.03 * actual[0]:
             overlap = np.abs(np.vdot(vectors[:, 0], connection.mass * z))
             assert overlap / np.sqrt(connection.mass @ np.abs(z) ** 2) > 1 - 1e-5, name
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
-def test_the_field_of_another_library(degree):
-    """geometry-central's connection Laplacian, raised to N; it shares no code with this one.
+def test_the_field_matches_another_library(degree):
+    """The connection Laplacian of geometry-central, raised to N, has the same smallest eigenvector.
 
-    It flips edges to be Delaunay, and lays out borders differently: so a closed Delaunay mesh.
+    It flips edges to be Delaunay, and treats borders differently, so the mesh is closed and Delaunay.
     """
     potpourri3d = pytest.importorskip("potpourri3d")
     surface = bumpy(icosphere(4), 0.08, (1.0, 1.05, 1.1))
@@ -163,18 +165,18 @@ def test_the_field_of_another_library(degree):
     vertex = np.empty(connection.node_count, dtype=int)
     vertex[connection.corner_node] = triangles.ravel()
     solver = potpourri3d.MeshVectorHeatSolver(surface.vertices, triangles)
-    theirs = sparse.csr_matrix(solver.get_connection_laplacian())
-    here, there = vertex[connection.tail], vertex[connection.head]
-    entry = np.asarray(theirs[here, there]).ravel()
+    their_laplacian = sparse.csr_matrix(solver.get_connection_laplacian())
+    tail, head = vertex[connection.tail], vertex[connection.head]
+    entry = np.asarray(their_laplacian[tail, head]).ravel()
     np.testing.assert_allclose(np.abs(entry), connection.weight, rtol=1e-6)
 
-    # Their frames differ from these by an angle at each vertex, found along a tree of edges.
+    # Their frames differ from ours by an angle at each vertex, found along a tree of edges.
     count = connection.node_count
-    ends = np.concatenate([here, there]), np.concatenate([there, here])
-    turn = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
-    between = sparse.csr_matrix((np.concatenate([turn, turn.conj()]), ends), (count, count))
+    ends = np.concatenate([tail, head]), np.concatenate([head, tail])
+    ratio = -entry / np.abs(entry) * np.exp(-1j * connection.transport_angle)
+    differences = sparse.csr_matrix((np.concatenate([ratio, ratio.conj()]), ends), (count, count))
     frames = np.ones(count, dtype=complex)
-    order, before = breadth_first_order(abs(between), 0, directed=False)
+    order, predecessor = breadth_first_order(abs(differences), 0, directed=False)
     ours = sparse.csr_matrix(
         (
             np.exp(1j * np.concatenate([connection.transport_angle, -connection.transport_angle])),
@@ -182,80 +184,82 @@ def test_the_field_of_another_library(degree):
         ),
         (count, count),
     )
-    for one in order[1:]:
-        toward = ours[one, before[one]]
-        there_too = between[one, before[one]] * toward
-        frames[one] = there_too * frames[before[one]] * toward.conj()
-    carried = frames[here] * np.exp(1j * connection.transport_angle) * frames[there].conj()
-    np.testing.assert_allclose(-entry / np.abs(entry), carried, atol=1e-6)
+    for vertex_index in order[1:]:
+        our_transport = ours[vertex_index, predecessor[vertex_index]]
+        difference = differences[vertex_index, predecessor[vertex_index]] * our_transport
+        frames[vertex_index] = difference * frames[predecessor[vertex_index]] * our_transport.conj()
+    their_transport = frames[tail] * np.exp(1j * connection.transport_angle) * frames[head].conj()
+    np.testing.assert_allclose(-entry / np.abs(entry), their_transport, atol=1e-6)
 
-    turned = np.concatenate([carried**degree, carried.conj() ** degree])
+    raised_transport = np.concatenate([their_transport**degree, their_transport.conj() ** degree])
     weight = np.tile(np.abs(entry), 2)
-    raised = sparse.diags(theirs.diagonal()) - sparse.csr_matrix((weight * turned, ends))
+    raised = sparse.diags(their_laplacian.diagonal()) - sparse.csr_matrix(
+        (weight * raised_transport, ends)
+    )
     mass = np.empty(count)
     mass[vertex] = connection.mass
-    found, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
-    expected = vectors[:, np.argmin(found)]
+    actual, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
+    expected = vectors[:, np.argmin(actual)]
     z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
-    assert energy[0] == pytest.approx(found.min(), rel=1e-5)
-    mine = np.empty(count, dtype=complex)
-    mine[vertex] = z
-    apart = mine * frames**degree * expected.conj()
-    apart *= np.conj(apart.sum()) / abs(apart.sum())
-    # Close to singularities both are small, and their angles anything.
-    clear = np.abs(mine) > 0.02 * np.abs(mine).max()
+    assert energy[0] == pytest.approx(actual.min(), rel=1e-5)
+    our_z = np.empty(count, dtype=complex)
+    our_z[vertex] = z
+    z_ratio = our_z * frames**degree * expected.conj()
+    z_ratio *= np.conj(z_ratio.sum()) / abs(z_ratio.sum())
+    # Close to singularities both vectors are small, so their angles are arbitrary.
+    clear = np.abs(our_z) > 0.02 * np.abs(our_z).max()
     assert clear.mean() > 0.9
-    assert np.degrees(np.abs(np.angle(apart[clear]))).max() / degree < 1
+    assert np.degrees(np.abs(np.angle(z_ratio[clear]))).max() / degree < 1
 
 
 @pytest.mark.parametrize("degree", range(1, 13))
-def test_indices_add_up_to_the_euler_characteristic(degree):
+def test_indices_sum_to_the_euler_characteristic(degree):
     for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
         _, index = find_singularities(surface, smoothest_field(surface, degree))
         assert index.sum() == degree * euler_characteristic(surface)
 
 
 @pytest.mark.parametrize("degree", range(1, 7))
-def test_a_sphere_has_no_more_singularities_than_it_must(degree):
+def test_a_sphere_has_the_fewest_possible_singularities(degree):
     _, index = find_singularities(icosphere(4), smoothest_field(icosphere(4), degree))
     assert (index == 1).all()
     assert len(index) == 2 * degree
 
 
 @pytest.mark.parametrize("degree", [2, 4, 5])
-def test_the_field_does_not_depend_on_numbers_or_place(degree):
+def test_the_field_does_not_depend_on_numbering_or_position(degree):
     surface = bumpy(icosphere(3))
     expected = smoothest_field(surface, degree).vectors
     triangles = surface.corner_vertex.reshape(-1, 3)
 
     order = np.random.default_rng(5).permutation(len(surface.vertices))
-    place = np.argsort(order)
-    renumbered = from_triangles(surface.vertices[order], place[triangles])
-    found = smoothest_field(renumbered, degree).vectors
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    new_index = np.argsort(order)
+    renumbered = from_triangles(surface.vertices[order], new_index[triangles])
+    actual = smoothest_field(renumbered, degree).vectors
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
-    turned = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
-    found = smoothest_field(turned, degree).vectors
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    rolled = from_triangles(surface.vertices, np.roll(triangles, 1, axis=1))
+    actual = smoothest_field(rolled, degree).vectors
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
     rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
     moved = from_triangles(3 * surface.vertices @ rotation.T + (1, 2, 3), triangles)
-    found = smoothest_field(moved, degree).vectors @ rotation
-    assert angles_apart(surface, found, expected, degree).max() < 1e-5
+    actual = smoothest_field(moved, degree).vectors @ rotation
+    assert angle_differences(surface, actual, expected, degree).max() < 1e-5
 
 
-def test_each_piece_has_its_own():
-    one, other = bumpy(icosphere(3)), bumpy(torus(24, 12))
-    points = np.concatenate([one.vertices, 0.3 * other.vertices + 5])
-    corners = np.concatenate([one.corner_vertex, other.corner_vertex + len(one.vertices)])
-    starts = np.concatenate([one.face_start, other.face_start[1:] + one.face_start[-1]])
+def test_each_component_has_its_own_field():
+    first, second = bumpy(icosphere(3)), bumpy(torus(24, 12))
+    points = np.concatenate([first.vertices, 0.3 * second.vertices + 5])
+    corners = np.concatenate([first.corner_vertex, second.corner_vertex + len(first.vertices)])
+    starts = np.concatenate([first.face_start, second.face_start[1:] + first.face_start[-1]])
     both = build_connection(build_surface(points, corners, starts))
     _, energy = run_to_completion(smallest_eigenvectors_task(both, 4))
-    alone = [
+    separately = [
         run_to_completion(smallest_eigenvectors_task(build_connection(surface), 4))[1][0]
-        for surface in (one, other)
+        for surface in (first, second)
     ]
-    np.testing.assert_allclose(energy, [alone[0], alone[1] / 0.09], rtol=1e-4)
+    np.testing.assert_allclose(energy, [separately[0], separately[1] / 0.09], rtol=1e-4)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4, 12])
@@ -277,7 +281,7 @@ def test_no_area_at_all_is_an_error():
         smoothest_field(flat, 4)
 
 
-def test_progress_never_steps_back():
+def test_progress_never_decreases():
     fractions = [step.fraction for step in smoothest_task(icosphere(4), 4)]
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1

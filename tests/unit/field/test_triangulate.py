@@ -1,4 +1,4 @@
-"""Polygons cut into triangles that fill them once, convex or not."""
+"""Triangles of convex and concave polygons, which must cover each polygon exactly once."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ pytestmark = pytest.mark.filterwarnings("error")
 seeds = st.integers(0, 2**32 - 1)
 
 
-def cut(*polygons):
-    """Triangles, their faces and the points of some (k, 2 or 3) polygons."""
+def triangulate_polygons(*polygons):
+    """Triangulate (k, 2) or (k, 3) polygons; return the points, the triangles and their faces."""
     polygons = [np.asarray(p, dtype=float) for p in polygons]
     polygons = [np.pad(p, ((0, 0), (0, 3 - p.shape[1]))) for p in polygons]
     points = np.concatenate(polygons)
@@ -38,12 +38,12 @@ def polygon_area(points):
 
 
 def assert_filled(polygon):
-    """All triangles wind as the polygon does, and their areas add up: so none lies outside."""
-    points, triangles, _ = cut(polygon)
+    """Check that all triangles wind like the polygon and that their areas sum to its area."""
+    points, triangles, _ = triangulate_polygons(polygon)
     areas = signed_areas(points, triangles)
-    whole = polygon_area(np.asarray(polygon, dtype=float))
-    assert (areas * np.sign(whole) > 0).all()
-    assert areas.sum() == pytest.approx(whole)
+    area = polygon_area(np.asarray(polygon, dtype=float))
+    assert (areas * np.sign(area) > 0).all()
+    assert areas.sum() == pytest.approx(area)
 
 
 def star(random, corners):
@@ -62,7 +62,7 @@ def test_star_shaped_polygons_are_filled(seed, corners, backward):
 
 
 @pytest.mark.parametrize("turn", range(4))
-def test_a_concave_quadrangle_is_cut_at_its_reflex_corner(turn):
+def test_a_concave_quadrangle_is_split_at_its_reflex_corner(turn):
     assert_filled(np.roll([(0, 0), (3, 1), (0, 2), (1, 1.0)], turn, axis=0))
 
 
@@ -101,7 +101,7 @@ def test_a_comb_and_a_spiral(turn):
 
 
 @pytest.mark.parametrize("turn", range(8))
-def test_corners_in_a_line_give_no_triangle_without_area(turn):
+def test_collinear_corners_cause_no_triangle_without_area(turn):
     assert_filled(np.roll([(0, 0), (1, 0), (2, 0), (1, 2)], turn, axis=0))
     assert_filled(np.roll([(0, 0), (1, 0), (2, 0), (2, 2), (0, 2)], turn, axis=0))
     assert_filled(
@@ -113,7 +113,7 @@ def test_convex_faces_are_fans_around_their_first_corner():
     angle = np.arange(6) * np.pi / 3
     hexagon = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    _, triangles, face = cut(square, hexagon, square[:3])
+    _, triangles, face = triangulate_polygons(square, hexagon, square[:3])
     assert triangles.tolist() == [
         *([0, 1, 2], [0, 2, 3]),
         *([4, 5, 6], [4, 6, 7], [4, 7, 8], [4, 8, 9]),
@@ -124,14 +124,14 @@ def test_convex_faces_are_fans_around_their_first_corner():
 
 @settings(max_examples=20)
 @given(seeds)
-def test_a_polygon_in_space_is_cut_as_in_the_plane(seed):
-    """Turned anywhere, moved far away, and a little out of its plane."""
+def test_a_polygon_in_space_is_split_as_in_the_plane(seed):
+    """A polygon that is rotated, far from the origin, and not quite planar."""
     random = np.random.default_rng(seed)
     flat = np.pad(star(random, 9), ((0, 0), (0, 1)))
     bumpy = flat + [0, 0, 1] * random.normal(size=(9, 1)) * 0.01
     q, _ = np.linalg.qr(random.normal(size=(3, 3)))
     q *= np.sign(np.linalg.det(q))
-    _, triangles, _ = cut(bumpy @ q.T + 100 * random.normal(size=3))
+    _, triangles, _ = triangulate_polygons(bumpy @ q.T + 100 * random.normal(size=3))
     areas = signed_areas(flat, triangles)
     assert (areas > 0).all()
     assert areas.sum() == pytest.approx(polygon_area(flat))
@@ -140,14 +140,16 @@ def test_a_polygon_in_space_is_cut_as_in_the_plane(seed):
 def test_a_mixed_mesh_keeps_its_order():
     random = np.random.default_rng(0)
     polygons = [star(random, k) for k in (3, 7, 4, 12, 5, 4, 3, 9)]
-    points, triangles, face = cut(*polygons)
+    points, triangles, face = triangulate_polygons(*polygons)
     areas = signed_areas(points, triangles)
     assert (areas > 0).all()
     expected = [polygon_area(p) for p in polygons]
     np.testing.assert_allclose(np.bincount(face, weights=areas), expected)
 
 
-def test_faces_without_area_or_that_cross_themselves_are_cut_somehow():
+def test_degenerate_and_self_intersecting_faces_are_split():
     bow_tie = [(0, 0), (1, 1), (1, 0), (0, 1)]
     pentagram = [(np.cos(a), np.sin(a)) for a in np.arange(5) * 0.8 * np.pi]
-    cut(bow_tie, pentagram, np.zeros((4, 2)), np.zeros((7, 2)), [(t, t) for t in range(6)])
+    triangulate_polygons(
+        bow_tie, pentagram, np.zeros((4, 2)), np.zeros((7, 2)), [(t, t) for t in range(6)]
+    )

@@ -1,4 +1,4 @@
-"""Ambient occlusion beside what is known in closed form."""
+"""Ambient occlusion against closed forms."""
 
 from __future__ import annotations
 
@@ -14,98 +14,98 @@ from rosy_addon.projection.gbuffer import MeshInstance
 pytestmark = pytest.mark.slow
 
 
-def at(surface, *shift):
+def instance_at(surface, *translation):
     matrix = np.eye(4)
-    matrix[:3, 3] = shift or (0, 0, 0)
+    matrix[:3, 3] = translation or (0, 0, 0)
     return MeshInstance(surface, matrix)
 
 
-def of_vertices(surface, values):
-    """A value of each vertex, one of those of its corners."""
-    found = np.empty(len(surface.vertices))
-    found[surface.corner_vertex] = values
-    return found
+def values_at_vertices(surface, values):
+    """(V,) values of vertices, from one corner of each."""
+    actual = np.empty(len(surface.vertices))
+    actual[surface.corner_vertex] = values
+    return actual
 
 
 def trough(cells=24, size=4.0, sharp=True, angle=np.pi / 2):
-    """A floor (z = 0, y > 0) and a wall at an angle to it, long in x; (V,) how far from the edge."""
+    """A floor (z = 0, y > 0) and a wall at an angle, long in x; (V,) distances from the edge."""
     x = np.linspace(-3 * size, 3 * size, 3 * cells + 1)
-    along = np.linspace(0, size, cells + 1)
-    along = np.concatenate([-along[:0:-1], along])
-    up = np.maximum(-along, 0)
-    y, z = np.maximum(along, 0) + up * np.cos(angle), up * np.sin(angle)
-    points = [np.repeat(x, len(along)), np.tile(y, len(x)), np.tile(z, len(x))]
+    edge_distance = np.linspace(0, size, cells + 1)
+    edge_distance = np.concatenate([-edge_distance[:0:-1], edge_distance])
+    wall_height = np.maximum(-edge_distance, 0)
+    y, z = np.maximum(edge_distance, 0) + wall_height * np.cos(angle), wall_height * np.sin(angle)
+    points = [np.repeat(x, len(edge_distance)), np.tile(y, len(x)), np.tile(z, len(x))]
     quads, _ = grid_of_quads(3 * cells, 2 * cells, False, False)
     bend = 0.5 if sharp else None
     surface = from_quads(np.stack(points, axis=1), quads, name="trough", sharp_angle=bend)
-    return surface, np.tile(along, len(x))
+    return surface, np.tile(edge_distance, len(x))
 
 
-def test_directions_are_even():
-    """They have the moments of the sphere: mean 0, and 1/3 of the identity."""
-    found = fibonacci_sphere(256)
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1)
-    np.testing.assert_allclose(found.mean(axis=0), 0, atol=5e-3)
-    np.testing.assert_allclose(found.T @ found / 256, np.eye(3) / 3, atol=5e-3)
+def test_directions_are_evenly_spread():
+    """The directions have the moments of the sphere: mean 0, covariance 1/3 of the identity."""
+    actual = fibonacci_sphere(256)
+    np.testing.assert_allclose(np.linalg.norm(actual, axis=1), 1)
+    np.testing.assert_allclose(actual.mean(axis=0), 0, atol=5e-3)
+    np.testing.assert_allclose(actual.T @ actual / 256, np.eye(3) / 3, atol=5e-3)
 
 
 @pytest.mark.parametrize("scale", [0.01, 1.0, 300.0])
-def test_nothing_hides_the_sky_from_a_ball(scale):
+def test_a_sphere_is_fully_open(scale):
     instance = MeshInstance(icosphere(3), np.diag([scale, scale, scale, 1.0]))
     np.testing.assert_allclose(ambient_occlusion([instance], 0, 64, 256), 1, atol=0.005)
 
 
-def test_a_corner_of_two_planes():
-    """A wall of height h at distance d leaves 1/2 + cos(atan(h/d))/2 of the sky: in the edge, half."""
-    surface, along = trough()
-    found = of_vertices(surface, ambient_occlusion([at(surface)], 0))
-    middle = np.abs(surface.vertices[:, 0]) < 1
+def test_a_floor_beside_a_wall():
+    """A wall of height h at distance d leaves 1/2 + cos(atan(h/d))/2 open; at the edge, half."""
+    surface, edge_distance = trough()
+    actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
+    is_central = np.abs(surface.vertices[:, 0]) < 1
     for distance, tolerance in ((0.0, 0.02), (0.5, 0.02), (1.0, 0.015), (2.0, 0.015)):
-        own = middle & (np.abs(np.abs(along) - distance) < 0.05)
-        wanted = 0.5 + 0.5 * distance / np.hypot(distance, 4.0)
-        assert found[own].mean() == pytest.approx(wanted, abs=tolerance)
-        assert found[own].std() < 0.01
+        selected = is_central & (np.abs(np.abs(edge_distance) - distance) < 0.05)
+        expected = 0.5 + 0.5 * distance / np.hypot(distance, 4.0)
+        assert actual[selected].mean() == pytest.approx(expected, abs=tolerance)
+        assert actual[selected].std() < 0.01
 
 
 @pytest.mark.parametrize("degrees", [60, 150, *long(90, 135)])
-def test_in_the_edge_of_two_planes(degrees):
-    """They leave each other 1/2 - cos(angle)/2, also where the point is on both of them."""
+def test_the_edge_of_two_planes(degrees):
+    """At the edge, 1/2 - cos(angle)/2 is open for both planes."""
     angle = np.radians(degrees)
-    surface, along = trough(2, angle=angle)
-    found = ambient_occlusion([at(surface)], 0)
-    edge = (np.abs(surface.vertices[:, 0]) < 5) & (along == 0)
-    own = found[edge[surface.corner_vertex]]
-    assert own.mean() == pytest.approx(0.5 - 0.5 * np.cos(angle), abs=0.05)
+    surface, edge_distance = trough(2, angle=angle)
+    actual = ambient_occlusion([instance_at(surface)], 0)
+    edge = (np.abs(surface.vertices[:, 0]) < 5) & (edge_distance == 0)
+    edge_values = actual[edge[surface.corner_vertex]]
+    assert edge_values.mean() == pytest.approx(0.5 - 0.5 * np.cos(angle), abs=0.05)
 
 
-def test_a_smooth_corner_looks_out_of_it():
-    """Where the two mix, normals are between: a wedge of a right angle around one leaves sin 45."""
-    surface, along = trough(sharp=False)
-    found = of_vertices(surface, ambient_occlusion([at(surface)], 0))
-    own = (np.abs(surface.vertices[:, 0]) < 1) & (along == 0)
-    assert found[own].mean() == pytest.approx(np.sqrt(0.5), abs=0.02)
+def test_the_smooth_edge_of_two_planes():
+    """The normal bisects the open wedge of 90 degrees, whose visibility is sin 45."""
+    surface, edge_distance = trough(sharp=False)
+    actual = values_at_vertices(surface, ambient_occlusion([instance_at(surface)], 0))
+    selected = (np.abs(surface.vertices[:, 0]) < 1) & (edge_distance == 0)
+    assert actual[selected].mean() == pytest.approx(np.sqrt(0.5), abs=0.02)
 
 
-def test_a_plane_beneath_a_ball():
+def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
     ground, ball = plane(24, 24, 6.0), icosphere(4)
-    instances = [at(ground), at(ball, 0, 0, 1.6)]
-    found = of_vertices(ground, ambient_occlusion(instances, 0, 600, 400))
-    away = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
-    wanted = 1 - 1.6 / away**3
-    assert wanted.min() < 0.65
-    assert np.abs(found - wanted).mean() < 0.006
-    assert np.abs(found - wanted).max() < 0.05
+    instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
+    actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 600, 400))
+    distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
+    expected = 1 - 1.6 / distance**3
+    assert expected.min() < 0.65
+    assert np.abs(actual - expected).mean() < 0.006
+    assert np.abs(actual - expected).max() < 0.05
 
 
 @pytest.mark.long
-def test_turned_and_moved_it_is_the_same():
+def test_occlusion_does_not_depend_on_rotation_and_translation():
     surface, _ = trough(8)
-    turned = np.array([[0, 0, 1.0, 5], [1, 0, 0, -3], [0, 1, 0, 9], [0, 0, 0, 1]])
-    here = ambient_occlusion([at(surface)], 0, 512, 256)
-    there = ambient_occlusion([MeshInstance(surface, turned)], 0, 512, 256)
-    assert np.abs(here - there).mean() < 0.01
+    matrix = np.array([[0, 0, 1.0, 5], [1, 0, 0, -3], [0, 1, 0, 9], [0, 0, 0, 1]])
+    original = ambient_occlusion([instance_at(surface)], 0, 512, 256)
+    moved = ambient_occlusion([MeshInstance(surface, matrix)], 0, 512, 256)
+    assert np.abs(original - moved).mean() < 0.01
 
 
-def test_no_directions(error_of):
-    assert "directions" in error_of(ambient_occlusion, [at(icosphere(1))], 0, 0)
+def test_zero_directions_are_refused(error_of):
+    assert "directions" in error_of(ambient_occlusion, [instance_at(icosphere(1))], 0, 0)

@@ -1,4 +1,4 @@
-"""Cameras: lenses as in Blender, framing, and what is refused."""
+"""Cameras: lenses as in Blender, framing, and errors."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from rosy_addon.projection.camera import (
 angles = st.floats(-400, 400)
 
 
-def in_frame(camera, points):
-    """(V, 3) normalised device coordinates."""
+def device_coordinates(camera, points):
+    """(V, 3) normalized device coordinates."""
     view = points @ camera.view[:3, :3].T + camera.view[:3, 3]
     clip = view @ camera.projection[:, :3].T + camera.projection[:, 3]
     assert (clip[:, 3] > 0).all()
@@ -40,7 +40,7 @@ def in_frame(camera, points):
         (0, -90, (1, 0, 0), (0, -1, 0), (0, 0, -1)),  # bottom
     ],
 )
-def test_view_directions_are_blenders(azimuth, elevation, right, up, back):
+def test_view_directions_match_blender(azimuth, elevation, right, up, back):
     np.testing.assert_allclose(orbit_basis(azimuth, elevation), [right, up, back], atol=1e-12)
 
 
@@ -55,10 +55,10 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     random = np.random.default_rng(seed)
     points = random.normal(size=(20, 3)) * random.uniform(0.01, 100, 3) + random.normal(size=3) * 50
     camera = orbit_camera(points, azimuth, elevation, *size, perspective=perspective, margin=0.05)
-    ndc = in_frame(camera, points)
+    ndc = device_coordinates(camera, points)
     assert np.abs(ndc[:, :2]).max() <= 0.9 + 1e-6
     assert np.abs(ndc[:, 2]).max() < 1
-    # As large as fits: along one side of the frame both margins are touched, unless the eye would
+    # As large as possible: the points touch both margins in one direction, unless the eye would
     # then be among the points.
     low, high = ndc[:, :2].min(axis=0), ndc[:, :2].max(axis=0)
     touched = (np.isclose(low, -0.9, atol=1e-6) & np.isclose(high, 0.9, atol=1e-6)).any()
@@ -66,7 +66,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
     assert touched or depth.min() < 2e-3 * np.ptp(points, axis=0).max()
 
 
-def test_framing_takes_surfaces_and_ignores_loose_vertices():
+def test_framing_ignores_loose_vertices():
     ball = icosphere(2)
     loose = type(ball)(
         **{
@@ -74,18 +74,18 @@ def test_framing_takes_surfaces_and_ignores_loose_vertices():
             "vertices": np.concatenate([ball.vertices, [[100.0, 0, 0]]]),
         }
     )
-    one, two = (orbit_camera(s, 10, 20, 50, 50) for s in (ball, [loose, ball]))
-    assert (one.view == two.view).all()
+    first, second = (orbit_camera(s, 10, 20, 50, 50) for s in (ball, [loose, ball]))
+    assert (first.view == second.view).all()
 
 
 @pytest.mark.parametrize("perspective", [True, False])
 def test_a_single_point_can_be_framed(perspective):
     camera = orbit_camera(np.zeros((1, 3)), 0, 0, 10, 10, perspective=perspective)
-    np.testing.assert_allclose(in_frame(camera, np.zeros((1, 3)))[0, :2], 0, atol=1e-9)
+    np.testing.assert_allclose(device_coordinates(camera, np.zeros((1, 3)))[0, :2], 0, atol=1e-9)
 
 
 def test_blenders_default_lens():
-    """50 mm on 36 mm at 1920 x 1080, from Blender's calc_matrix_camera."""
+    """50 mm on 36 mm at 1920 x 1080; expected values are from Blender's calc_matrix_camera."""
     camera = perspective_camera(np.eye(4), 1920, 1080, clip=(0.1, 100))
     expected = [
         [2.7777777, 0, 0, 0],
@@ -108,12 +108,14 @@ def test_orthographic_scale_spans_the_longer_side():
 
 
 @pytest.mark.parametrize("make", [perspective_camera, orthographic_camera])
-def test_pixel_rays_go_through_pixel_centres(make):
+def test_pixel_rays_go_through_pixel_centers(make):
     camera = make(np.eye(4), 31, 17, shift=(0.2, -0.3))
     pixel = np.arange(31 * 17)
     x, y = pixel_rays(camera, pixel)
     depth = 3.0 if camera.is_perspective else 1.0
-    ndc = in_frame(camera, np.stack([depth * x, depth * y, np.full(x.shape, -3.0)], axis=1))
+    ndc = device_coordinates(
+        camera, np.stack([depth * x, depth * y, np.full(x.shape, -3.0)], axis=1)
+    )
     np.testing.assert_allclose((ndc[:, 0] + 1) * 15.5, pixel % 31 + 0.5)
     np.testing.assert_allclose((ndc[:, 1] + 1) * 8.5, pixel // 31 + 0.5)
 
@@ -122,16 +124,16 @@ def test_a_shift_moves_the_picture_as_in_blender():
     """With the lens shifted right by half of the longer side, the axis is at the left border."""
     for make in (perspective_camera, orthographic_camera):
         camera = make(np.eye(4), 40, 20, shift=(0.5, 0.25))
-        np.testing.assert_allclose(in_frame(camera, np.array([[0, 0, -5.0]]))[0, :2], -1)
+        np.testing.assert_allclose(device_coordinates(camera, np.array([[0, 0, -5.0]]))[0, :2], -1)
 
 
-def test_a_scaled_projection_means_the_same():
+def test_the_scale_of_a_projection_does_not_matter():
     plain = perspective_camera(np.eye(4), 20, 20)
     scaled = Camera(np.eye(4), 7 * plain.projection, 20, 20)
     np.testing.assert_allclose(scaled.projection, plain.projection)
 
 
-def test_look_at_looks_at():
+def test_look_at():
     view = look_at((3, 4, 5), (1, 1, 1))
     np.testing.assert_allclose(view @ (1, 1, 1, 1), (0, 0, -np.sqrt(29), 1), atol=1e-12)
     above = view @ (1, 1, 2, 1)
@@ -139,7 +141,7 @@ def test_look_at_looks_at():
     assert above[1] > 0
 
 
-def bad(view=None, projection=None, size=(10, 10)):
+def make_camera(view=None, projection=None, size=(10, 10)):
     good = perspective_camera(np.eye(4), 10, 10)
     return Camera(
         good.view if view is None else view,
@@ -165,7 +167,7 @@ def bad(view=None, projection=None, size=(10, 10)):
 )
 def test_impossible_cameras_are_refused(settings, message):
     with pytest.raises(RosyError, match=message):
-        bad(**settings)
+        make_camera(**settings)
 
 
 @pytest.mark.parametrize(

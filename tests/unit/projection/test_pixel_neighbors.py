@@ -1,4 +1,4 @@
-"""Where streamlines may step: smooth surfaces stay whole, silhouettes and creases cut."""
+"""Links between pixels: smooth surfaces are continuous, silhouettes and creases separate pixels."""
 
 from __future__ import annotations
 
@@ -10,30 +10,31 @@ from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import neighbor_masks, project
+from rosy_addon.projection.pixel_neighbors import neighbor_masks
+from rosy_addon.projection.project import project
 
 pytestmark = pytest.mark.filterwarnings("error")
 
-ALL = np.pi
+NO_CREASE = np.pi
 OFFSETS = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
 
 
-def ones(surface):
+def constant_field(surface):
     return RosyField(4, np.tile([1.0, 0.3, 0.2], (surface.face_count, 1)))
 
 
-def shown(surfaces, camera, shifts=None):
+def project_surfaces(surfaces, camera, shifts=None):
     shifts = np.zeros((len(surfaces), 3)) if shifts is None else np.asarray(shifts, dtype=float)
     instances = []
     for surface, shift in zip(surfaces, shifts, strict=True):
         matrix = np.eye(4)
         matrix[:3, 3] = shift
-        instances.append(MeshInstance(surface, matrix, ones(surface)))
+        instances.append(MeshInstance(surface, matrix, constant_field(surface)))
     return project(instances, camera)
 
 
-def above(width=200, scale=4.0, perspective=False, eye=(0, 0, 6), up=(0, 1, 0)):
-    """A camera 6 away from the origin, that sees `scale` units there."""
+def camera_above(width=200, scale=4.0, perspective=False, eye=(0, 0, 6), up=(0, 1, 0)):
+    """A camera at distance 6 from the origin whose frame is `scale` units wide there."""
     view = look_at(eye, (0, 0, 0), up)
     if perspective:
         fov = 2 * np.arctan(scale / 12)
@@ -41,71 +42,71 @@ def above(width=200, scale=4.0, perspective=False, eye=(0, 0, 6), up=(0, 1, 0)):
     return orthographic_camera(view, width, width, scale=scale, clip=(0.01, 100))
 
 
-def pairs(buffer, bits):
-    """(K, 2) covered neighbours here and there, and (K,) whether they are linked."""
-    width, height = buffer.camera.width, buffer.camera.height
+def neighbor_pairs(gbuffer, masks):
+    """(K, 2) pairs of neighboring covered pixels, and (K,) whether they are linked."""
+    width, height = gbuffer.camera.width, gbuffer.camera.height
     entry = np.full((height + 2, width + 2), -1)
-    row, column = np.divmod(buffer.pixel, width)
+    row, column = np.divmod(gbuffer.pixel, width)
     entry[row + 1, column + 1] = np.arange(len(row))
-    found, linked = [], []
+    pairs, linked = [], []
     for bit, (dx, dy) in enumerate(OFFSETS):
-        there = entry[row + 1 + dy, column + 1 + dx]
-        covered = np.flatnonzero(there >= 0)
-        found.append(np.stack([covered, there[covered]], axis=1))
-        linked.append(bits[covered] >> bit & 1 == 1)
-        assert not (bits[there < 0] >> bit & 1).any()
-    return np.concatenate(found), np.concatenate(linked)
+        neighbor = entry[row + 1 + dy, column + 1 + dx]
+        covered = np.flatnonzero(neighbor >= 0)
+        pairs.append(np.stack([covered, neighbor[covered]], axis=1))
+        linked.append(masks[covered] >> bit & 1 == 1)
+        assert not (masks[neighbor < 0] >> bit & 1).any()
+    return np.concatenate(pairs), np.concatenate(linked)
 
 
-def cut_share(buffer, crease_angle=ALL, cross=True):
-    _, linked = pairs(buffer, neighbor_masks(buffer, crease_angle, cross))
+def unlinked_fraction(gbuffer, crease_angle=NO_CREASE, cross=True):
+    _, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, crease_angle, cross))
     return 1 - linked.mean()
 
 
 @pytest.mark.parametrize("perspective", [False, True])
 @pytest.mark.parametrize("tilt", [0, 45, 80, 85, 87])
 @pytest.mark.parametrize("roll", [0, 33])
-def test_a_tilted_plane_is_whole(perspective, tilt, roll):
+def test_a_tilted_plane_is_continuous(perspective, tilt, roll):
     t, r = np.radians([tilt, roll])
     eye = 6 * np.array([np.sin(t) * np.sin(r), -np.sin(t) * np.cos(r), np.cos(t)])
-    camera = above(perspective=perspective, eye=eye)
-    buffer = shown([plane(7, 5)], camera)
-    assert len(buffer.pixel) > 200
-    assert cut_share(buffer, 0.01, False) == 0
+    camera = camera_above(perspective=perspective, eye=eye)
+    gbuffer = project_surfaces([plane(7, 5)], camera)
+    assert len(gbuffer.pixel) > 200
+    assert unlinked_fraction(gbuffer, 0.01, False) == 0
 
 
 @pytest.mark.parametrize("perspective", [False, True])
 @pytest.mark.parametrize("radius", [4, 12, 40, 90])
-def test_spheres_are_whole(perspective, radius):
-    """Of some pixels' radius, up to the silhouette where the surface is seen edge-on."""
-    camera = above(200, 200 / radius, perspective)
-    buffer = shown([icosphere(5)], camera)
-    assert cut_share(buffer) == 0
-    assert cut_share(buffer, 1.3, False) < 0.002
+def test_spheres_are_continuous(perspective, radius):
+    """Spheres of a radius in pixels, up to the silhouette, where the surface is seen edge-on."""
+    camera = camera_above(200, 200 / radius, perspective)
+    gbuffer = project_surfaces([icosphere(5)], camera)
+    assert unlinked_fraction(gbuffer) == 0
+    assert unlinked_fraction(gbuffer, 1.3, False) < 0.002
 
 
 @pytest.mark.parametrize(("perspective", "height"), [(False, 1.0), (True, 0.4)])
-def test_an_uneven_surface_is_whole(perspective, height):
-    """Waves up to 80 degrees steep, seen from above: no inflection is taken for a silhouette.
+def test_an_uneven_surface_is_continuous(perspective, height):
+    """Waves of up to 80 degrees, seen from above: inflections do not count as silhouettes.
 
-    Under perspective they are less steep, for the border would have silhouettes.
+    Under perspective they are less steep, because there would be silhouettes near the border.
     """
     surface = plane(300, 300, 4.0)
     x, y, _ = surface.vertices.T
     z = height * (0.5 * np.sin(6 * x + 2 * y) + 0.3 * np.sin(9 * y - 1))
     waves = from_quads(np.stack([x, y, z], axis=1), surface.corner_vertex.reshape(-1, 4))
-    assert cut_share(shown([waves], above(250, 3.6, perspective))) == 0
+    assert unlinked_fraction(project_surfaces([waves], camera_above(250, 3.6, perspective))) == 0
 
 
 @pytest.mark.parametrize("perspective", [False, True])
-def test_a_tube_before_its_far_side_is_cut_off(perspective):
-    """A torus seen over its near side: no link jumps from the near tube to the far one."""
-    camera = above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
+def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
+    """A torus seen over its near side: the near tube is not linked to the far one."""
+    camera = camera_above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
     surface = torus(200, 100)
-    buffer = shown([surface], camera)
-    here_there, linked = pairs(buffer, neighbor_masks(buffer, ALL, True))
-    here, there = here_there.T
-    jump = np.abs(buffer.position[here, 2] - buffer.position[there, 2])
+    gbuffer = project_surfaces([surface], camera)
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    first, second = pairs.T
+    jump = np.abs(gbuffer.position[first, 2] - gbuffer.position[second, 2])
     far = jump > 0.5
     assert far.sum() > 100
     assert not linked[far].any()
@@ -115,101 +116,105 @@ def test_a_tube_before_its_far_side_is_cut_off(perspective):
 
 @pytest.mark.parametrize("perspective", [False, True])
 @pytest.mark.parametrize("tilt", [0, 40, 60, 75, 80])
-@pytest.mark.parametrize("same_body", [False, True])
-def test_parallel_sheets_are_cut_apart(perspective, tilt, same_body):
-    """One sheet over the half of another, two pixels above it."""
+@pytest.mark.parametrize("same_instance", [False, True])
+def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
+    """A sheet partly covered by another one, two pixels above it."""
     t = np.radians(tilt)
-    camera = above(200, 4.0, perspective, eye=(0, -6 * np.sin(t), 6 * np.cos(t)))
+    camera = camera_above(200, 4.0, perspective, eye=(0, -6 * np.sin(t), 6 * np.cos(t)))
     low, high = plane(3, 3, 6.0), plane(2, 2, 1.0)
     gap = np.array([0, 0, 2 * 4.0 / 200])
-    if same_body:
+    if same_instance:
         vertices = np.concatenate([low.vertices, high.vertices + gap])
         quads = np.concatenate([low.corner_vertex, high.corner_vertex + len(low.vertices)])
-        buffer = shown([from_quads(vertices, quads.reshape(-1, 4))], camera)
-        upper = buffer.face >= low.face_count
+        gbuffer = project_surfaces([from_quads(vertices, quads.reshape(-1, 4))], camera)
+        upper = gbuffer.face >= low.face_count
     else:
-        buffer = shown([low, high], camera, [np.zeros(3), gap])
-        upper = buffer.instance_id == 1
+        gbuffer = project_surfaces([low, high], camera, [np.zeros(3), gap])
+        upper = gbuffer.instance_id == 1
     assert 100 < upper.sum() < len(upper) - 100
-    found, linked = pairs(buffer, neighbor_masks(buffer, ALL, True))
-    across = upper[found[:, 0]] != upper[found[:, 1]]
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    across = upper[pairs[:, 0]] != upper[pairs[:, 1]]
     assert across.sum() > 100
     assert not linked[across].any()
     assert linked[~across].all()
 
 
-def test_the_rim_of_a_bowl_is_cut():
-    """The outside in front, the inside behind it: no step over the rim."""
+def test_the_rim_of_a_bowl_is_a_silhouette():
+    """The outside of the near wall and the inside of the far wall are not linked at the rim."""
     ball = icosphere(4)
     triangles = ball.corner_vertex.reshape(-1, 3)
     bowl = from_triangles(ball.vertices, triangles[ball.face_center[:, 2] < 0.2])
-    buffer = shown([bowl], above(200, 2.4, eye=(0, -5, 2.5), up=(0, 0, 1)))
-    found, linked = pairs(buffer, neighbor_masks(buffer, ALL, True))
-    front = buffer.front_facing
+    gbuffer = project_surfaces([bowl], camera_above(200, 2.4, eye=(0, -5, 2.5), up=(0, 0, 1)))
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    front = gbuffer.front_facing
     assert 0.1 < front.mean() < 0.9
-    over = front[found[:, 0]] != front[found[:, 1]]
-    assert over.sum() > 100
-    assert not linked[over].any()
-    assert linked[~over].mean() > 0.999
+    across_rim = front[pairs[:, 0]] != front[pairs[:, 1]]
+    assert across_rim.sum() > 100
+    assert not linked[across_rim].any()
+    assert linked[~across_rim].mean() > 0.999
 
 
 @pytest.mark.parametrize("perspective", [False, True])
-def test_creases_are_cut_unless_crossed(perspective):
+def test_creases_separate_pixels_unless_crossed(perspective):
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.0)])
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     cube = from_quads(corners, np.array(quads), flat_faces=np.ones(6, dtype=bool))
-    buffer = shown([cube], above(200, 4, perspective, eye=(2, -4, 3.5), up=(0, 0, 1)))
-    found, linked = pairs(buffer, neighbor_masks(buffer, 0.7, False))
-    across = buffer.face[found[:, 0]] != buffer.face[found[:, 1]]
+    gbuffer = project_surfaces(
+        [cube], camera_above(200, 4, perspective, eye=(2, -4, 3.5), up=(0, 0, 1))
+    )
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, 0.7, False))
+    across = gbuffer.face[pairs[:, 0]] != gbuffer.face[pairs[:, 1]]
     assert across.sum() > 300
     assert not linked[across].any()
     assert linked[~across].all()
-    assert cut_share(buffer, 0.7, True) == 0
-    assert cut_share(buffer, 1.6, False) == 0
+    assert unlinked_fraction(gbuffer, 0.7, True) == 0
+    assert unlinked_fraction(gbuffer, 1.6, False) == 0
 
 
-def test_unevenly_oriented_faces_are_whole():
-    """Half of the faces wound the other way: the surface goes on all the same."""
+def test_inconsistently_oriented_faces_are_continuous():
+    """Half of the faces have the opposite winding, but the surface is continuous."""
     sheet = plane(8, 8, 3.0)
     quads = sheet.corner_vertex.reshape(-1, 4).copy()
     quads[::2] = quads[::2, ::-1]
-    buffer = shown([from_quads(sheet.vertices, quads)], above(eye=(1, -5, 2)))
-    assert 0.2 < buffer.front_facing.mean() < 0.8
-    assert cut_share(buffer, 0.7, False) == 0
+    gbuffer = project_surfaces([from_quads(sheet.vertices, quads)], camera_above(eye=(1, -5, 2)))
+    assert 0.2 < gbuffer.front_facing.mean() < 0.8
+    assert unlinked_fraction(gbuffer, 0.7, False) == 0
 
 
-def test_the_relation_is_symmetric_and_holds_for_oneself():
-    buffer = shown([torus(30, 20), icosphere(1)], above(97, 3.0, True), [(0, 0, 0), (0, 0.8, 0.3)])
-    bits = neighbor_masks(buffer, 0.4, False)
-    assert bits.dtype == np.uint16
-    assert (bits >> 4 & 1).all()
-    assert (bits < 512).all()
-    found, linked = pairs(buffer, bits)
-    linked_pairs = set(map(tuple, found[linked].tolist()))
-    assert len(linked_pairs) < len(found)
+def test_links_are_symmetric_and_include_the_pixel_itself():
+    gbuffer = project_surfaces(
+        [torus(30, 20), icosphere(1)], camera_above(97, 3.0, True), [(0, 0, 0), (0, 0.8, 0.3)]
+    )
+    masks = neighbor_masks(gbuffer, 0.4, False)
+    assert masks.dtype == np.uint16
+    assert (masks >> 4 & 1).all()
+    assert (masks < 512).all()
+    pairs, linked = neighbor_pairs(gbuffer, masks)
+    linked_pairs = set(map(tuple, pairs[linked].tolist()))
+    assert len(linked_pairs) < len(pairs)
     assert all((b, a) in linked_pairs for a, b in linked_pairs)
 
 
-def test_a_frame_that_is_all_covered_has_no_links_around_its_border():
-    buffer = shown([plane(1, 1, 50.0)], above(11))
-    assert len(buffer.pixel) == 121
-    bits = neighbor_masks(buffer, 0.7, False).reshape(11, 11)
-    assert (bits[1:-1, 1:-1] == 511).all()
-    assert (bits[:, 0] & 0b001001001 == 0).all()
-    assert (bits[:, -1] & 0b100100100 == 0).all()
-    assert (bits[0] & 0b000000111 == 0).all()
-    assert (bits[-1] & 0b111000000 == 0).all()
+def test_links_do_not_leave_the_frame():
+    gbuffer = project_surfaces([plane(1, 1, 50.0)], camera_above(11))
+    assert len(gbuffer.pixel) == 121
+    masks = neighbor_masks(gbuffer, 0.7, False).reshape(11, 11)
+    assert (masks[1:-1, 1:-1] == 511).all()
+    assert (masks[:, 0] & 0b001001001 == 0).all()
+    assert (masks[:, -1] & 0b100100100 == 0).all()
+    assert (masks[0] & 0b000000111 == 0).all()
+    assert (masks[-1] & 0b111000000 == 0).all()
 
 
 def test_streamlines_end_at_the_frame_and_at_holes():
     size = 7
     angles = np.zeros((size, size))
     angles[3, 2:5] = np.nan
-    flow = planar_pixel_field(angles, 4)
+    field = planar_pixel_field(angles, 4)
     defined = np.isfinite(angles)
     for row, column in np.ndindex(size, size):
         for bit, (dx, dy) in enumerate(OFFSETS):
-            there = row + dy, column + dx
-            inside = 0 <= there[0] < size and 0 <= there[1] < size
-            wanted = inside and bool(defined[row, column] and defined[there])
-            assert (flow.neighbor_mask[row * size + column] >> bit & 1 == 1) == wanted
+            neighbor = row + dy, column + dx
+            inside = 0 <= neighbor[0] < size and 0 <= neighbor[1] < size
+            expected = inside and bool(defined[row, column] and defined[neighbor])
+            assert (field.neighbor_mask[row * size + column] >> bit & 1 == 1) == expected

@@ -15,7 +15,8 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.camera import perspective_camera as lens
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project, project_task, screen_jacobians
+from rosy_addon.projection.pixel_neighbors import screen_jacobians
+from rosy_addon.projection.project import project, project_task
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -46,22 +47,22 @@ def tangent_field(surface, degree, seed=0):
     return RosyField(degree, vectors - dot(vectors, normal)[:, None] * normal)
 
 
-def turned_about_normals(surface, field, turns):
-    """The same field by other members: each vector turned by `turns` times 2 pi / N."""
-    angle = turns * 2 * np.pi / field.degree
+def with_other_members(surface, field, member_index):
+    """The same field with other members stored: vectors rotated by `member_index` 2 pi / N."""
+    angle = member_index * 2 * np.pi / field.degree
     sideways = np.cross(surface.face_normal, field.vectors)
     return RosyField(
         field.degree, np.cos(angle)[:, None] * field.vectors + np.sin(angle)[:, None] * sideways
     )
 
 
-def members_in_space(buffer, degree):
-    """(P, 3) in camera space: the member that the representation stands for."""
-    angle = np.angle(buffer.representation.astype(complex)) / degree
-    toward_eye = buffer.view_direction.astype(float)
+def members_in_space(gbuffer, degree):
+    """(P, 3) members in camera space, from the representation."""
+    angle = np.angle(gbuffer.representation.astype(complex)) / degree
+    toward_eye = gbuffer.view_direction.astype(float)
     x, y = view_frame(toward_eye)
-    seen = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
-    return transport(seen, toward_eye, buffer.normal.astype(float))
+    member_in_view = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
+    return transport(member_in_view, toward_eye, gbuffer.normal.astype(float))
 
 
 def representation(vectors, normal, degree):
@@ -77,76 +78,81 @@ def member(z, normal, degree):
     return np.abs(z) * (np.cos(angle) * x + np.sin(angle) * y)
 
 
-def screen_directions(buffer, degree):
-    """(P,) complex: N-th power of a member's direction on screen (face-on the same for all)."""
-    axes = screen_jacobians(buffer).astype(complex)
-    angle = np.angle(buffer.representation.astype(complex)) / degree
+def screen_directions(gbuffer, degree):
+    """(P,) complex directions of a member on screen."""
+    axes = screen_jacobians(gbuffer).astype(complex)
+    angle = np.angle(gbuffer.representation.astype(complex)) / degree
     return axes[:, 0] * np.cos(angle) + axes[:, 1] * np.sin(angle)
 
 
-def explicit_values(surface, field, buffer, chosen, linear):
-    """z at some pixels in the view frame, every vector carried one at a time in space."""
+def explicit_values(surface, field, gbuffer, chosen, linear):
+    """z at some pixels in the view frame, by transporting one vector at a time in space."""
     degree = field.degree
     vectors, faces = field.vectors @ linear.T, surface.face_normal @ linear.T
     corner_normal = surface.corner_normal @ linear.T
     points = surface.vertices[surface.corner_vertex]
-    before = np.argsort(surface.next_corner)
-    ahead = normalize(points[surface.next_corner] - points)
-    angle = np.arccos(dot(ahead, normalize(points[before] - points)))
+    previous_corner = np.argsort(surface.next_corner)
+    to_next = normalize(points[surface.next_corner] - points)
+    angle = np.arccos(dot(to_next, normalize(points[previous_corner] - points)))
     at_corner = np.zeros((len(angle), 3))
     for corner in range(len(angle)):
         fan = np.flatnonzero(surface.corner_fan == surface.corner_fan[corner])
-        around, normal = surface.corner_face[fan], corner_normal[corner]
-        there = [transport(vectors[f], faces[f], normal) for f in around]
-        z = np.array([representation(vector, normal, degree) for vector in there])
+        faces_of_fan, normal = surface.corner_face[fan], corner_normal[corner]
+        transported = [transport(vectors[f], faces[f], normal) for f in faces_of_fan]
+        z = np.array([representation(vector, normal, degree) for vector in transported])
         at_corner[corner] = member((z * angle[fan]).sum() / angle[fan].sum(), normal, degree)
     values = []
     for pixel in chosen:
-        corners = surface.triangles[buffer.triangle[pixel]]
-        weights = buffer.barycentric[pixel].astype(float)
+        corners = surface.triangles[gbuffer.triangle[pixel]]
+        weights = gbuffer.barycentric[pixel].astype(float)
         normal = normalize(weights @ corner_normal[corners])
-        there = [transport(at_corner[c], corner_normal[c], normal) for c in corners]
-        z = sum(w * representation(v, normal, degree) for w, v in zip(weights, there, strict=True))
+        transported = [transport(at_corner[c], corner_normal[c], normal) for c in corners]
+        z = sum(
+            w * representation(v, normal, degree) for w, v in zip(weights, transported, strict=True)
+        )
         direction = member(z, normal, degree)
-        eye = buffer.view_direction[pixel].astype(float)
-        side = np.sign(dot(buffer.normal[pixel].astype(float), normal))
-        seen = transport(direction, side * normal, eye)
+        eye = gbuffer.view_direction[pixel].astype(float)
+        side = np.sign(dot(gbuffer.normal[pixel].astype(float), normal))
+        member_in_view = transport(direction, side * normal, eye)
         x, y = view_frame(eye)
-        values.append(np.abs(z) * np.exp(1j * degree * np.arctan2(dot(seen, y), dot(seen, x))))
+        values.append(
+            np.abs(z)
+            * np.exp(1j * degree * np.arctan2(dot(member_in_view, y), dot(member_in_view, x)))
+        )
     return np.array(values)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("inside", [False, True])
-def test_values_are_what_explicit_transport_gives(degree, inside):
-    """On a very coarse sphere, where the ways of transport differ by many degrees."""
+def test_values_match_explicit_transport(degree, inside):
+    """On a very coarse sphere, where other paths of transport differ by many degrees."""
     surface = icosphere(1)
     field = tangent_field(surface, degree)
     camera = orbit_camera(surface, 30, 20, 64, 64)
     if inside:
         camera = lens(look_at((0.1, 0, 0.1), (1, 1, 0)), 64, 64, fov=1.5, clip=(0.01, 9))
-    buffer = project([MeshInstance(surface, IDENTITY, field)], camera)
-    assert buffer.front_facing.all() != inside
-    chosen = np.arange(0, len(buffer.pixel), 37)
-    expected = explicit_values(surface, field, buffer, chosen, camera.view[:3, :3])
-    np.testing.assert_allclose(buffer.representation[chosen], expected, atol=2e-5)
+    gbuffer = project([MeshInstance(surface, IDENTITY, field)], camera)
+    assert gbuffer.front_facing.all() != inside
+    chosen = np.arange(0, len(gbuffer.pixel), 37)
+    expected = explicit_values(surface, field, gbuffer, chosen, camera.view[:3, :3])
+    np.testing.assert_allclose(gbuffer.representation[chosen], expected, atol=2e-5)
 
 
 def test_values_are_continuous_across_edges_of_triangles():
-    """Neighbouring pixels on a coarse sphere, of one triangle and of two, differ alike."""
+    """Differences of neighboring pixels are not larger across edges than inside triangles."""
     surface = icosphere(1)
-    buffer = project(
+    gbuffer = project(
         [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))],
         orbit_camera(surface, 10, 70, 400, 400),
     )
-    there = np.searchsorted(buffer.pixel, buffer.pixel + 1)[:-1]
-    here = np.flatnonzero(
-        buffer.pixel[np.minimum(there, len(buffer.pixel) - 1)] == buffer.pixel[:-1] + 1
+    right = np.searchsorted(gbuffer.pixel, gbuffer.pixel + 1)[:-1]
+    left = np.flatnonzero(
+        gbuffer.pixel[np.minimum(right, len(gbuffer.pixel) - 1)] == gbuffer.pixel[:-1] + 1
     )
-    facing = buffer.normal[here, 2] > 0.5
-    here = here[facing]
-    change = np.abs(buffer.representation[here + 1] - buffer.representation[here])
-    same = buffer.triangle[here + 1] == buffer.triangle[here]
+    facing = gbuffer.normal[left, 2] > 0.5
+    left = left[facing]
+    change = np.abs(gbuffer.representation[left + 1] - gbuffer.representation[left])
+    same = gbuffer.triangle[left + 1] == gbuffer.triangle[left]
     assert (~same).sum() > 500
     assert change[~same].max() < 1.2 * change[same].max()
     assert np.median(change[~same]) < 1.2 * np.median(change[same])
@@ -154,7 +160,7 @@ def test_values_are_continuous_across_edges_of_triangles():
 
 @settings(max_examples=20)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
-def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, display):
+def test_values_do_not_depend_on_the_stored_member(seed, degree, deformed, display):
     random = np.random.default_rng(seed)
     surface = torus(12, 7)
     if deformed:
@@ -170,42 +176,42 @@ def test_it_does_not_matter_which_member_is_stored(seed, degree, deformed, displ
         surface.face_start,
     )
     field = tangent_field(rest, degree, seed)
-    other = turned_about_normals(rest, field, random.integers(0, degree, surface.face_count))
-    one = project([MeshInstance(surface, matrix, field)], camera, display)
-    two = project([MeshInstance(surface, matrix, other)], camera, display)
-    z = one.representation
-    assert np.abs(z - two.representation).max() < 1e-5 * np.abs(z).max()
-    assert np.abs(one.representation).max() > 0.1
+    other = with_other_members(rest, field, random.integers(0, degree, surface.face_count))
+    first = project([MeshInstance(surface, matrix, field)], camera, display)
+    second = project([MeshInstance(surface, matrix, other)], camera, display)
+    z = first.representation
+    assert np.abs(z - second.representation).max() < 1e-5 * np.abs(z).max()
+    assert np.abs(first.representation).max() > 0.1
 
 
 @settings(max_examples=15)
 @given(seeds, degrees, st.booleans(), st.sampled_from(["smooth", "flat"]))
-def test_turning_everything_together_changes_nothing(seed, degree, perspective, display):
+def test_moving_mesh_and_camera_together_changes_nothing(seed, degree, perspective, display):
     random = np.random.default_rng(seed)
     surface = torus(16, 9)
     field = tangent_field(surface, degree, seed)
     camera = orbit_camera(surface, 25, 40, 64, 64, perspective=perspective)
     motion = matrix_of(random_rotation(random), random.normal(size=3))
     moved = type(camera)(camera.view @ np.linalg.inv(motion), camera.projection, 64, 64)
-    one = project([MeshInstance(surface, IDENTITY, field)], camera, display)
-    two = project([MeshInstance(surface, motion, field)], moved, display)
-    _, at_one, at_two = np.intersect1d(one.pixel, two.pixel, return_indices=True)
-    assert len(at_one) >= max(len(one.pixel), len(two.pixel)) - 3
-    same = one.triangle[at_one] == two.triangle[at_two]
+    first = project([MeshInstance(surface, IDENTITY, field)], camera, display)
+    second = project([MeshInstance(surface, motion, field)], moved, display)
+    _, at_first, at_second = np.intersect1d(first.pixel, second.pixel, return_indices=True)
+    assert len(at_first) >= max(len(first.pixel), len(second.pixel)) - 3
+    same = first.triangle[at_first] == second.triangle[at_second]
     assert same.mean() > 0.99
-    at_one, at_two = at_one[same], at_two[same]
-    strong = np.abs(one.representation[at_one]) > 0.05
-    at_one, at_two = at_one[strong], at_two[strong]
-    ratio = two.representation[at_two] / one.representation[at_one]
+    at_first, at_second = at_first[same], at_second[same]
+    strong = np.abs(first.representation[at_first]) > 0.05
+    at_first, at_second = at_first[strong], at_second[strong]
+    ratio = second.representation[at_second] / first.representation[at_first]
     assert np.abs(np.angle(ratio)).max() / degree < np.radians(0.1)
-    axes = screen_jacobians(one)[at_one] - screen_jacobians(two)[at_two]
+    axes = screen_jacobians(first)[at_first] - screen_jacobians(second)[at_second]
     assert np.abs(axes).max() < 1e-3
 
 
 @pytest.mark.parametrize("perspective", [True, False])
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 def test_a_tilted_plane_under_a_wide_lens(perspective, display):
-    """Two triangles at 80 degrees: directions on screen are those of the projected vector."""
+    """Two triangles at 80 degrees: directions on screen match the projected vector."""
     corners = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0.0]])
     surface = from_quads(corners, np.array([[0, 1, 2, 3]]))
     vector = np.array([0.6, 0.8, 0.0])
@@ -215,7 +221,9 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
         camera = lens(view, 300, 200, fov=1.9)
     else:
         camera = orthographic_camera(view, 300, 200, scale=5.0)
-    buffer = project([MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))], camera, display)
+    gbuffer = project(
+        [MeshInstance(surface, IDENTITY, RosyField(1, vector[None]))], camera, display
+    )
     moved = camera.view[:3, :3] @ vector
     h = 1e-6
 
@@ -224,51 +232,51 @@ def test_a_tilted_plane_under_a_wide_lens(perspective, display):
         ndc = clip[:, :2] / clip[:, 3:]
         return 150 * ndc[:, 0] + 100j * ndc[:, 1]
 
-    position = buffer.position.astype(float)
+    position = gbuffer.position.astype(float)
     expected = (on_screen(position + h * moved) - on_screen(position - h * moved)) / (2 * h)
-    found = screen_directions(buffer, 1)
-    off = np.degrees(np.abs(np.angle(found / expected)))
-    assert len(buffer.pixel) > 5000
+    actual = screen_directions(gbuffer, 1)
+    off = np.degrees(np.abs(np.angle(actual / expected)))
+    assert len(gbuffer.pixel) > 5000
     assert off.max() < 5e-3
     depth = -position[:, 2] if perspective else 1.0
     length = np.abs(expected) * depth / camera.pixels_per_unit
-    np.testing.assert_allclose(np.abs(found), length, rtol=1e-3)
+    np.testing.assert_allclose(np.abs(actual), length, rtol=1e-3)
 
 
-def test_directions_on_a_sphere_are_those_of_projected_members():
+def test_directions_on_a_sphere_match_projected_members():
     """N = 4, against finite differences of the members in space."""
     surface = icosphere(3)
     camera = lens(look_at((2.5, 1, 1), (0, 0, 0)), 200, 200, fov=1.2)
-    buffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
-    along = members_in_space(buffer, 4)
-    position, h = buffer.position.astype(float), 1e-6
+    gbuffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
+    along = members_in_space(gbuffer, 4)
+    position, h = gbuffer.position.astype(float), 1e-6
 
     def on_screen(points):
         clip = points @ camera.projection[:, :3].T + camera.projection[:, 3]
         return (clip[:, 0] + 1j * clip[:, 1]) / clip[:, 3]
 
     expected = (on_screen(position + h * along) - on_screen(position - h * along)) / (2 * h)
-    facing = dot(buffer.normal, buffer.view_direction) > 0.1
-    found = screen_directions(buffer, 4)
-    assert np.degrees(np.abs(np.angle(found / expected)))[facing].max() < 0.05
+    facing = dot(gbuffer.normal, gbuffer.view_direction) > 0.1
+    actual = screen_directions(gbuffer, 4)
+    assert np.degrees(np.abs(np.angle(actual / expected)))[facing].max() < 0.05
 
 
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 def test_flat_faces_show_their_own_member(display):
-    """A cube of flat faces: in either display each pixel shows its face's member."""
+    """A cube with flat faces: in both displays each pixel shows the member of its face."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.0)])
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     surface = from_quads(corners, np.array(quads), flat_faces=np.ones(6, dtype=bool))
     field = tangent_field(surface, 3)
     camera = orbit_camera(surface, 30, 30, 100, 80)
-    buffer = project([MeshInstance(surface, IDENTITY, field)], camera, display)
-    assert len(np.unique(buffer.face)) == 3
+    gbuffer = project([MeshInstance(surface, IDENTITY, field)], camera, display)
+    assert len(np.unique(gbuffer.face)) == 3
     np.testing.assert_allclose(
-        np.abs(buffer.representation), field.magnitude[buffer.face], rtol=1e-5
+        np.abs(gbuffer.representation), field.magnitude[gbuffer.face], rtol=1e-5
     )
-    own = field.vectors[buffer.face] @ camera.view[:3, :3].T
-    normal = buffer.normal.astype(float)
-    turn = representation(members_in_space(buffer, 3), normal, 3)
+    own = field.vectors[gbuffer.face] @ camera.view[:3, :3].T
+    normal = gbuffer.normal.astype(float)
+    turn = representation(members_in_space(gbuffer, 3), normal, 3)
     np.testing.assert_allclose(turn, unit_z(representation(own, normal, 3)), atol=1e-4)
 
 
@@ -279,12 +287,12 @@ def unit_z(z):
 @pytest.mark.parametrize("display", ["smooth", "flat"])
 @pytest.mark.parametrize("degree", [1, 4, 5])
 def test_mirrored_objects(display, degree):
-    """A negative scale shows what the mirrored mesh with mirrored vectors shows."""
+    """A negative scale has the same result as a mirrored mesh with mirrored vectors."""
     surface = torus(14, 8)
     field = tangent_field(surface, degree)
     mirror = np.array([-1.0, 1, 1])
     mirrored = build_surface(surface.vertices * mirror, surface.corner_vertex, surface.face_start)
-    # Each face the other way round from the same first corner, so that it is cut the same way.
+    # Each face is reversed from the same first corner, so that it is triangulated the same way.
     backward = (np.arange(0, surface.face_start[-1], 4)[:, None] + [0, 3, 2, 1]).ravel()
     outward = build_surface(
         surface.vertices * mirror, surface.corner_vertex[backward], surface.face_start
@@ -305,19 +313,19 @@ def test_mirrored_objects(display, degree):
 
 
 @pytest.mark.parametrize("cells", [(4, 4), (9, 2), (1, 6)])
-def test_stretching_turns_members_by_its_rotation_alone(cells):
-    """A stretch along the axes turns nothing; a shear by s turns by -atan(s / 2).
+def test_stretching_rotates_members_by_its_polar_rotation(cells):
+    """A stretch along the axes rotates nothing; a shear by s rotates by -atan(s / 2).
 
-    Whatever the shape of the faces that the map is read from.
+    This does not depend on the shape of the faces.
     """
     surface = plane(*cells)
     field = RosyField(4, np.tile([np.cos(0.3), np.sin(0.3), 0], (surface.face_count, 1)) * 2.0)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, scale=8)
 
     def angle(linear):
-        buffer = project([MeshInstance(surface, matrix_of(linear), field)], camera)
-        np.testing.assert_allclose(np.abs(buffer.representation), 2.0, rtol=1e-6)
-        return np.angle(buffer.representation) / 4
+        gbuffer = project([MeshInstance(surface, matrix_of(linear), field)], camera)
+        np.testing.assert_allclose(np.abs(gbuffer.representation), 2.0, rtol=1e-6)
+        return np.angle(gbuffer.representation) / 4
 
     np.testing.assert_allclose(angle(np.diag([3.0, 0.7, 1])), 0.3, atol=1e-6)
     shear = np.eye(3)
@@ -326,8 +334,8 @@ def test_stretching_turns_members_by_its_rotation_alone(cells):
 
 
 @pytest.mark.parametrize("columns", [4, 40])
-def test_a_bent_sheet_carries_its_field(columns):
-    """A strip rolled to a half tube: the members roll with it."""
+def test_the_field_of_a_sheet_bends_with_it(columns):
+    """A sheet is rolled to a half tube, and the members rotate with it."""
     sheet = plane(columns, columns)
     x, y, _ = sheet.vertices.T
     radius = 2 / np.pi
@@ -337,35 +345,35 @@ def test_a_bent_sheet_carries_its_field(columns):
     )
     field = RosyField(1, np.tile([0.8, 0.6, 0.0], (columns**2, 1)))
     camera = orbit_camera(rolled, 15, 35, 120, 120)
-    buffer = project([MeshInstance(surface, IDENTITY, field)], camera)
-    world = buffer.position.astype(float) - camera.view[:3, 3]
+    gbuffer = project([MeshInstance(surface, IDENTITY, field)], camera)
+    world = gbuffer.position.astype(float) - camera.view[:3, 3]
     world = world @ camera.view[:3, :3]
     about = np.arctan2(world[:, 0], world[:, 2])
     expected = np.stack([0.8 * np.cos(about), 0.6 + 0 * about, -0.8 * np.sin(about)], axis=1)
-    found = members_in_space(buffer, 1) @ camera.view[:3, :3]
-    off = np.degrees(np.arccos(np.clip(dot(found, expected), -1, 1)))
-    # At the sheet's border normals are one-sided, half a column off.
+    actual = members_in_space(gbuffer, 1) @ camera.view[:3, :3]
+    off = np.degrees(np.arccos(np.clip(dot(actual, expected), -1, 1)))
+    # Normals at the border of the sheet are averages over one side only: half a column off.
     assert off.max() < 1.3 * 90 / columns
     assert np.median(off) < 8 / columns
 
 
-def test_instances_are_seen_as_if_each_were_alone():
+def test_instances_are_projected_independently():
     surface = torus(20, 10)
     field = tangent_field(surface, 6)
-    places = [matrix_of(np.eye(3), (0, -2, 0)), matrix_of(0.5 * np.diag([1, -1, 1]), (0, 1.5, 0))]
+    matrices = [matrix_of(np.eye(3), (0, -2, 0)), matrix_of(0.5 * np.diag([1, -1, 1]), (0, 1.5, 0))]
     camera = lens(look_at((6, 0, 3), (0, 0, 0)), 150, 100)
-    instances = [MeshInstance(surface, place, field) for place in places]
-    both = project(instances, camera)
-    assert set(both.instance_id) == {0, 1}
-    assert both.instance_names == ("torus", "torus")
-    assert both.instance_degrees == (6, 6)
-    for number, instance in enumerate(instances):
-        alone, mine = project([instance], camera), both.instance_id == number
+    instances = [MeshInstance(surface, matrix, field) for matrix in matrices]
+    together = project(instances, camera)
+    assert set(together.instance_id) == {0, 1}
+    assert together.instance_names == ("torus", "torus")
+    assert together.instance_degrees == (6, 6)
+    for index, instance in enumerate(instances):
+        alone, pixels = project([instance], camera), together.instance_id == index
         for name in ("pixel", "face", "triangle", "normal", "position", "representation"):
-            assert (getattr(both, name)[mine] == getattr(alone, name)).all()
+            assert (getattr(together, name)[pixels] == getattr(alone, name)).all()
 
 
-def test_bodies_of_different_degrees_and_one_that_hides():
+def test_instances_of_different_degrees_and_an_occluder():
     ball, wall = icosphere(2), plane(1, 1)
     camera = lens(look_at((0, -6, 0), (0, 0, 0)), 120, 60)
     stand = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -388,25 +396,25 @@ def test_bodies_of_different_degrees_and_one_that_hides():
 def test_pixels_positions_and_frames_agree():
     surface = torus()
     camera = lens(look_at((3, -2, 2), (0, 0, 0)), 160, 120, shift=(0.1, -0.05))
-    buffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
-    assert (np.diff(buffer.pixel) > 0).all()
-    clip = buffer.position @ camera.projection[:, :3].T + camera.projection[:, 3]
+    gbuffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
+    assert (np.diff(gbuffer.pixel) > 0).all()
+    clip = gbuffer.position @ camera.projection[:, :3].T + camera.projection[:, 3]
     x, y = (clip[:, :2] / clip[:, 3:] + 1).T * ([80], [60])
-    row, column = np.divmod(buffer.pixel, 160)
+    row, column = np.divmod(gbuffer.pixel, 160)
     np.testing.assert_allclose(x, column + 0.5, atol=1e-3)
     np.testing.assert_allclose(y, row + 0.5, atol=1e-3)
     points = surface.vertices @ camera.view[:3, :3].T + camera.view[:3, 3]
-    corners = points[surface.corner_vertex[surface.triangles[buffer.triangle]]]
-    position = np.einsum("pc,pci->pi", buffer.barycentric, corners)
-    np.testing.assert_allclose(buffer.position, position, atol=1e-5)
-    assert (surface.triangle_face[buffer.triangle] == buffer.face).all()
-    np.testing.assert_allclose(buffer.view_direction, -normalize(buffer.position), atol=1e-6)
+    corners = points[surface.corner_vertex[surface.triangles[gbuffer.triangle]]]
+    position = np.einsum("pc,pci->pi", gbuffer.barycentric, corners)
+    np.testing.assert_allclose(gbuffer.position, position, atol=1e-5)
+    assert (surface.triangle_face[gbuffer.triangle] == gbuffer.face).all()
+    np.testing.assert_allclose(gbuffer.view_direction, -normalize(gbuffer.position), atol=1e-6)
     for name in ("normal", "geometric_normal", "view_direction"):
-        np.testing.assert_allclose(np.linalg.norm(getattr(buffer, name), axis=1), 1, atol=1e-5)
-    assert (dot(buffer.geometric_normal, buffer.view_direction) > -1e-6).all()
-    assert buffer.representation.dtype == np.complex64
-    assert buffer.pixel.dtype == buffer.face.dtype == buffer.instance_id.dtype == np.int32
-    assert buffer.position.dtype == buffer.normal.dtype == np.float32
+        np.testing.assert_allclose(np.linalg.norm(getattr(gbuffer, name), axis=1), 1, atol=1e-5)
+    assert (dot(gbuffer.geometric_normal, gbuffer.view_direction) > -1e-6).all()
+    assert gbuffer.representation.dtype == np.complex64
+    assert gbuffer.pixel.dtype == gbuffer.face.dtype == gbuffer.instance_id.dtype == np.int32
+    assert gbuffer.position.dtype == gbuffer.normal.dtype == np.float32
 
 
 @pytest.mark.parametrize("display", ["smooth", "flat"])
@@ -422,40 +430,40 @@ def test_undefined_and_degenerate_faces_are_zero(display):
     vectors[::3] = 0
     camera = orbit_camera(surface, 0, 0, 100, 100)
     for matrix in (IDENTITY, matrix_of(np.diag([1.0, 0.0, 1.0])), matrix_of(np.diag([1, 1e-9, 1]))):
-        buffer = project([MeshInstance(surface, matrix, RosyField(4, vectors))], camera, display)
-        assert np.isfinite(buffer.representation).all()
-        assert np.isfinite(buffer.normal).all()
-        assert (buffer.representation[buffer.face % 3 == 0] == 0).all()
-    assert (buffer.representation[buffer.face % 3 == 1] != 0).mean() > 0.9
+        gbuffer = project([MeshInstance(surface, matrix, RosyField(4, vectors))], camera, display)
+        assert np.isfinite(gbuffer.representation).all()
+        assert np.isfinite(gbuffer.normal).all()
+        assert (gbuffer.representation[gbuffer.face % 3 == 0] == 0).all()
+    assert (gbuffer.representation[gbuffer.face % 3 == 1] != 0).mean() > 0.9
 
 
 def test_custom_normals_within_a_fan():
-    """Corner normals that differ within a fan: finite, near the values with common ones."""
+    """Corner normals that differ within a fan: values are close to those with equal normals."""
     surface = icosphere(2)
     field = tangent_field(surface, 4)
     random = np.random.default_rng(1)
-    leaned = normalize(
+    tilted = normalize(
         surface.corner_normal + 0.05 * random.normal(size=surface.corner_normal.shape)
     )
     custom = build_surface(
-        surface.vertices, surface.corner_vertex, surface.face_start, corner_normal=leaned
+        surface.vertices, surface.corner_vertex, surface.face_start, corner_normal=tilted
     )
     camera = orbit_camera(surface, 0, 0, 60, 60)
-    one, two = (project([MeshInstance(s, IDENTITY, field)], camera) for s in (surface, custom))
-    facing = dot(one.normal, one.view_direction) > 0.3
-    assert 0 < np.abs(one.representation - two.representation)[facing].max() < 0.5
+    first, second = (project([MeshInstance(s, IDENTITY, field)], camera) for s in (surface, custom))
+    facing = dot(first.normal, first.view_direction) > 0.3
+    assert 0 < np.abs(first.representation - second.representation)[facing].max() < 0.5
 
 
-def test_the_eye_inside_a_mesh_sees_all_around():
+def test_an_eye_inside_a_mesh_sees_it_at_all_pixels():
     surface = icosphere(2)
     camera = lens(look_at((0, 0, 0), (1, 0, 0)), 40, 30, fov=1.6, clip=(0.01, 10))
-    buffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
-    assert len(buffer.pixel) == 1200
-    assert not buffer.front_facing.any()
-    assert (dot(buffer.normal, buffer.view_direction) > 0.8).all()
+    gbuffer = project([MeshInstance(surface, IDENTITY, tangent_field(surface, 4))], camera)
+    assert len(gbuffer.pixel) == 1200
+    assert not gbuffer.front_facing.any()
+    assert (dot(gbuffer.normal, gbuffer.view_direction) > 0.8).all()
 
 
-def test_what_cannot_be_seen_is_said():
+def test_errors_of_projection():
     ball, wall = icosphere(1), plane(1, 1, size=20)
     field = tangent_field(ball, 4)
     camera = lens(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 50, 50, name="Camera.001")
@@ -472,15 +480,15 @@ def test_what_cannot_be_seen_is_said():
         RosyError, match="sphere: its field has 79 vectors, but the mesh has 80 faces"
     ):
         project([MeshInstance(ball, IDENTITY, RosyField(4, field.vectors[1:]))], camera)
-    spoiled = field.vectors.copy()
-    spoiled[7, 1] = np.nan
+    damaged = field.vectors.copy()
+    damaged[7, 1] = np.nan
     with pytest.raises(RosyError, match="sphere: its field is not finite on face 7"):
-        project([MeshInstance(ball, IDENTITY, RosyField(4, spoiled))], camera)
+        project([MeshInstance(ball, IDENTITY, RosyField(4, damaged))], camera)
     with pytest.raises(RosyError, match="sphere: its matrix must be"):
         project([MeshInstance(ball, np.full((4, 4), np.inf), field)], camera)
 
 
-def test_progress_grows_and_work_can_be_dropped():
+def test_progress_grows_and_the_task_can_be_closed():
     surface = torus()
     instances = [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))] * 2
     camera = orbit_camera(surface, 0, 40, 300, 300)
@@ -488,14 +496,14 @@ def test_progress_grows_and_work_can_be_dropped():
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1
     assert len(fractions) > 4
-    work = project_task(instances, camera)
-    next(work)
-    work.close()
+    task = project_task(instances, camera)
+    next(task)
+    task.close()
 
 
 def test_the_same_input_gives_the_same_bits():
     surface = torus()
     instance = MeshInstance(surface, IDENTITY, tangent_field(surface, 4))
     camera = orbit_camera(surface, 0, 40, 90, 90)
-    one, two = project([instance], camera), project([instance], camera)
-    assert one.representation.tobytes() == two.representation.tobytes()
+    first, second = project([instance], camera), project([instance], camera)
+    assert first.representation.tobytes() == second.representation.tobytes()

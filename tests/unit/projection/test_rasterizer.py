@@ -1,4 +1,4 @@
-"""The rasteriser against a ray caster, and its promises: no cracks, no double hits, any order."""
+"""The rasterizer against a ray caster; no cracks, no overlaps, any order of triangles."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def flat_clip(x, y, z=0.0, width=WIDTH, height=HEIGHT):
     )
 
 
-def a_camera(perspective, width=WIDTH, height=HEIGHT):
+def make_camera(perspective, width=WIDTH, height=HEIGHT):
     if perspective:
         return perspective_camera(np.eye(4), width, height, fov=1.2, clip=CLIP)
     return orthographic_camera(np.eye(4), width, height, scale=5.0, clip=CLIP)
 
 
-def cast(points, triangles, camera):
-    """For each pixel the nearest triangle, its barycentrics and depth along -z, ray by ray.
+def cast_rays(points, triangles, camera):
+    """Cast a ray through each pixel: nearest triangle, barycentric coordinates and depth along -z.
 
-    Also whether the answer hangs on less than 1e-9, so that rounding may decide it.
+    Also return whether a margin is below 1e-9, so that the result depends on rounding.
     """
     shape = camera.width * camera.height
     owner, depth = np.full(shape, -1), np.full(shape, np.inf)
@@ -53,71 +53,73 @@ def cast(points, triangles, camera):
             origin, direction = np.zeros(3), np.array([x, y, -1.0])
         else:
             origin, direction = np.array([x, y, 0.0]), np.array([0.0, 0.0, -1.0])
-        for number, corners in enumerate(points[triangles]):
+        for index, corners in enumerate(points[triangles]):
             # a + s (b - a) + t (c - a) = origin + d direction
             a, b, c = corners
             matrix = np.stack([b - a, c - a, -direction], axis=1)
             if abs(np.linalg.det(matrix)) < 1e-9:
                 continue
             s, t, d = np.linalg.solve(matrix, origin - a)
-            found = np.array([1 - s - t, s, t])
-            if found.min() > -1e-9 and near - 1e-9 < d < far + 1e-9:
-                margin = min(found.min(), d - near, far - d, abs(d - depth[pixel]))
+            barycentric = np.array([1 - s - t, s, t])
+            if barycentric.min() > -1e-9 and near - 1e-9 < d < far + 1e-9:
+                margin = min(barycentric.min(), d - near, far - d, abs(d - depth[pixel]))
                 doubtful[pixel] |= margin < 1e-9
                 if d < depth[pixel]:
-                    owner[pixel], depth[pixel], weights[pixel] = number, d, found
+                    owner[pixel], depth[pixel], weights[pixel] = index, d, barycentric
     return owner, weights, depth, doubtful
 
 
 @settings(max_examples=15)
 @given(seeds, st.booleans())
-def test_sees_what_a_ray_caster_sees(seed, perspective):
-    """Triangles anywhere: before, behind and around the eye, across both clip planes."""
+def test_visible_triangles_match_a_ray_caster(seed, perspective):
+    """Triangles in front of, behind and around the eye, and across both clip planes."""
     random = np.random.default_rng(seed)
-    camera = a_camera(perspective, 19, 13)
+    camera = make_camera(perspective, 19, 13)
     points = random.normal(size=(24, 3)) * (2, 2, 4) + (0, 0, -2)
     triangles = np.arange(24).reshape(8, 3)
-    owner, weights, depth, doubtful = cast(points, triangles, camera)
-    seen = rasterize(to_clip(points, camera), triangles, camera.width, camera.height)
-    found = np.full(len(owner), -1)
-    found[seen.pixel] = seen.triangle
-    assert (found == owner)[~doubtful].all()
-    sure = (found == owner)[seen.pixel]
-    np.testing.assert_allclose(seen.barycentric[sure], weights[seen.pixel[sure]], atol=1e-7)
-    z = -depth[seen.pixel[sure]]
+    owner, weights, depth, doubtful = cast_rays(points, triangles, camera)
+    fragments = rasterize(to_clip(points, camera), triangles, camera.width, camera.height)
+    actual = np.full(len(owner), -1)
+    actual[fragments.pixel] = fragments.triangle
+    assert (actual == owner)[~doubtful].all()
+    certain = (actual == owner)[fragments.pixel]
+    np.testing.assert_allclose(
+        fragments.barycentric[certain], weights[fragments.pixel[certain]], atol=1e-7
+    )
+    z = -depth[fragments.pixel[certain]]
     projection = camera.projection
     ndc = (projection[2, 2] * z + projection[2, 3]) / (projection[3, 2] * z + projection[3, 3])
-    np.testing.assert_allclose(seen.depth[sure], ndc, atol=1e-7)
+    np.testing.assert_allclose(fragments.depth[certain], ndc, atol=1e-7)
 
 
 def jittered_grid(random, cells, snap):
-    """A square from 3.5 to 25.5 pixels cut at random into triangles of either winding.
+    """A square from 3.5 to 25.5 pixels, split at random into triangles of both windings.
 
     With `snap` all vertices lie on multiples of 1 / snap, so that many edges and vertices fall on
-    the centres of pixels.
+    the centers of pixels.
     """
     side = np.linspace(3.5, 25.5, cells + 1)
     x, y = np.meshgrid(side, side)
-    reach = np.zeros_like(x)
-    reach[1:-1, 1:-1] = 0.24 * (side[1] - side[0])
-    x = x + reach * random.uniform(-1, 1, x.shape)
-    y = y + reach * random.uniform(-1, 1, x.shape)
+    max_offset = np.zeros_like(x)
+    max_offset[1:-1, 1:-1] = 0.24 * (side[1] - side[0])
+    x = x + max_offset * random.uniform(-1, 1, x.shape)
+    y = y + max_offset * random.uniform(-1, 1, x.shape)
     if snap:
         x, y = np.round(x * snap) / snap, np.round(y * snap) / snap
     index = np.arange(x.size).reshape(x.shape)
     corners = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     a, b, c, d = (corner.ravel() for corner in corners)
     flip = (random.random(len(a)) < 0.5)[:, None]
-    one = np.where(flip, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
-    two = np.where(flip, np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
-    triangles = np.concatenate([one, two])
-    turned = random.random(len(triangles)) < 0.5
-    triangles[turned] = triangles[turned][:, ::-1]
+    first = np.where(flip, np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
+    second = np.where(flip, np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
+    triangles = np.concatenate([first, second])
+    reversed_winding = random.random(len(triangles)) < 0.5
+    triangles[reversed_winding] = triangles[reversed_winding][:, ::-1]
     return x.ravel(), y.ravel(), triangles
 
 
 def coverage(clip, triangles, width=WIDTH, height=HEIGHT):
-    """(height, width) how many of the triangles, drawn one by one, hold each pixel."""
+    """(height, width) number of triangles, drawn one by one, that cover each pixel."""
     count = np.zeros(width * height, dtype=int)
     for triangle in triangles:
         count[rasterize(clip, triangle[None], width, height).pixel] += 1
@@ -127,9 +129,9 @@ def coverage(clip, triangles, width=WIDTH, height=HEIGHT):
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 6), st.sampled_from([0, 2, 4]))
 def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
-    """Half-open: pixel centres on the left and lower border are in, the others out."""
+    """Pixel centers on the left and lower borders are inside, on the other borders outside."""
     x, y, triangles = jittered_grid(np.random.default_rng(seed), cells, snap)
-    # In a frame of 32 x 32 pixels clip coordinates of the border are exact.
+    # In a frame of 32 x 32 pixels the clip coordinates of the border are exact.
     count = coverage(flat_clip(x, y, 0.0, 32, 32), triangles, 32, 32)
     expected = np.zeros((32, 32), dtype=int)
     expected[3:25, 3:25] = 1
@@ -139,13 +141,15 @@ def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
 @settings(max_examples=25)
 @given(seeds)
 def test_no_cracks_where_the_near_plane_cuts(seed):
-    """A floor that passes under the eye, cut at random: below the horizon all is covered once."""
+    """A floor under the eye, split at random: all pixels below the horizon are covered once."""
     random = np.random.default_rng(seed)
-    camera = a_camera(True)
+    camera = make_camera(True)
     x, y, triangles = jittered_grid(random, 5, 0)
     points = np.stack([(x - 14.5) * 30, np.full(x.shape, -0.1), (y - 14.5) * 0.7], axis=1)
     clip = to_clip(points, camera)
-    clip[:, 2] = -0.1 + 0 * clip[:, 2]  # w from behind the eye to before it; near where w = 0.1
+    clip[:, 2] = (
+        -0.1 + 0 * clip[:, 2]
+    )  # w is from behind the eye to in front of it; the near plane is at w = 0.1
     count = coverage(clip, triangles)
     lowest_row = HEIGHT / 2 * (1 - camera.projection[1, 1] * 0.1 / 0.1)
     farthest_row = HEIGHT / 2 * (1 - camera.projection[1, 1] * 0.1 / (11 * 0.7))
@@ -157,51 +161,51 @@ def test_no_cracks_where_the_near_plane_cuts(seed):
 
 
 def test_a_floor_under_the_eye_has_exact_barycentrics_and_depth():
-    """Two triangles, most of each behind the eye."""
-    camera = a_camera(True, 200, 150)
+    """Two triangles, mostly behind the eye."""
+    camera = make_camera(True, 200, 150)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
-    seen = rasterize(to_clip(points, camera), triangles, 200, 150)
-    row, column = np.divmod(seen.pixel, 200)
+    fragments = rasterize(to_clip(points, camera), triangles, 200, 150)
+    row, column = np.divmod(fragments.pixel, 200)
     down = (1 - 2 * (row + 0.5) / 150) / camera.projection[1, 1]
     z = -1 / down
     x = (2 * (column + 0.5) / 200 - 1) / camera.projection[0, 0] * -z
-    assert len(seen.pixel) == 200 * ((z[np.unique(row, return_index=True)[1]] > -9).sum())
-    position = np.einsum("pc,pci->pi", seen.barycentric, points[triangles[seen.triangle]])
+    assert len(fragments.pixel) == 200 * ((z[np.unique(row, return_index=True)[1]] > -9).sum())
+    position = np.einsum("pc,pci->pi", fragments.barycentric, points[triangles[fragments.triangle]])
     # Weights are rounded to single precision, and the corners are up to 70 away.
     np.testing.assert_allclose(position, np.stack([x, -1 + 0 * x, z], axis=1), atol=1e-5)
     depth = (camera.projection[2, 2] * z + camera.projection[2, 3]) / -z
-    np.testing.assert_allclose(seen.depth, depth, atol=1e-9)
+    np.testing.assert_allclose(fragments.depth, depth, atol=1e-9)
 
 
 @settings(max_examples=20)
 @given(seeds)
 def test_order_of_triangles_and_corners_does_not_matter(seed):
     random = np.random.default_rng(seed)
-    camera = a_camera(True)
+    camera = make_camera(True)
     points = random.normal(size=(40, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = random.permuted(np.tile(np.arange(40), (60, 1)), axis=1)[:, :3]
     _, distinct = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[distinct]
     clip = to_clip(points, camera)
-    seen = rasterize(clip, triangles, WIDTH, HEIGHT)
+    fragments = rasterize(clip, triangles, WIDTH, HEIGHT)
     order = random.permutation(len(triangles))
     again = rasterize(clip, triangles[order], WIDTH, HEIGHT)
-    assert (again.pixel == seen.pixel).all()
-    assert (order[again.triangle] == seen.triangle).all()
-    assert (again.barycentric == seen.barycentric).all()
-    assert (again.depth == seen.depth).all()
+    assert (again.pixel == fragments.pixel).all()
+    assert (order[again.triangle] == fragments.triangle).all()
+    assert (again.barycentric == fragments.barycentric).all()
+    assert (again.depth == fragments.depth).all()
     turned = rasterize(clip, triangles[:, [1, 2, 0]], WIDTH, HEIGHT)
-    assert (turned.pixel == seen.pixel).all()
-    assert (turned.triangle == seen.triangle).all()
-    np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], seen.barycentric, atol=1e-6)
-    assert (turned.front_facing == seen.front_facing).all()
+    assert (turned.pixel == fragments.pixel).all()
+    assert (turned.triangle == fragments.triangle).all()
+    np.testing.assert_allclose(turned.barycentric[:, [2, 0, 1]], fragments.barycentric, atol=1e-6)
+    assert (turned.front_facing == fragments.front_facing).all()
     mirrored = rasterize(clip, triangles[:, ::-1], WIDTH, HEIGHT)
-    assert (mirrored.triangle == seen.triangle).all()
-    assert (mirrored.front_facing == ~seen.front_facing).all()
+    assert (mirrored.triangle == fragments.triangle).all()
+    assert (mirrored.front_facing == ~fragments.front_facing).all()
 
 
-def test_the_first_of_equal_depths_is_seen():
+def test_the_first_of_equal_depths_is_visible():
     x, y = np.array([1.0, 30, 8]), np.array([2.0, 5, 28])
     triangles = np.array([[0, 1, 2]] * 5)
     assert (rasterize(flat_clip(x, y), triangles, WIDTH, HEIGHT).triangle == 0).all()
@@ -213,16 +217,18 @@ def test_the_size_of_blocks_does_not_matter(monkeypatch, block, band):
     points = random.normal(size=(60, 3)) * (2, 2, 2) + (0, 0, -3)
     triangles = np.arange(60).reshape(20, 3)
     triangles = np.concatenate([triangles, triangles])
-    clip = to_clip(points, a_camera(True))
+    clip = to_clip(points, make_camera(True))
     expected = rasterize(clip, triangles, WIDTH, HEIGHT)
     monkeypatch.setattr(rasterizer, "BLOCK_SIZE", block)
     monkeypatch.setattr(rasterizer, "MAX_BAND_PIXELS", band)
-    for found, wanted in zip(rasterize(clip, triangles, WIDTH, HEIGHT), expected, strict=True):
-        assert (found == wanted).all()
+    for actual, expected_values in zip(
+        rasterize(clip, triangles, WIDTH, HEIGHT), expected, strict=True
+    ):
+        assert (actual == expected_values).all()
 
 
 @pytest.mark.parametrize("z", [-1.0, 1.0])
-def test_clip_planes_themselves_are_seen_and_beyond_is_not(z):
+def test_clip_planes_are_inclusive(z):
     x, y = np.array([0.0, 37, 0]), np.array([0.0, 0, 29])
     assert len(rasterize(flat_clip(x, y, z), np.array([[0, 1, 2]]), WIDTH, HEIGHT).pixel) > 400
     assert not len(
@@ -230,7 +236,7 @@ def test_clip_planes_themselves_are_seen_and_beyond_is_not(z):
     )
 
 
-def test_what_has_no_area_or_is_elsewhere_covers_nothing():
+def test_triangles_without_area_or_outside_the_frame_cover_nothing():
     x = np.array([3.0, 20, 11.5, 3, 3, -50, -90, -60])
     y = np.array([3.0, 20, 11.5, 3, 3, 10, 12, 20])
     triangles = np.array([[0, 1, 2], [0, 3, 4], [0, 0, 1], [5, 6, 7]])
@@ -238,12 +244,12 @@ def test_what_has_no_area_or_is_elsewhere_covers_nothing():
     assert not len(rasterize(flat_clip(x, y), triangles[:0], WIDTH, HEIGHT).pixel)
 
 
-def test_vertices_far_outside_the_frame_do_no_harm():
-    """A triangle of 10^12 pixels, whose one edge runs through the picture."""
+def test_vertices_far_outside_the_frame():
+    """A triangle of 10^12 pixels with an edge across the picture."""
     x, y = np.array([18.5, 18.5, 1e12]), np.array([-1e12, 1e12, 0.0])
-    seen = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
-    assert len(seen.pixel) == HEIGHT * (WIDTH - 18)
-    assert (seen.pixel % WIDTH >= 18).all()
+    fragments = rasterize(flat_clip(x, y), np.array([[0, 1, 2]]), WIDTH, HEIGHT)
+    assert len(fragments.pixel) == HEIGHT * (WIDTH - 18)
+    assert (fragments.pixel % WIDTH >= 18).all()
 
 
 def test_two_million_tiny_triangles_leave_no_hole():
@@ -258,18 +264,18 @@ def test_two_million_tiny_triangles_leave_no_hole():
     assert len(rasterize(clip, triangles, 256, 256).pixel) == 256 * 256
 
 
-def test_edges_meet_the_near_plane_in_the_same_point_from_both_sides():
-    """Bit for bit: else the two triangles of an edge would be cut apart by rounding."""
+def test_near_plane_intersections_do_not_depend_on_the_edge_direction():
+    """Intersections are bit-identical; otherwise rounding would separate adjacent triangles."""
     vertices = np.random.default_rng(3).normal(size=(2000, 4))
     first, second = np.arange(1000), np.arange(1000, 2000)
-    one = rasterizer._intersect_near(vertices, first, second)
-    assert (one == rasterizer._intersect_near(vertices, second, first)).all()
+    forward = rasterizer._intersect_near(vertices, first, second)
+    assert (forward == rasterizer._intersect_near(vertices, second, first)).all()
 
 
-def test_the_first_of_equal_depths_is_seen_among_cut_triangles_too():
-    camera = a_camera(True)
+def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():
+    camera = make_camera(True)
     points = np.array([[-50, -1, 60], [60, -1, 50], [40, -1, -70], [-45, -1, -40.0], [0, 1, -80]])
-    # A floor four times, cut in different shapes, and a wall that is whole.
+    # A floor four times, clipped in different ways, and a wall that is not clipped.
     triangles = np.array([[0, 1, 2], [1, 2, 0], [2, 3, 0], [0, 2, 3], [2, 3, 4], [2, 4, 3]])
-    seen = rasterize(to_clip(points, camera), triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
-    assert set(seen.triangle) <= {0, 1, 2}
+    fragments = rasterize(to_clip(points, camera), triangles[[4, 0, 2, 5, 0, 2]], WIDTH, HEIGHT)
+    assert set(fragments.triangle) <= {0, 1, 2}

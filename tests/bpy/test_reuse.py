@@ -164,7 +164,7 @@ def test_a_change_adds_only_results_of_its_object(scene, camera, monkey, run_sta
     assert len(BAKE_CACHE) == entries + 4
     set_vectors(plane.data, np.zeros((len(plane.data.polygons), 3)) + (1, 0, 0.5))
     bake(scene)
-    # Its original and its evaluated field, its instance, its corner field, and the last three again.
+    # Its original and its evaluated field, its instance, its corner field, and those three.
     assert len(BAKE_CACHE) == entries + 11
 
 

@@ -5,8 +5,8 @@
                          [--vulkan] [PYTEST...]
 
 REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. Screenshots of the
-panel are saved in DIR. The exit status is 0 only if all tests passed. The last line is a summary, as
-pytest's.
+panel are saved in DIR. The exit status is 0 only if all tests passed. The last line is a
+summary.
 """
 
 from __future__ import annotations

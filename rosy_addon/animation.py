@@ -1,7 +1,7 @@
 """The main job over a range of frames: read, draw and write each frame that is not up to date.
 
-The picture of a frame is a file in a folder. A sidecar file beside it holds a hash of everything that
-the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A frame is up
+The picture of a frame is a file in a folder. A sidecar file next to it holds a hash of everything
+that the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A frame is up
 to date if the picture exists and the hash is equal. So work that was stopped continues where it
 stopped, and a change draws only the frames that it affects. Both files are written under a temporary
 name and renamed, and equal inputs give equal bytes. Two processes may therefore share one folder; at

@@ -175,7 +175,7 @@ class ProgressiveRenderer:
         view.texture = run_to_completion(task)
         self.renderer.finish()
         elapsed = time.monotonic() - start_time
-        # The minimum keeps what is compiled or uploaded only once out of the estimate.
+        # The minimum keeps the cost of single compilations and uploads out of the estimate.
         cost = elapsed / max(megapixels, _MIN_MEGAPIXELS)
         self._seconds_per_megapixel = (
             cost

@@ -1,11 +1,11 @@
 """The main job over a range of frames: read, draw and write each frame that is not up to date.
 
 The picture of a frame is a file in a folder. A sidecar file next to it holds a hash of everything
-that the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A frame is up
-to date if the picture exists and the hash is equal. So work that was stopped continues where it
-stopped, and a change draws only the frames that it affects. Both files are written under a temporary
-name and renamed, and equal inputs give equal bytes. Two processes may therefore share one folder; at
-worst they draw a frame twice.
+that the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A
+frame is up to date if the picture exists and the hash is equal. So an interrupted job continues
+where it stopped, and after a change only the affected frames are drawn. Both files are written under
+a temporary name and renamed, and equal inputs give equal bytes. Two processes may therefore share
+one folder; at worst they draw a frame twice.
 """
 
 from __future__ import annotations

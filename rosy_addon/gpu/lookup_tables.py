@@ -26,7 +26,7 @@ NOISE_TILE_PIXELS = 256
 
 
 def palette(resources: GpuResources) -> Any:
-    """Return `family_hues.PALETTE`. It is also bound in place of textures that a shader does not read."""
+    """Return `family_hues.PALETTE`. It is also bound in place of textures that are not read."""
     return _color_table(resources, "palette", None, lambda: PALETTE)
 
 

@@ -42,8 +42,8 @@ class MeshBuffers:
     center : (3,) float64 ndarray
         Origin of all positions, so that surfaces far from the origin keep their precision.
     triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
-        The record of each triangle, `texels_per_record` consecutive texels (see `_triangle_records`).
-        None without a field.
+        The record of each triangle: `texels_per_record` consecutive texels, see
+        `_triangle_records`. None without a field.
     texels_per_record : int
     bounds : (8, 3) float64 ndarray
         Corners of the bounding box, relative to `center`.

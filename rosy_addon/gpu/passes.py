@@ -143,7 +143,7 @@ VISIBILITY = RasterPass(
     (*_CLIP_MATRIX, ("instance_id", "float")),
 )
 
-#: `VISIBILITY` with clip planes. It is a separate pass, because the planes take a third of its time.
+#: `VISIBILITY` with clip planes. It is a separate pass, as the planes take a third of its time.
 VISIBILITY_CLIPPED = RasterPass(
     "visibility_clipped",
     (),

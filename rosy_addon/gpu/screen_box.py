@@ -16,7 +16,7 @@ Box = tuple[int, int, int, int]
 def screen_box(item: DrawItem, camera: Camera) -> Box:
     """Return the box of the pixels that a mesh can cover.
 
-    The whole frame if the near plane cuts off a part of the bounds, an empty box if it cuts off all.
+    The whole frame if the near plane cuts off a part of the bounds; an empty box if it cuts off all.
     """
     points = np.concatenate([item.mesh.buffers.bounds, np.ones((8, 1))], axis=1)
     clip = points @ (camera.projection @ camera.view @ item.model_matrix).T

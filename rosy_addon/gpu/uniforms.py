@@ -74,7 +74,10 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
 
 
 def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of the LIC pass that depend on the look. Lengths are in pixels of the supersampled frame."""
+    """Return the uniforms of the LIC pass that depend on the look.
+
+    Lengths are in pixels of the supersampled frame.
+    """
     pixel_look = supersampled_look(look)
     _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, tapered=look.taper)
     gain = supersampling_gain(pixel_look) if look.supersampling > 1 else 1.0

@@ -33,7 +33,8 @@ Corners corner_normals(int triangle)
                  record_texel(triangle, NORMAL_TEXEL + 2).xyz);
 }
 
-// The rest positions: x is the fourth component of positions, y that of normals, z is in the last texel.
+// The rest positions: x is the fourth component of positions, y that of normals; z is in the last
+// texel.
 Corners rest_positions(int triangle)
 {
   vec3 z = record_texel(triangle, texels_per_record - 1).xyz;

@@ -12,7 +12,7 @@ A package imports only from those above it::
     ui                    properties, panels, preferences and overlay
     cli                   the command line
 
-The modules beside the packages are of two kinds. The base modules, such as `errors`, `progress`,
+The modules outside the packages are of two kinds. The base modules, such as `errors`, `progress`,
 `cache` and `settings`, are imported by many packages. The main jobs are run by operators and by the
 command line: `bake`, `animation`, `draw_strokes` and `turntable`.
 

@@ -1,11 +1,11 @@
 """The main job over a range of frames: read, draw and write each frame that is not up to date.
 
-The picture of a frame is a file in a folder. A sidecar file beside it holds a hash of everything that
-the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A frame is up
-to date if the picture exists and the hash is equal. So work that was stopped continues where it
-stopped, and a change draws only the frames that it affects. Both files are written under a temporary
-name and renamed, and equal inputs give equal bytes. Two processes may therefore share one folder; at
-worst they draw a frame twice.
+The picture of a frame is a file in a folder. A sidecar file next to it holds a hash of everything
+that the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A
+frame is up to date if the picture exists and the hash is equal. So an interrupted job continues
+where it stopped, and after a change only the affected frames are drawn. Both files are written under
+a temporary name and renamed, and equal inputs give equal bytes. Two processes may therefore share
+one folder; at worst they draw a frame twice.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ def bake_animation_task(
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its current frame is restored in the end.
+        Its current frame is restored at the end.
     frames : sequence of int
     cameras : sequence of bpy.types.Object, optional
-        One image sequence each. By default one sequence from the camera that renders each frame;
-        markers may change it.
+        One image sequence for each. By default there is one sequence, from the camera that renders
+        each frame; markers may change it.
     objects, look, size : optional
         As for `bake`. Settings of the scene's own look may be animated.
     settings : OutputSettings, optional
@@ -114,7 +114,7 @@ def bake_animation_task(
     sequence_cameras: dict[str, Camera] = {}
     start_time, rendered_count = time.monotonic(), 0
     scene_data = None
-    # After each frame, entries that it has not used are evicted.
+    # `_frame_task` evicts the entries that a frame has not used.
     exit_stack, cache = ExitStack(), Cache()
     try:
         depsgraph = scene_depsgraph(scene)
@@ -154,7 +154,7 @@ def bake_animation_task(
         return sequence_results
     finally:
         exit_stack.close()
-        cache.clear()  # of renderers, which refer to it
+        cache.clear()  # it holds renderers, which refer to the cache
         scene.frame_set(original_frame[0], subframe=original_frame[1])
 
 

@@ -100,12 +100,12 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
         Without ``--frames``, which is added.
     frames : sequence of int
     process_count : int
-        Clamped to 1 to the number of frames.
+        At most one for each frame is started, and at least one.
 
     Yields
     ------
     str
-        Lines of the output of all processes, as they come.
+        Lines of the output of all processes, in the order in which they arrive.
 
     Raises
     ------
@@ -254,6 +254,6 @@ def _error_line(output: Sequence[str]) -> str:
     It is the last line that begins with ``rosy:``, else the last line that is not empty.
     """
     lines = [line for line in output if line.strip()]
-    output = [line for line in lines if line.startswith("rosy: ")]
-    message = (output or lines or ["ended without output"])[-1].removeprefix("rosy: ")
+    error_lines = [line for line in lines if line.startswith("rosy: ")]
+    message = (error_lines or lines or ["ended without output"])[-1].removeprefix("rosy: ")
     return re.sub(r"^frame -?\d+: ", "", message)

@@ -1,7 +1,7 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
 A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
-`color`. Each field carries a `Setting`: its default, range, label, help text, place in the panels,
+`color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
 the stage of rendering that it affects and when it applies. Properties, panels, validation, command
 line options, tables of the documentation and cache keys are derived from these descriptions.
 """
@@ -80,7 +80,7 @@ class Setting:
         raise NotImplementedError
 
     def parse(self, text: str) -> Any:
-        """Return the value that a text on the command line stands for.
+        """Convert a text from the command line to a value of this setting.
 
         Only the type is converted; `check` tells whether the value is allowed.
 
@@ -133,7 +133,7 @@ class Number(Setting):
             self._refuse(value, f"a number from {self.low} to {self.high}")
 
     def parse(self, text: str) -> Any:
-        """Return the number that a text stands for."""
+        """Convert a text to a number."""
         return type(self.default)(text)
 
 
@@ -165,7 +165,7 @@ class Switch(Setting):
             self._refuse(value, "true or false")
 
     def parse(self, text: str) -> Any:
-        """Return the bool that a text stands for, or the text if it stands for none."""
+        """Convert a text to a bool. Return the text itself if it is not one of `SWITCH_VALUES`."""
         return SWITCH_VALUES.get(text.lower(), text)
 
 

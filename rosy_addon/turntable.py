@@ -26,7 +26,8 @@ from .render.view_input import ViewInput
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
-#: Encodes a video: folder of pictures, their number and size, frames per second, and the file.
+#: A function that encodes a video. Its arguments are the folder of pictures, their number and size,
+#: the frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
 #: Points per circle of the hull that is framed.
@@ -46,7 +47,7 @@ def turntable_views(
     perspective: bool = True,
     lights: Sequence[Light] = (),
 ) -> Iterator[ViewInput]:
-    """Return the views of a camera that orbits a mesh once, counter-clockwise.
+    """Yield the views of a camera that orbits a mesh once, counter-clockwise.
 
     Parameters
     ----------
@@ -62,6 +63,10 @@ def turntable_views(
     perspective : bool
     lights : sequence of Light
         World space. The camera moves, the lights do not.
+
+    Yields
+    ------
+    ViewInput
     """
     hull = _swept_hull(instance.world_points())
     for index in range(count):
@@ -181,11 +186,12 @@ def has_ffmpeg() -> bool:
 
 
 def check_video_path(path: Path) -> None:
-    """Refuse a file name of a video that cannot be written.
+    """Check that a video can be written under a file name.
 
     Raises
     ------
     RosyError
+        If the suffix is not one of `VIDEO_SUFFIXES`.
     """
     if path.suffix.lower() not in VIDEO_SUFFIXES:
         raise RosyError(f"{path}: the name of the video must end in {' or '.join(VIDEO_SUFFIXES)}")
@@ -194,6 +200,7 @@ def check_video_path(path: Path) -> None:
 def _encode_with_ffmpeg(
     folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
 ) -> None:
+    """Encode the pictures of a folder as .mp4 with the program ffmpeg. See `Encoder`."""
     command = [
         "ffmpeg", "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
         "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),

@@ -31,7 +31,7 @@ class CpuViewportRenderer:
     Attributes
     ----------
     downscale_factors, needs_occluders
-        As those of the protocol. Pictures have no depth, so occluders are needed.
+        See `ViewportRenderer`. Pictures have no depth, so occluders are needed.
     """
 
     downscale_factors = 4, 2
@@ -41,7 +41,7 @@ class CpuViewportRenderer:
         self._device = device
         self._cache = Cache()
         self._renderer = CpuRenderer(self._cache)
-        # Two triangles that fill the view, in front of all that is in it.
+        # Two triangles that fill the view, in front of everything in it.
         vertices = np.zeros((6, 4), dtype=np.float32)
         vertices[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
         vertices[:, 2] = -0.9999

@@ -13,10 +13,7 @@ import numpy as np
 from ..color import REC709_LUMINANCE
 from ..compositor.compose import COLOR_CONTRAST
 from ..compositor.covering import ALL_NEIGHBORS
-from ..compositor.hatching import (
-    MIN_COVERAGE,
-    RANK_BLEND,
-)
+from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
     FINALIZER_FACTORS,
@@ -123,7 +120,7 @@ HASH_CONSTANTS = dict(
 
 @lru_cache(maxsize=1)
 def shader_defines() -> str:
-    """Return a ``#define`` for each shared constant, one a line."""
+    """Return a ``#define`` for each shared constant, one per line."""
     values = {name: _float_literal(value) for name, value in FLOAT_CONSTANTS.items()}
     for name, vector in VECTOR_CONSTANTS.items():
         values[name] = f"vec{len(vector)}({', '.join(map(_float_literal, vector))})"
@@ -134,6 +131,6 @@ def shader_defines() -> str:
 
 
 def _float_literal(value: float) -> str:
-    """The shortest decimal number that rounds to the same single precision number."""
+    """Return the shortest decimal number that rounds to the same single precision number."""
     text = str(np.float32(value))
     return f"({text})" if value < 0 else text

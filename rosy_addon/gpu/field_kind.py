@@ -13,7 +13,7 @@ from .mesh_buffers import field_channels
 
 @dataclass(frozen=True)
 class FieldKind:
-    """What the shaders need to know of all fields of one degree.
+    """The shader constants of all fields of one degree.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class FieldKind:
     @property
     def harmonic_orders(self) -> list[int]:
         """Orders j of the harmonics, the first layers. Layers that fill a gap are 0."""
-        return [number for kind, number in self.channels if kind == "deviation"]
+        return [order for kind, order in self.channels if kind == "deviation"]
 
     @property
     def line_count(self) -> int:
@@ -62,7 +62,7 @@ def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
 
 def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
     """Return a kind with harmonics without gaps, and the first channel of families."""
-    harmonic_orders = [number for kind, number in channels if kind == "deviation"]
+    harmonic_orders = [order for kind, order in channels if kind == "deviation"]
     ordered: list[FieldChannel] = []
     if harmonic_orders:
         ordered = [("deviation", j) for j in range(min(harmonic_orders), max(harmonic_orders) + 1)]

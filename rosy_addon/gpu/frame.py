@@ -32,12 +32,12 @@ class Frame:
     camera : Camera
         Of the supersampled frame.
     look : Look
-        Lengths in pixels of the finished picture.
+        Its lengths are in pixels of the finished picture.
     lights : sequence of Light
     reference : ReferenceRender or None
     clip_planes : (6, 4) ndarray
     textures : dict of str to texture
-        Results of the passes so far, by the names that shaders read them by.
+        Results of the passes so far, by their names in shaders.
     """
 
     resources: GpuResources
@@ -72,7 +72,7 @@ class Frame:
         )
 
     def fields_in_view(self) -> Iterator[tuple[int, DrawItem, Box]]:
-        """Yield the id, item and box of each instance that has a field and can be visible."""
+        """Yield the id, item and box of each instance that has a field and may be visible."""
         for instance_id, item in enumerate(self.items):
             if item.field is not None:
                 box = screen_box(item, self.camera)

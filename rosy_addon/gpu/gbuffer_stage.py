@@ -1,4 +1,4 @@
-"""The G-buffer of a picture: what each pixel sees, and the surface and field there."""
+"""The G-buffer of a picture: the triangle that each pixel sees, and the surface and field there."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .uniforms import NO_CLIP_PLANES, clip_uniforms, uniform_scale
 
 
 def render_gbuffer(frame: Frame) -> None:
-    """Render which triangle each pixel sees, and the surface and field there.
+    """Render the G-buffer: the triangle that each pixel sees, and the surface and field there.
 
     The images are put into ``frame.textures``: ``visibility``, ``normals``, ``field_values``,
     ``depth_slopes`` and ``field_channels``.

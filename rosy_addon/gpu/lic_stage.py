@@ -14,7 +14,8 @@ from .passes import WORKGROUP_SIZE
 from .screen_box import Box
 from .uniforms import camera_uniforms, covering_uniforms, direction_uniforms, look_uniforms
 
-#: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers stop longer ones.
+#: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers abort runs that
+#: take too long.
 MAX_DISPATCH_STEPS = 1 << 29
 
 
@@ -65,7 +66,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -
     image, lines = frame.resources.image, kind.line_count
     cells = image("cells", *frame.size)
     directions = image("directions", *frame.size, "RGBA16F", lines)
-    angle_gradient = image("angle_gradients", *frame.size, "RGBA16F", lines)
+    angle_gradients = image("angle_gradients", *frame.size, "RGBA16F", lines)
     frame.run(
         passes.DIRECTIONS,
         box,
@@ -78,15 +79,15 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -
         },
     )
     textures = {"cells": cells, "directions": directions}
-    images = {"angle_gradients": angle_gradient}
+    images = {"angle_gradients": angle_gradients}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
-    return {"cells": cells, "angle_gradients": angle_gradient}
+    return {"cells": cells, "angle_gradients": angle_gradients}
 
 
 def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:
     """Return a texture of one texel: the largest magnitude of the fields of a kind.
 
-    Any texture if the look does not need it.
+    If the look does not need it, another texture that the shader does not read.
     """
     if not MAGNITUDE_MODES[look.magnitude] or look.magnitude_range:
         return textures["cells"]

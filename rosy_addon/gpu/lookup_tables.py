@@ -26,7 +26,7 @@ NOISE_TILE_PIXELS = 256
 
 
 def palette(resources: GpuResources) -> Any:
-    """Return `family_hues.PALETTE`. Also bound where a shader reads no texture."""
+    """Return `family_hues.PALETTE`. It is also bound in place of textures that are not read."""
     return _color_table(resources, "palette", None, lambda: PALETTE)
 
 
@@ -66,7 +66,7 @@ def picture_grain(
 ) -> Any:
     """Return `paper_grain.picture_paper_grain` in the first channel.
 
-    For a frame of this size, and a number of lines that each have their own part of it.
+    The texture is for a frame of this size. Each line has its own part of it.
     """
     if not has_paper_grain(look):
         return palette(resources)
@@ -83,7 +83,7 @@ def picture_grain(
 
 
 def picture_noise(resources: GpuResources, width: int, height: int, look: Look) -> Any:
-    """Return `image_noise.image_noise`, for a frame of this size."""
+    """Return the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(supersampled_look(look))
 
     def create(width: int, height: int) -> np.ndarray:

@@ -41,9 +41,9 @@ class MeshBuffers:
         Position of each corner of each triangle, and the id of the triangle.
     center : (3,) float64 ndarray
         Origin of all positions, so that surfaces far from the origin keep their precision.
-    triangle_records : (rows, ROW, 4) float32 ndarray or None
-        The record of each triangle, `texels_per_record` texels in a row (see `_triangle_records`). None
-        without a field.
+    triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
+        The record of each triangle: `texels_per_record` consecutive texels, see
+        `_triangle_records`. None without a field.
     texels_per_record : int
     bounds : (8, 3) float64 ndarray
         Corners of the bounding box, relative to `center`.
@@ -75,7 +75,8 @@ def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     linear : (3, 3) ndarray
-        The identity if the matrix is a similarity, so that a mesh that is moved stays on the device.
+        The part that changes the shape. It is the identity if the matrix is a similarity, so that a
+        mesh that is moved stays on the device.
     model_matrix : (4, 4) ndarray
         A rotation, a uniform scale and a translation.
     """

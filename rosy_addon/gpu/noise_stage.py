@@ -75,7 +75,7 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
 
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
-    """Return noise around its mean, without its low frequencies."""
+    """Return centered noise, without its low frequencies if `high_pass` is not 0."""
     size, blurred = frame.size, raw_noise
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)

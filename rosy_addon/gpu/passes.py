@@ -18,7 +18,7 @@ SHADER_FOLDER = Path(__file__).with_name("glsl")
 #: Width and height of a work group, in pixels.
 WORKGROUP_SIZE = (8, 8)
 
-#: Names and GLSL types of the uniforms of a shader.
+#: Names and GLSL types of the uniforms, or of the varyings, of a shader.
 Uniforms = tuple[tuple[str, str], ...]
 
 _CLIP_MATRIX: Uniforms = tuple((f"clip_{axis}", "vec4") for axis in "xyzw")
@@ -75,7 +75,6 @@ class ComputePass:
     textures: tuple[str, ...]
     images: tuple[tuple[str, str], ...]
     uniforms: Uniforms
-
     includes: tuple[str, ...] = ()
 
     @property
@@ -144,7 +143,7 @@ VISIBILITY = RasterPass(
     (*_CLIP_MATRIX, ("instance_id", "float")),
 )
 
-#: `VISIBILITY` with clip planes, which take a third of its time.
+#: `VISIBILITY` with clip planes. It is a separate pass, as the planes take a third of its time.
 VISIBILITY_CLIPPED = RasterPass(
     "visibility_clipped",
     (),

@@ -46,7 +46,7 @@ class GpuRenderer:
     Attributes
     ----------
     device_name, downscale_factors, needs_occluders
-        As those of the protocols.
+        See `Renderer` and `ViewportRenderer`.
     """
 
     device_name = "gpu"

@@ -90,7 +90,7 @@ class MipAtlas:
 
     Attributes
     ----------
-    texture
+    texture : texture
     size : (int, int)
         Width and height of level 0.
     max_level : int
@@ -105,7 +105,7 @@ class MipAtlas:
 
 
 class GpuResources:
-    """Owns what stays on a device, and frees what has not been used for some uploads.
+    """The meshes, images and textures on a device. Those not used for some uploads are freed.
 
     Parameters
     ----------
@@ -122,12 +122,12 @@ class GpuResources:
 
     @property
     def meshes(self) -> list[GpuMesh]:
-        """Return the meshes on the device."""
+        """The meshes on the device."""
         return list(self._meshes.values())
 
     @property
     def texture_count(self) -> int:
-        """Return the number of textures on the device."""
+        """The number of textures on the device."""
         records = sum(mesh.records_texture is not None for mesh in self.meshes)
         atlases = sum(mesh.tone_atlas is not None for mesh in self.meshes)
         return records + atlases + len(self._images) + len(self._lookup_textures)

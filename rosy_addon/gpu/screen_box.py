@@ -16,14 +16,14 @@ Box = tuple[int, int, int, int]
 def screen_box(item: DrawItem, camera: Camera) -> Box:
     """Return the box of the pixels that a mesh can cover.
 
-    The whole frame if a part of the bounds is in front of the near plane.
+    The whole frame if the near plane cuts off a part of the bounds; an empty box if it cuts off all.
     """
     points = np.concatenate([item.mesh.buffers.bounds, np.ones((8, 1))], axis=1)
     clip = points @ (camera.projection @ camera.view @ item.model_matrix).T
-    behind = clip[:, 2] < -clip[:, 3]
-    if behind.all():
+    is_cut_off = clip[:, 2] < -clip[:, 3]
+    if is_cut_off.all():
         return 0, 0, 0, 0
-    if behind.any() or (clip[:, 3] <= 0).any():
+    if is_cut_off.any() or (clip[:, 3] <= 0).any():
         return 0, 0, camera.width, camera.height
     ends = clip[:, :2] / clip[:, 3:] * 0.5 + 0.5
     size = np.array([camera.width, camera.height])
@@ -33,6 +33,7 @@ def screen_box(item: DrawItem, camera: Camera) -> Box:
 
 
 def is_empty(box: Box) -> bool:
+    """Return whether a box contains no pixel."""
     left, bottom, right, top = box
     return left >= right or bottom >= top
 

@@ -11,7 +11,7 @@ from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer
 
-#: What draws pictures: the names, and what a user reads of them.
+#: Devices that draw pictures, by key: label and description in the user interface.
 RENDER_DEVICES = {
     "cpu": ("Processor", "Identical pixels on every machine"),
     "gpu": ("Graphics Card", "Faster. Single pixels can differ between cards"),
@@ -33,7 +33,7 @@ def select_renderer(
     look : Look
     cache : Cache, optional
     keep_gbuffers : bool
-        What the processor keeps in the cache, see `CpuRenderer`.
+        Whether the processor keeps G-buffers in the cache; see `CpuRenderer`.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def clip_uniforms(
 
 
 def camera_uniforms(camera: Camera) -> dict[str, Any]:
-    """Return what maps pixels to the rays through their centers."""
+    """Return the uniforms that map pixels to the rays through their centers."""
     projection = camera.projection
     shift = projection[:2, 2] if camera.is_perspective else -projection[:2, 3]
     return {
@@ -74,7 +74,10 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
 
 
 def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the settings of the LIC pass. Lengths are in pixels of the supersampled frame."""
+    """Return the uniforms of the LIC pass that depend on the look.
+
+    Lengths are in pixels of the supersampled frame.
+    """
     pixel_look = supersampled_look(look)
     _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, tapered=look.taper)
     gain = supersampling_gain(pixel_look) if look.supersampling > 1 else 1.0
@@ -151,7 +154,7 @@ def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
 
 
 def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None) -> dict[str, Any]:
-    """Return the settings of the tone pass."""
+    """Return the uniforms of the tone pass that all instances share."""
     scale, black = tone_curve(look)
     to_reference = np.zeros((4, 4)) if reference is None else reference.reprojection(camera)
     return {
@@ -196,7 +199,7 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
 
 
 def instance_uniforms(instance_id: int, item: DrawItem, camera: Camera) -> dict[str, Any]:
-    """Return what passes over the pixels of one instance need."""
+    """Return the uniforms of passes over the pixels of one instance."""
     model_to_camera = camera.view @ item.model_matrix
     return {
         "instance_id": float(instance_id),
@@ -214,7 +217,7 @@ def uniform_scale(model_matrix: np.ndarray) -> float:
 
 
 def covering_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return how the sheets of the covering are numbered."""
+    """Return the uniforms that number the sheets of the covering."""
     return {
         "degree": kind.degree,
         "line_count": kind.line_count,
@@ -224,7 +227,7 @@ def covering_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
 
 
 def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
-    """Return the settings of the pass that unfolds the covering."""
+    """Return the uniforms of the pass that unfolds the covering."""
     orders = kind.harmonic_orders
     return {
         "camera_to_pixels": camera_to_pixels(camera),
@@ -237,12 +240,12 @@ def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str,
 
 
 def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return what the noise of all surfaces has in common.
+    """Return the uniforms of surface noise that all surfaces share.
 
     Parameters
     ----------
     settings : dict
-        Of `surface_noise.surface_noise`.
+        Arguments of `surface_noise.surface_noise`.
     """
     density = settings["density"]
     amplitude = NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS)

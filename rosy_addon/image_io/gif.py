@@ -102,14 +102,14 @@ def lzw_compress(data: bytes) -> bytes:
 
 
 def _palette() -> np.ndarray:
-    """(256, 3) display values: all combinations of the levels, then black for unused entries."""
+    """Return (256, 3) display values: all combinations of the levels, then black to fill up."""
     red, green, blue = (np.linspace(0, 255, count) for count in PALETTE_LEVELS)
     colors = np.stack(np.meshgrid(red, green, blue, indexing="ij"), axis=-1).reshape(-1, 3)
     return np.rint(np.concatenate([colors, np.zeros((256 - len(colors), 3))]))
 
 
 def _dither(frame: np.ndarray) -> np.ndarray:
-    """(H, W) uint8 palette indices of an (H, W, 3) uint8 frame, with ordered dithering."""
+    """Return (H, W) uint8 palette indices of an (H, W, 3) uint8 frame, with ordered dithering."""
     height, width = frame.shape[:2]
     threshold = np.tile(BAYER_MATRIX, (-(-height // 4), -(-width // 4)))[:height, :width]
     index = np.zeros((height, width), dtype=np.int64)

@@ -159,7 +159,7 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
         column = diagonal - row
         left, above, corner = out[row + 1, column], out[row, column + 1], out[row, column]
         estimate = left + above - corner
-        errors = [np.abs(estimate - near) for near in (left, above, corner)]
+        errors = [np.abs(estimate - neighbor) for neighbor in (left, above, corner)]
         paeth = np.where(
             (errors[0] <= errors[1]) & (errors[0] <= errors[2]),
             left,
@@ -173,7 +173,7 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
 
 
 def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray:
-    """(H, W, 4) uint8 colors of (H, W, 1) palette indices."""
+    """Return the (H, W, 4) uint8 colors of (H, W, 1) palette indices."""
     colors = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
     palette = np.full((len(colors), 4), 255, dtype=np.uint8)
     palette[:, :3] = colors
@@ -183,7 +183,7 @@ def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray
 
 
 def _to_linear_rgba(values: np.ndarray) -> np.ndarray:
-    """(H, W, 4) linear RGBA of gray, gray and alpha, RGB or RGBA display values from 0 to 1."""
+    """Convert gray, gray and alpha, RGB or RGBA display values, 0 to 1, to (H, W, 4) linear RGBA."""
     channels = values.shape[2]
     rgba = np.ones((*values.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = to_linear(values[..., : 3 if channels > 2 else 1])

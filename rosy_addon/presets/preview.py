@@ -68,7 +68,7 @@ def _fast_look(look: Look) -> Look:
 
 
 def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
-    """(H, W, 4) linear picture over the paper of the look, or over `BACKGROUND` if it has none."""
+    """Composite an (H, W, 4) linear picture over the paper of the look, or over `BACKGROUND`."""
     background = to_linear(from_hex(look.paper_colour if is_hatched(look) else BACKGROUND))
     alpha = rgba[..., 3:]
     opaque = np.ones_like(rgba)
@@ -104,7 +104,7 @@ def _trefoil_mesh(
 
 
 def _trefoil_curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) points of the trefoil knot at (n,) parameters, and (n, 3) unit tangents."""
+    """Return (n, 3) points of the trefoil knot at (n,) parameters, and (n, 3) unit tangents."""
     radius, height = 2 + np.cos(3 * t), 1.1
     curve = np.stack(
         [radius * np.cos(2 * t), radius * np.sin(2 * t), height * np.sin(3 * t)], axis=1

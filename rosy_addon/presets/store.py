@@ -35,7 +35,7 @@ MAX_NAME_LENGTH, MAX_DESCRIPTION_LENGTH, MAX_FILE_BYTES = 48, 200, 1 << 16
 
 #: File names that Windows reserves for devices, with any extension.
 WINDOWS_DEVICE_NAMES = {"con", "prn", "aux", "nul"} | {
-    f"{p}{n}" for p in ("com", "lpt") for n in range(10)
+    f"{port}{digit}" for port in ("com", "lpt") for digit in range(10)
 }
 
 
@@ -148,8 +148,8 @@ def read_preset(path: str | os.PathLike[str]) -> Preset:
     Raises
     ------
     RosyError
-        If the file cannot be read, is larger than `MAX_FILE_BYTES` or has another content, or if
-        there is no such setting or its value is not allowed.
+        If the file cannot be read, is larger than `MAX_FILE_BYTES` or is not a preset, or if it has
+        an unknown setting or a value that is not allowed.
     """
     data = _read_json_object(path)
     try:
@@ -208,7 +208,7 @@ def preset_key(name: str) -> str:
         If there is no letter or digit in the name.
     """
     normalized = unicodedata.normalize("NFC", name).lower()
-    words = "".join(sign if sign.isalnum() else " " for sign in normalized).split()
+    words = "".join(character if character.isalnum() else " " for character in normalized).split()
     if not words:
         raise RosyError(f"preset {_short_repr(name)}: the name needs a letter or a digit")
     key = "-".join(words)
@@ -324,6 +324,7 @@ def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
 
 
 def _user_file(key: str, user_folder: Path) -> Path:
+    """Return the file of one of the user's own presets. Raise RosyError if it is none of them."""
     path = preset_files(user_folder).get(key)
     if path is None or path.parent != user_folder:
         raise RosyError(f"'{key}' is not one of your presets")
@@ -331,6 +332,7 @@ def _user_file(key: str, user_folder: Path) -> Path:
 
 
 def _create_folder(folder: Path) -> None:
+    """Create a folder and its parents if they are missing. Raise RosyError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as reason:
@@ -338,6 +340,7 @@ def _create_folder(folder: Path) -> None:
 
 
 def _delete_file(path: Path) -> None:
+    """Delete a file if it exists. Raise RosyError if that fails."""
     try:
         path.unlink(missing_ok=True)
     except OSError as reason:
@@ -345,6 +348,7 @@ def _delete_file(path: Path) -> None:
 
 
 def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read a file with one JSON object. Raise RosyError if it is anything else."""
     data = read_bytes(path, reject_binary=True, max_bytes=MAX_FILE_BYTES)
     try:
         parsed = json.loads(data.decode("utf-8-sig"), object_pairs_hook=_reject_duplicate_keys)
@@ -364,6 +368,7 @@ def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the entries of a JSON object as a dict. Raise RosyError if a key appears twice."""
     result = dict(pairs)
     if len(result) < len(pairs):
         names = [name for name, _ in pairs]
@@ -373,5 +378,5 @@ def _reject_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _short_repr(value: Any) -> str:
-    """Abbreviated `repr` of a value from a file, for messages."""
+    """Return an abbreviated `repr` of a value from a file, for messages."""
     return reprlib.repr(value)

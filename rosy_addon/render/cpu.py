@@ -21,12 +21,12 @@ class CpuRenderer:
     Parameters
     ----------
     cache : Cache, optional
-        Keeps results from picture to picture. They are found again while the mesh instances are
-        the same objects, as far as they do not depend on a camera or setting that has changed.
-        Whoever owns the cache evicts. Without a cache nothing is kept.
+        Keeps results for later pictures. A result is reused while the mesh instances are the same
+        objects, and the camera and the settings that it depends on are unchanged. The owner of the
+        cache evicts its entries. Without a cache nothing is kept.
     keep_gbuffers : bool
-        Whether G-buffers and what is made of them are kept. Otherwise only what does not depend on
-        the camera is kept, as for animations.
+        Whether G-buffers and the results computed from them are kept. If not, as for animations,
+        only results that do not depend on the camera are kept.
     """
 
     device_name = "cpu"

@@ -80,7 +80,7 @@ def mesh_view(
 
 
 def check_light(light: str, name: str) -> None:
-    """Refuse the lights of a scene for a mesh that is not in one.
+    """Check that a light is not that of a scene, for a mesh that is not in one.
 
     Parameters
     ----------
@@ -92,6 +92,7 @@ def check_light(light: str, name: str) -> None:
     Raises
     ------
     RosyError
+        If the light is "scene".
     """
     if light == "scene":
         raise RosyError(

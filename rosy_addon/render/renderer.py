@@ -38,7 +38,7 @@ class Renderer(Protocol):
 class ViewportRenderer(Protocol):
     """Draws pictures that stay on the graphics card, and composites them over a 3D view.
 
-    Draw items and textures are handles that only the renderer looks into.
+    Draw items and textures are opaque handles.
 
     Attributes
     ----------

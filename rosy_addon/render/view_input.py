@@ -29,7 +29,7 @@ class ViewInput:
     reference : ReferenceRender or None
         For the tone "picture".
     clip_planes : (6, 4) float64 ndarray or None
-        World space. What is on the negative side of a plane is cut away.
+        World space. The negative side of each plane is cut away.
     """
 
     instances: tuple[MeshInstance, ...]

@@ -47,7 +47,7 @@ class BakeInfo:
 
 @dataclass(frozen=True)
 class RemovalCounts:
-    """Numbers of what was removed from a scene.
+    """Numbers of objects and datablocks that were removed from a scene.
 
     Attributes
     ----------

@@ -60,7 +60,7 @@ def frame_camera(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     bound = [marker for marker in scene.timeline_markers if marker.camera is not None]
     if not bound:
         return render_camera(scene)
-    # The same choice as Blender's.
+    # Blender makes the same choice.
     earlier = [marker for marker in bound if marker.frame <= frame]
     if earlier:
         return max(earlier, key=lambda marker: marker.frame).camera
@@ -95,7 +95,7 @@ def camera_of_object(
     Parameters
     ----------
     scene : bpy.types.Scene
-        Gives the pixel aspect and the default size.
+        Its pixel aspect and, by default, its size of renders are used.
     depsgraph : bpy.types.Depsgraph
     camera_object : bpy.types.Object
         Perspective or orthographic.
@@ -145,7 +145,7 @@ def resolve_camera(
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
     source : bpy.types.Object or Camera
-        A `Camera` is returned as it is, with its own size.
+        A `Camera` is returned unchanged, with its own size.
     size : (int, int), optional
         Pixels; by default the size of renders times the scene's percentage for pictures.
 

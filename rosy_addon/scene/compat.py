@@ -23,7 +23,7 @@ def has_nodes_by_default(material: bpy.types.Material) -> bool:
 def path_property_options() -> set[str]:
     """Return the ``options`` of a path property that may start with ``//``, the .blend's folder.
 
-    Blender 5.0 and later need an option for this. Before, every path property may start so.
+    Blender 5.0 and later need an option for this. Earlier versions allow it for all path properties.
     """
     is_supported = "is_path_supports_blend_relative" in bpy.types.Property.bl_rna.properties
     return {"ANIMATABLE", "PATH_SUPPORTS_BLEND_RELATIVE"} if is_supported else {"ANIMATABLE"}

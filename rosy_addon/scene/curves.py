@@ -40,7 +40,7 @@ def new_curves(
     name : str
     geometry : StrokeGeometry
     frame : int
-        Not used: curves have no frames. It is here for the same signature as `new_grease_pencil`.
+        Not used: curves have no frames. The signature is the same as that of `new_grease_pencil`.
     register : callable
         Called with each new datablock and its name.
     """

@@ -1,4 +1,4 @@
-"""Fields on evaluated meshes: temporary attributes that modifiers carry, and reading them again."""
+"""Fields on evaluated meshes: temporary attributes that modifiers copy, and reading them again."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..field.validate import apply_nonfinite_policy, project_to_tangent, tangent
 from .field_attributes import VECTOR_TYPE, cached_field, field_values
 from .meshes import read_attribute
 
-#: Temporary attribute while a scene is read: the normals of the original faces, on which the
-#: field's vectors were given. Modifiers carry it to the evaluated mesh.
+#: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
+#: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
 
@@ -122,10 +122,12 @@ def read_evaluated_field(
 
     key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
     if cache is None or surface.rest_vertices is None:
-        return cached_field(cache, surface, build_field, "carried", *key_parts)
+        return cached_field(cache, surface, build_field, "evaluated", *key_parts)
     # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
     rest_shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
-    return cache.get_or_create(("carried", content_hash(*rest_shape, *key_parts)), build_field)
+    return cache.get_or_create(
+        ("evaluated field", content_hash(*rest_shape, *key_parts)), build_field
+    )
 
 
 def _transported_vectors(
@@ -135,7 +137,7 @@ def _transported_vectors(
     source: str,
     nonfinite: str,
 ) -> np.ndarray:
-    """Return the vectors, (F, 3) float64, transported from the original to the new normals."""
+    """Return the vectors, (F, 3) float64, transported from the original to the evaluated faces."""
     vectors = values.astype(np.float64)
     apply_nonfinite_policy(vectors, source, "face", nonfinite)
     normals = tangent_normals(surface, "face")

@@ -31,7 +31,7 @@ def store_occlusion_task(
     """Compute the ambient occlusion of objects, and store it on their meshes.
 
     Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
-    the modifiers keep the faces, the original mesh otherwise. Modifiers then carry the attribute to
+    the modifiers keep the faces, the original mesh otherwise. Modifiers then copy the attribute to
     the evaluated mesh.
 
     Parameters

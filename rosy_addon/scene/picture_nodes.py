@@ -1,4 +1,4 @@
-"""What shows a picture on objects: a material per camera; a node group and a modifier per object."""
+"""Nodes that show a picture: a material per camera, a node group and a modifier per object."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def read_mesh_field(
 
     attribute_type = attribute.domain, attribute.data_type
     return cached_field(
-        cache, surface, build_field, "given", *attribute_type, values, degree, source, nonfinite
+        cache, surface, build_field, "attribute", *attribute_type, values, degree, source, nonfinite
     )
 
 

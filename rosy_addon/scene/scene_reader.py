@@ -156,8 +156,8 @@ class _SceneReader:
     occluders : list of MeshInstance
         All other instances.
     mesh_data : dict
-        What was read of each evaluated mesh; None if it has no faces. The key is the pointer of the
-        mesh and the original object, or None for an occluder.
+        The data of each evaluated mesh; None if it has no faces. The key is the pointer of the mesh,
+        and the original object or, for an occluder, None.
     """
 
     def __init__(
@@ -242,7 +242,7 @@ def temp_attributes(
     nonfinite: str,
     cache: Cache,
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
-    """Add temporary attributes that modifiers carry to evaluated meshes, and remove them at exit.
+    """Add temporary attributes that modifiers copy to evaluated meshes, and remove them at exit.
 
     The attributes are the rest positions, the normals of the original faces, and vectors on faces
     for fields that are stored in another form. All fields are checked on the original meshes.

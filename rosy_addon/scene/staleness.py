@@ -21,7 +21,7 @@ from .look_properties import read_look
 #: Seconds for which the cached state of a mesh is used before it is computed again.
 STATE_TTL_SECONDS = 1.0
 
-#: Checksums in the cache at which it is cleared, as the pointers of removed meshes stay in it.
+#: Number of checksums above which the cache is cleared, as the pointers of removed meshes stay in it.
 MAX_CACHED_STATES = 256
 
 #: Camera settings that change the picture.

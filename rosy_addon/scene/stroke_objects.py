@@ -122,7 +122,7 @@ def store_strokes(
         old_data, obj.data = obj.data, data
         _remove_data(old_data)
         for datablock, final_name in final_names.items():
-            datablock.name = final_name  # free now: the old data had it
+            datablock.name = final_name  # now free: the old data had this name
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()

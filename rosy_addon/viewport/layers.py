@@ -28,7 +28,7 @@ class LayerState:
     stale : bool
         Whether they must be read again.
     request_key : hashable
-        What was requested when they were read: occluders or not, and tones.
+        The options with which they were read: whether with occluders, and with which tones.
     """
 
     scene_cache: SceneCache = field(default_factory=SceneCache)
@@ -43,7 +43,8 @@ class LayerStates:
     Parameters
     ----------
     schedule_resolving : callable
-        Called without arguments while Blender draws; must have `resolve_topologies` called later.
+        Called without arguments while Blender draws. It must arrange for a later call of
+        `resolve_topologies`.
     """
 
     def __init__(self, schedule_resolving: Callable[[], None]) -> None:
@@ -81,22 +82,22 @@ class LayerStates:
         return layer
 
     def mark_all_stale(self) -> None:
-        """Have all layers read again."""
+        """Mark all layers, so that they are read again."""
         for layer in self._layers.values():
             layer.stale = True
 
     def clear(self) -> None:
-        """Forget all layers."""
+        """Drop all layers."""
         self._layers.clear()
 
     def invalidate(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:
-        """Note what has changed in a scene.
+        """Mark what has changed in a scene, so that it is read again.
 
         Parameters
         ----------
         scene : bpy.types.Scene
         depsgraph : bpy.types.Depsgraph or None
-            Its `updates` say what has changed. None: anything may have changed.
+            Its `updates` list what has changed. None: anything may have changed.
         """
         if self._is_resolving:
             return
@@ -125,7 +126,7 @@ class LayerStates:
                 layer.stale = True
 
     def resolve_topologies(self) -> None:
-        """Read what cannot be read while Blender draws, in all windows."""
+        """Read the data that cannot be read while Blender draws, in all windows."""
         self._is_resolving = True
         try:
             for window in bpy.context.window_manager.windows:

@@ -24,8 +24,8 @@ ABANDON_SECONDS = 1.0
 #: Cost of a preview relative to the final picture: half the size each way, streaks half as long.
 PREVIEW_COST_RATIO = 0.2
 
-#: Smallest size of a picture, in megapixels, for estimating the cost of one. Small pictures cost
-#: more than their pixels.
+#: Minimum size of a picture in estimates of the cost, in megapixels. The cost of smaller pictures is
+#: not proportional to their size.
 _MIN_MEGAPIXELS = 0.02
 
 
@@ -175,7 +175,7 @@ class ProgressiveRenderer:
         view.texture = run_to_completion(task)
         self.renderer.finish()
         elapsed = time.monotonic() - start_time
-        # The minimum keeps what is compiled or uploaded only once out of the estimate.
+        # The minimum keeps the cost of single compilations and uploads out of the estimate.
         cost = elapsed / max(megapixels, _MIN_MEGAPIXELS)
         self._seconds_per_megapixel = (
             cost

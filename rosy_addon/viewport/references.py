@@ -23,7 +23,8 @@ class ReferenceImages:
     Parameters
     ----------
     schedule_loading : callable
-        Called without arguments while Blender draws; must have `load_pending` called later.
+        Called without arguments while Blender draws. It must arrange for a later call of
+        `load_pending`.
     """
 
     def __init__(self, schedule_loading: Callable[[], None]) -> None:

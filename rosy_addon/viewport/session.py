@@ -152,7 +152,7 @@ class ViewportSession:
         redraw(self.spaces)
 
     def _resolve_topologies(self) -> None:
-        """Read what cannot be read while Blender draws."""
+        """Read the data that cannot be read while Blender draws."""
         self.layers.resolve_topologies()
         redraw(self.spaces)
 
@@ -162,7 +162,7 @@ class ViewportSession:
         redraw(self.spaces)
 
     def _schedule(self, seconds: float, name: str) -> None:
-        """Have a method called by a timer, unless its timer is running already."""
+        """Start a timer that calls a method, unless it is running already."""
         timer = self._timers[name]
         if not bpy.app.timers.is_registered(timer):
             bpy.app.timers.register(timer, first_interval=seconds)
@@ -316,7 +316,7 @@ def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:
 
 
 def stop(space: bpy.types.SpaceView3D | None = None) -> None:
-    """Make a 3D view no longer live; all of them if none is given."""
+    """Make a 3D view no longer live. By default, all of them."""
     global _session
     if _session is None:
         return

@@ -60,7 +60,7 @@ def clip_planes(region_3d: bpy.types.RegionView3D) -> np.ndarray | None:
     Returns
     -------
     (6, 4) float64 ndarray or None
-        World space. What is on the negative side of a plane is cut away.
+        World space. The negative side of each plane is cut away.
     """
     if not region_3d.use_clip_planes:
         return None

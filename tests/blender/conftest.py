@@ -31,7 +31,7 @@ def scene():
 
 
 def add_camera(name, location, rotation):
-    """A camera object in the current scene."""
+    """Add a camera object to the current scene."""
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     camera.location, camera.rotation_euler = location, rotation
     bpy.context.scene.collection.objects.link(camera)
@@ -63,18 +63,16 @@ def baked(with_field):
 
 
 def contents():
-    """Names of everything in the file, kind by kind, and what hangs on each object."""
+    """Return the names of all datablocks by kind, and what each object and mesh holds."""
     names = {}
     for prop in bpy.data.bl_rna.properties:
         if prop.type == "COLLECTION":
-            names[prop.identifier] = sorted(
-                thing.name for thing in getattr(bpy.data, prop.identifier)
-            )
-    for thing in bpy.data.objects:
-        names["object " + thing.name] = [
-            [modifier.name for modifier in thing.modifiers],
-            [slot.name for slot in thing.material_slots],
-            sorted(set(thing.keys()) - {"rosy"}),
+            names[prop.identifier] = sorted(obj.name for obj in getattr(bpy.data, prop.identifier))
+    for obj in bpy.data.objects:
+        names["object " + obj.name] = [
+            [modifier.name for modifier in obj.modifiers],
+            [slot.name for slot in obj.material_slots],
+            sorted(set(obj.keys()) - {"rosy"}),
         ]
     for mesh in bpy.data.meshes:
         names["mesh " + mesh.name] = [
@@ -85,7 +83,7 @@ def contents():
 
 
 def error_of(operator, *arguments, **settings):
-    """The text of the error that an operator reports."""
+    """Return the text of the error that an operator reports."""
     with pytest.raises(RuntimeError) as caught:
         operator(*arguments, **settings)
     return str(caught.value).strip()

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Install the built zip into an empty Blender and test it there, headless and in a window.
 
-    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--windows NAMES] [--vulkan] [PYTEST...]
+    tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--windows NAMES]
+                         [--vulkan] [PYTEST...]
 
-REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. The screenshots of the panel
-go to DIR. The exit status is 0 only if all tests passed; the last line sums up, as pytest does.
+REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. Screenshots of the
+panel are saved in DIR. The exit status is 0 only if all tests passed. The last line is a
+summary.
 """
 
 from __future__ import annotations
@@ -25,28 +27,28 @@ HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 
 #: Scripts that test in a window, by what they test.
-WINDOWS = {"panel": "window.py", "presets": "window_presets.py", "live": "window_live.py"}
+WINDOWS = {"panel": "window_panel.py", "presets": "window_presets.py", "live": "window_live.py"}
 
 
 def main() -> int:
-    options = arguments()
+    options = parse_arguments()
     start = time.monotonic()
     folder = Path(tempfile.mkdtemp(prefix="blender-lane-"))
     try:
-        counts = lane(options, folder)
-    except subprocess.TimeoutExpired as late:
-        print(f"Blender did not end within {late.timeout:.0f} s")
+        counts = run_tests(options, folder)
+    except subprocess.TimeoutExpired as error:
+        print(f"Blender did not end within {error.timeout:.0f} s")
         counts = {"errors": 1}
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    said = ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-    good = counts.get("passed", 0) > 0 and not counts.get("failed") and not counts.get("errors")
-    line = f" Blender {options.which}: {said} in {time.monotonic() - start:.0f}s "
+    summary = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)
+    passed = counts.get("passed", 0) > 0 and not counts.get("failed") and not counts.get("errors")
+    line = f" Blender {options.which}: {summary} in {time.monotonic() - start:.0f}s "
     print(line.center(80, "="))
-    return 0 if good else 1
+    return 0 if passed else 1
 
 
-def arguments() -> argparse.Namespace:
+def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("which", choices=("stable", "latest"))
     parser.add_argument("zip", type=Path)
@@ -72,8 +74,8 @@ def arguments() -> argparse.Namespace:
     return options
 
 
-def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
-    """Run all parts; how many tests passed, failed, had errors, were skipped."""
+def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
+    """Run all parts, and return how many tests passed, failed, had errors and were skipped."""
     zipped = folder / "rosy.zip"
     shutil.copy(options.zip, zipped)
     environment = dict(
@@ -87,10 +89,15 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
     backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
 
-    def blender(verb: str, *command: str, timeout: float = 480.0, **more) -> Any:
-        words = [str(options.real_blender), verb, options.which, *command]
+    def blender(verb: str, *command: str, timeout: float = 480.0, **run_options) -> Any:
+        full_command = [str(options.real_blender), verb, options.which, *command]
         return subprocess.run(
-            words, cwd=REPOSITORY, env=environment, timeout=timeout, check=False, **more
+            full_command,
+            cwd=REPOSITORY,
+            env=environment,
+            timeout=timeout,
+            check=False,
+            **run_options,
         )
 
     counts = {"failed": 0, "passed": 0, "skipped": 0, "errors": 0}
@@ -103,7 +110,7 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     if not options.only_window:
         results = folder / "results.xml"
         blender(
-            "run", *backend, "--python-exit-code", "1", "-P", str(HERE / "inside.py"), "--",
+            "run", *backend, "--python-exit-code", "1", "-P", str(HERE / "run_pytest.py"), "--",
             "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
             *options.pytest, str(HERE),
         )  # fmt: skip
@@ -114,19 +121,21 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         shots.mkdir()
         environment["ROSY_SHOTS"] = str(shots)
         for script in windows:
-            said = folder / f"{script}.json"
-            environment["ROSY_RESULTS"] = str(said)
-            patience = 900 if "ROSY_LIVE_MANY" in environment else 420
-            done = blender(
-                "gui", "-s", str(patience), *backend,
+            results_file = folder / f"{script}.json"
+            environment["ROSY_RESULTS"] = str(results_file)
+            time_limit = 900 if "ROSY_LIVE_MANY" in environment else 420
+            process = blender(
+                "gui", "-s", str(time_limit), *backend,
                 "--enable-event-simulate", "--python-exit-code", "1",
                 "-P", str(HERE / script),
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=patience + 60.0,
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=time_limit + 60.0,
             )  # fmt: skip
-            add_window(counts, said)
-            # A panel that cannot be drawn says so on the terminal and nowhere else.
-            if "Traceback" in done.stdout:
-                print("in the window:\n" + done.stdout[done.stdout.index("Traceback") :][:3000])
+            add_window(counts, results_file)
+            # Errors in the drawing of a panel appear on the terminal alone.
+            if "Traceback" in process.stdout:
+                print(
+                    "in the window:\n" + process.stdout[process.stdout.index("Traceback") :][:3000]
+                )
                 counts["failed"] += 1
         if options.shots is not None:
             shutil.copytree(shots, options.shots, dirs_exist_ok=True)
@@ -134,22 +143,27 @@ def lane(options: argparse.Namespace, folder: Path) -> dict[str, int]:
 
 
 def add_junit(counts: dict[str, int], results: Path) -> None:
-    """Count what pytest wrote; none at all is an error."""
+    """Add the counts of pytest's report. A missing report is an error."""
     if not results.is_file():
         print("the tests inside Blender did not come to their end")
         counts["errors"] += 1
         return
     suite = ElementTree.parse(results).getroot().find("testsuite")
-    number = {what: int(suite.get(what)) for what in ("tests", "failures", "errors", "skipped")}
-    counts["failed"] += number["failures"]
-    counts["errors"] += number["errors"]
-    counts["skipped"] += number["skipped"]
-    counts["passed"] += number["tests"] - number["failures"] - number["errors"] - number["skipped"]
+    suite_counts = {key: int(suite.get(key)) for key in ("tests", "failures", "errors", "skipped")}
+    counts["failed"] += suite_counts["failures"]
+    counts["errors"] += suite_counts["errors"]
+    counts["skipped"] += suite_counts["skipped"]
+    counts["passed"] += (
+        suite_counts["tests"]
+        - suite_counts["failures"]
+        - suite_counts["errors"]
+        - suite_counts["skipped"]
+    )
 
 
-def add_window(counts: dict[str, int], said: Path) -> None:
-    """Count what the run in a window wrote, step by step."""
-    steps = json.loads(said.read_text()) if said.is_file() else {}
+def add_window(counts: dict[str, int], results: Path) -> None:
+    """Add the results of the steps in a window. A missing end is an error."""
+    steps = json.loads(results.read_text()) if results.is_file() else {}
     for step, (failure, seconds) in steps.items():
         print(f"window: {step}: {failure or 'passed'} ({seconds} s)")
         counts["failed" if failure else "passed"] += 1

@@ -14,9 +14,9 @@ def baked_images():
     return [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
-def material_of(thing):
-    """What an object is drawn with once its modifiers have run."""
-    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+def material_of(obj):
+    """Return the material of the evaluated object."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return evaluated.data.materials[-1].original
 
 
@@ -27,7 +27,7 @@ def pixels(image):
 
 
 def render(scene, folder):
-    """What Cycles shows of the scene, (H, W, 4) as on screen, sampled at the centres of pixels."""
+    """Render the scene with Cycles: (H, W, 4) display values, sampled at the centers of pixels."""
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 4, False
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
@@ -55,22 +55,22 @@ bpy.ops.render.render(write_still=True)
 """
 
 
-def test_the_saved_file_renders_alike_without_the_extension(baked, scene, tmp_path):
+def test_the_saved_file_renders_without_the_extension(baked, scene, tmp_path):
     expected = render(scene, tmp_path)
     scene.render.filepath = str(tmp_path / "alone.png")
     path = tmp_path / "baked.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    words = ["-b", "--factory-startup", str(path), "--python-exit-code", "1"]
-    done = subprocess.run(
-        [bpy.app.binary_path, *words, "--python-expr", RENDER_ALONE],
+    options = ["-b", "--factory-startup", str(path), "--python-exit-code", "1"]
+    process = subprocess.run(
+        [bpy.app.binary_path, *options, "--python-expr", RENDER_ALONE],
         capture_output=True,
         text=True,
         timeout=120,
         check=False,
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    found = pixels(bpy.data.images.load(str(tmp_path / "alone.png")))
-    np.testing.assert_array_equal(found, expected)
+    assert process.returncode == 0, process.stdout + process.stderr
+    rendered = pixels(bpy.data.images.load(str(tmp_path / "alone.png")))
+    np.testing.assert_array_equal(rendered, expected)
     assert expected[..., :3][expected[..., 3] > 0.9].std() > 0.1
 
 
@@ -81,17 +81,17 @@ def test_cycles_shows_the_picture(with_field, scene, tmp_path, placement):
     bpy.ops.rosy.bake()
     (image,) = baked_images()
     picture = pixels(image)
-    seen = render(scene, tmp_path)
-    inside = (picture[..., 3] > 0.99) & (seen[..., 3] > 0.99)
+    rendered = render(scene, tmp_path)
+    inside = (picture[..., 3] > 0.99) & (rendered[..., 3] > 0.99)
     assert inside.mean() > 0.05
     assert (inside != (picture[..., 3] > 0.5)).mean() < 0.01
-    assert np.abs(seen - picture)[..., :3][inside].mean() < 0.02
+    assert np.abs(rendered - picture)[..., :3][inside].mean() < 0.02
 
 
-@pytest.mark.parametrize("what", ["another picture", "no picture"])
-def test_undo(with_field, scene, what):
-    """Undo brings back what was there before the bake, pixels included; redo the bake."""
-    if what == "another picture":
+@pytest.mark.parametrize("previous", ["another picture", "no picture"])
+def test_undo(with_field, scene, previous):
+    """Undo restores the file as it was before the bake, with all pixels; redo restores the bake."""
+    if previous == "another picture":
         scene.rosy.look.seed = 1
         bpy.ops.rosy.bake()
     before = contents()
@@ -113,7 +113,7 @@ def test_undo(with_field, scene, what):
         np.testing.assert_array_equal(pixels(image), picture)
 
 
-def test_remove_takes_everything_away(with_field):
+def test_remove(with_field):
     before = contents()
     bpy.ops.rosy.bake()
     assert contents() != before
@@ -125,16 +125,16 @@ def test_all_cameras(with_field, scene):
     add_camera("Behind", (0.0, 6.0, 0.0), (np.pi / 2, 0.0, np.pi))
     assert bpy.ops.rosy.bake(camera="ALL") == {"FINISHED"}
     assert len(baked_images()) == 2
-    shown = {material_of(with_field).name}
+    material_names = {material_of(with_field).name}
     for bake in scene.rosy.bakes:
         assert bpy.ops.rosy.show(camera=bake.name) == {"FINISHED"}
         assert material_of(with_field) == bake.material
-        shown.add(material_of(with_field).name)
-    assert len(shown) == 2
+        material_names.add(material_of(with_field).name)
+    assert len(material_names) == 2
     assert "Nobody" in error_of(bpy.ops.rosy.show, camera="Nobody")
 
 
-def test_bake_refuses(with_field, scene):
+def test_errors(with_field, scene):
     before = contents()
     camera = scene.camera
     scene.camera = None
@@ -162,11 +162,11 @@ def test_edit_mode_and_shared_mesh(with_field, scene):
     bpy.ops.object.mode_set(mode="EDIT")
     before = contents()
     try:
-        done = bpy.ops.rosy.bake()
+        result = bpy.ops.rosy.bake()
     except RuntimeError:
         assert contents() == before
     else:
-        assert done == {"FINISHED"}
+        assert result == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
@@ -194,10 +194,10 @@ def test_bake_animation(with_field, tmp_path):
 def test_turntable(with_field, tmp_path):
     for kind in (".gif", ".mp4"):
         path = tmp_path / f"film{kind}"
-        made = bpy.ops.rosy.turntable(
+        result = bpy.ops.rosy.turntable(
             filepath=str(path), film=kind, pictures=4, width=48, height=32
         )
-        assert made == {"FINISHED"} and path.stat().st_size > 500
+        assert result == {"FINISHED"} and path.stat().st_size > 500
     clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
     assert clip.frame_duration == 4
     assert len(bpy.data.scenes) == 1
@@ -208,17 +208,17 @@ def test_a_turntable_is_lit_by_the_scene(with_field, scene, tmp_path):
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.rotation_euler = (1.2, 0.0, 0.5)
     scene.collection.objects.link(sun)
-    films = []
+    videos = []
     for energy in (0.0, 3.0):
         sun.data.energy = energy
         path = tmp_path / f"{energy}.gif"
         settings = {"filepath": str(path), "film": ".gif", "width": 48, "height": 48}
         assert bpy.ops.rosy.turntable(pictures=2, **settings) == {"FINISHED"}
-        films.append(path.read_bytes())
-    assert films[0] != films[1]
+        videos.append(path.read_bytes())
+    assert videos[0] != videos[1]
 
 
-def test_a_turntable_takes_the_device_of_the_scene(with_field, scene, tmp_path):
+def test_a_turntable_uses_the_device_of_the_scene(with_field, scene, tmp_path):
     """The graphics card refuses the method "members", the processor draws it."""
     scene.rosy.look.method = "members"
     settings = {"filepath": str(tmp_path / "film.gif"), "film": ".gif", "pictures": 2}

@@ -1,6 +1,6 @@
-"""The graphics card against numpy, in this Blender: software OpenGL will do.
+"""The graphics card compared with numpy, in this Blender; software OpenGL is enough.
 
-`bench/parity.py` says what is measured, and runs the same at 512 x 512 for a table.
+`bench/parity.py` defines what is measured, and measures the same at 512 x 512 for a table.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from bench.parity import (
 )
 
 PACKAGE = f"{EXTENSION}.rosy_addon"
-#: Meshes of others.
+#: Meshes that are not part of the repository.
 DATA = Path(__file__).parents[3] / "shared" / "data"
-#: Half of the table's, and half of a streamline's usual length: the same part of the picture.
+#: Half of the table's size, and half of the default length: the same share of the picture.
 SIZE, LENGTH = 256, 20
 
 
@@ -58,14 +58,14 @@ def surface_of(rosy):
     return lru_cache(lambda name: surface_of_shape(rosy, name, DATA))
 
 
-def test_it_is_drawn_with_what_was_asked_for(card):
+def test_the_requested_backend_is_used(card):
     assert gpu.platform.backend_type_get() == os.environ["ROSY_BACKEND"].upper()
 
 
 @pytest.mark.parametrize("degree", DEGREES)
 @pytest.mark.parametrize("name", VIEWS)
 def test_parity(rosy, card, surface_of, name, degree):
-    """Without shading, which would be the same in both and flatter the correlation."""
+    """Without shading, which is the same in both and would raise the correlation."""
     surface = surface_of(name)
     if surface is None:
         pytest.skip(f"no {name} in ../shared/data")
@@ -74,15 +74,15 @@ def test_parity(rosy, card, surface_of, name, degree):
     pair = draw_pair(rosy, card, [instance], camera, rosy.Look(shading=0.0, length=LENGTH))
     assert len(pair.gbuffer.pixel) > 0.25 * SIZE * SIZE
     assert pair.agreement >= 0.999
-    # Around a sink of one direction brute force goes round in circles where the card passes through;
-    # with so few pixels that is a larger part of the picture.
+    # Around a sink of degree 1, brute force circles, and the card passes through. In such a small
+    # picture that area has a larger share.
     assert pair.likeness >= (0.98 if degree > 1 else 0.95)
 
 
 @pytest.mark.parametrize("degree", [3, 4])
 @pytest.mark.parametrize("anchor", ["picture", "surface"])
-def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
-    """All that makes lines uneven, and an ink for each family."""
+def test_parity_of_uneven_lines(rosy, card, surface_of, degree, anchor):
+    """All settings that make lines uneven, and an ink for each family."""
     surface = surface_of("torus")
     camera = camera_of_shape(rosy, "torus", surface, 2 * SIZE)
     instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "smoothest", degree))
@@ -104,32 +104,32 @@ def test_parity_of_ink_by_hand(rosy, card, surface_of, degree, anchor):
 
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
-    """What a bake would read: a field on faces, a modifier, instances, a lens that is shifted."""
+    """The input of a bake: a field on faces, a modifier, instances, and a shifted lens."""
     bpy.ops.rosy.field_generate(kind="curvature", degree=4)
     camera = scene.camera
     camera.data.type, camera.data.ortho_scale = kind, 4.0
     camera.data.shift_x, camera.data.shift_y = 0.12, -0.05
     mirrored = bpy.data.objects.new("Mirrored", suzanne.data)
     mirrored.location, mirrored.scale = (1.6, 1.0, 0.3), (-0.7, 0.7, 0.7)
-    hiding = bpy.data.objects.new("Hiding", bpy.data.meshes.new("Hiding"))
-    hiding.data.from_pydata([(-1, -2, -1), (0, -2, -1), (0, -2, 0)], [], [(0, 1, 2)])
-    for thing in (mirrored, hiding):
-        scene.collection.objects.link(thing)
+    occluder = bpy.data.objects.new("Hiding", bpy.data.meshes.new("Hiding"))
+    occluder.data.from_pydata([(-1, -2, -1), (0, -2, -1), (0, -2, 0)], [], [(0, 1, 2)])
+    for obj in (mirrored, occluder):
+        scene.collection.objects.link(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = module_of(PACKAGE, "scene.scene_reader").read_instances(depsgraph)
     assert [instance.field is None for instance in instances] == [False, False, True]
-    seen = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
+    view = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
     look = rosy.Look(shading=0.0)
-    pair = draw_pair(rosy, card, instances, seen, look)
+    pair = draw_pair(rosy, card, instances, view, look)
     assert set(np.unique(pair.gbuffer.instance_id)) == {0, 1}
     assert pair.agreement >= 0.999
     assert pair.likeness >= 0.98
-    # The fast way of numpy shares averages between neighbours, and is off from all others alike.
+    # The fast method of numpy shares averages between pixels: it differs from both pictures alike.
     fast = rosy.compose(pair.gbuffer, replace(look, method="sheets")).rgba
     assert likeness(pair.card, fast) >= likeness(pair.numpy, fast) - 0.02
 
 
-def test_what_blender_draws_with_is_as_it_was(rosy, card, surface_of):
+def test_the_state_of_blender_is_restored(rosy, card, surface_of):
     import gpu
 
     state = gpu.state
@@ -141,14 +141,14 @@ def test_what_blender_draws_with_is_as_it_was(rosy, card, surface_of):
         instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 2))
         camera = camera_of_shape(rosy, "sphere", surface, 64)
         draw_on_card(rosy, card, [instance], camera, rosy.Look())
-        found = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
-        assert found == ("GREATER", False, "ADDITIVE")
+        current = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
+        assert current == ("GREATER", False, "ADDITIVE")
     finally:
         state.depth_test_set("NONE")
         state.blend_set("NONE")
 
 
-def test_a_shader_that_the_driver_does_not_take_is_an_error_of_one_line(rosy, card, capfd):
+def test_a_rejected_shader_is_an_error_of_one_line(rosy, card, capfd):
     passes = module_of(PACKAGE, "gpu.passes")
     errors = module_of(PACKAGE, "errors")
 

@@ -21,13 +21,13 @@ def test_every_kind_on_every_mesh(scene, kind, name, capfd):
     points, faces = AWKWARD[name]()
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], faces)
-    layer = mesh.uv_layers.new(name="UVMap")
+    uv_layer = mesh.uv_layers.new(name="UVMap")
     corner = np.array([points[vertex] for face in faces for vertex in face], dtype=np.float32)
-    layer.uv.foreach_set("vector", (corner[:, :2] + 0.2 * corner[:, 2:]).ravel())
-    thing = bpy.data.objects.new(name, mesh)
-    scene.collection.objects.link(thing)
-    bpy.context.view_layer.objects.active = thing
-    thing.select_set(True)
+    uv_layer.uv.foreach_set("vector", (corner[:, :2] + 0.2 * corner[:, 2:]).ravel())
+    obj = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
     settings = {"guides": {"EDGES", "UV"}, "reach": 0.1} if kind == "guided" else {}
     if (kind, name) == ("features", "faces_without_area"):
         # The edges of an octahedron's triangles cancel out.

@@ -47,12 +47,12 @@ def test_generate_on_all_selected(suzanne):
     bpy.ops.mesh.primitive_torus_add(location=(3, 0, 0))
     suzanne.select_set(True)
     assert bpy.ops.rosy.field_generate(kind="axis", degree=3, axis=(1, 0, 0)) == {"FINISHED"}
-    for thing in bpy.context.selected_objects:
-        assert thing.data.rosy.degree == 3
-        assert "rosy" in thing.data.attributes
+    for obj in bpy.context.selected_objects:
+        assert obj.data.rosy.degree == 3
+        assert "rosy" in obj.data.attributes
 
 
-def test_generate_refuses(suzanne):
+def test_errors_of_generate(suzanne):
     before = contents()
     assert "curvature" in error_of(bpy.ops.rosy.field_generate, kind="curvature", degree=3)
     assert "axis" in error_of(bpy.ops.rosy.field_generate, kind="axis", axis=(0, 0, 0))
@@ -60,12 +60,12 @@ def test_generate_refuses(suzanne):
 
 
 def test_generate_on_an_empty_mesh_names_it(scene):
-    nothing = bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
-    scene.collection.objects.link(nothing)
-    bpy.context.view_layer.objects.active = nothing
-    nothing.select_set(True)
+    empty_object = bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
+    scene.collection.objects.link(empty_object)
+    bpy.context.view_layer.objects.active = empty_object
+    empty_object.select_set(True)
     assert "Nothing" in error_of(bpy.ops.rosy.field_generate, kind="axis")
-    assert not nothing.data.attributes.get("rosy")
+    assert not empty_object.data.attributes.get("rosy")
 
 
 def test_generate_undo(suzanne):
@@ -79,9 +79,9 @@ def test_generate_undo(suzanne):
     assert "rosy" in bpy.context.object.data.attributes
 
 
-@pytest.mark.parametrize("ending", [".rosy", ".rawfield"])
-def test_export_then_import(with_field, tmp_path, ending):
-    path = tmp_path / ("suzanne" + ending)
+@pytest.mark.parametrize("suffix", [".rosy", ".rawfield"])
+def test_export_then_import(with_field, tmp_path, suffix):
+    path = tmp_path / ("suzanne" + suffix)
     before = member_vectors(with_field.data)
     assert bpy.ops.rosy.field_export(filepath=str(path)) == {"FINISHED"}
     with_field.data.attributes.remove(with_field.data.attributes["rosy"])
@@ -91,7 +91,7 @@ def test_export_then_import(with_field, tmp_path, ending):
     np.testing.assert_allclose(member_vectors(with_field.data), before, atol=1e-5)
 
 
-def test_import_refuses(suzanne, tmp_path):
+def test_errors_of_import(suzanne, tmp_path):
     before = contents()
     missing = tmp_path / "missing.rosy"
     assert "missing.rosy" in error_of(bpy.ops.rosy.field_import, filepath=str(missing))
@@ -101,12 +101,12 @@ def test_import_refuses(suzanne, tmp_path):
     assert contents() == before
 
 
-def test_export_refuses(with_field, tmp_path):
+def test_errors_of_export(with_field, tmp_path):
     path = tmp_path / "no" / "folder" / "field.rosy"
     assert "field.rosy" in error_of(bpy.ops.rosy.field_export, filepath=str(path))
 
 
-def test_why_buttons_are_disabled(scene):
+def test_reasons_of_disabled_buttons(scene):
     assert not bpy.ops.rosy.bake.poll()
     assert "Select a mesh" in error_of(bpy.ops.rosy.field_generate)
     assert "field" in error_of(bpy.ops.rosy.bake)
@@ -140,8 +140,8 @@ def test_every_setting_of_a_look_is_shown_once():
 # --- guides ----------------------------------------------------------------------------------
 
 
-def ball_with(add):
-    """A sphere, and something beside it to follow; the sphere is active, both are selected."""
+def add_ball_and_guide(add):
+    """Add a sphere and a guide for it. The sphere is active; both are selected."""
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, location=(1.0, 2.0, 0.5))
     ball = bpy.context.object
     ball.rotation_euler = (0.3, 0.2, 0.1)
@@ -155,84 +155,85 @@ def ball_with(add):
     return ball, guide
 
 
-def arc_around(ball):
-    """Points on the sphere in the world, and the way they take."""
-    turn = np.linspace(0, 1.2, 25)
-    local = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
+def arc_on(ball):
+    """Return the points of an arc on the sphere, in world space."""
+    angle = np.linspace(0, 1.2, 25)
+    local = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
     matrix = np.array(ball.matrix_world)
     return local @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def drawn_curve(ball):
+def add_curve(ball):
     curve = bpy.data.curves.new("Curve", "CURVE")
     curve.dimensions = "3D"
-    points = arc_around(ball)
+    points = arc_on(ball)
     spline = curve.splines.new("POLY")
     spline.points.add(len(points) - 1)
     spline.points.foreach_set("co", np.c_[points, np.ones(len(points))].ravel())
-    return placed(curve)
+    return add_object(curve)
 
 
-def drawn_bezier(ball):
+def add_bezier(ball):
     curve = bpy.data.curves.new("Bezier", "CURVE")
     curve.dimensions = "3D"
-    points = arc_around(ball)[::6]
+    points = arc_on(ball)[::6]
     spline = curve.splines.new("BEZIER")
     spline.bezier_points.add(len(points) - 1)
     spline.bezier_points.foreach_set("co", points.ravel())
     for point in spline.bezier_points:
         point.handle_left_type = point.handle_right_type = "AUTO"
-    return placed(curve)
+    return add_object(curve)
 
 
-def drawn_hair(ball):
-    points = arc_around(ball)
+def add_hair(ball):
+    points = arc_on(ball)
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([len(points)])
     curves.position_data.foreach_set("vector", points.astype(np.float32).ravel())
-    return placed(curves)
+    return add_object(curves)
 
 
-def drawn_grease_pencil(ball):
-    points = arc_around(ball)
+def add_grease_pencil(ball):
+    points = arc_on(ball)
     if hasattr(bpy.data, "grease_pencils_v3") or bpy.app.version >= (4, 3, 0):
         newer = hasattr(bpy.data, "grease_pencils_v3")
         pencil = (bpy.data.grease_pencils_v3 if newer else bpy.data.grease_pencils).new("Pencil")
         drawing = pencil.layers.new("Lines").frames.new(1).drawing
         drawing.add_strokes([len(points)])
-        for point, place in zip(drawing.strokes[0].points, points, strict=True):
-            point.position = place
+        for point, position in zip(drawing.strokes[0].points, points, strict=True):
+            point.position = position
     else:
         pencil = bpy.data.grease_pencils.new("Pencil")
         stroke = pencil.layers.new("Lines").frames.new(1).strokes.new()
         stroke.points.add(len(points))
         stroke.points.foreach_set("co", points.ravel())
-    return placed(pencil)
+    return add_object(pencil)
 
 
-def placed(data):
-    thing = bpy.data.objects.new(data.name, data)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+def add_object(data):
+    """Add an object with data to the scene."""
+    obj = bpy.data.objects.new(data.name, data)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
-@pytest.mark.parametrize("add", [drawn_curve, drawn_bezier, drawn_hair, drawn_grease_pencil])
+@pytest.mark.parametrize("add", [add_curve, add_bezier, add_hair, add_grease_pencil])
 @pytest.mark.parametrize("named", [False, True])
 def test_strokes_are_followed(scene, add, named):
-    ball, guide = ball_with(add)
+    ball, guide = add_ball_and_guide(add)
     name = guide.name if named else ""
     assert bpy.ops.rosy.field_generate(kind="guided", degree=2, guide=name) == {"FINISHED"}
     vectors = member_vectors(ball.data)
-    centre = np.array([face.center for face in ball.data.polygons])
-    along = (np.abs(centre[:, 1]) < 0.04) & (centre[:, 0] > 0.4) & (centre[:, 2] > 0.1)
-    assert along.sum() > 10
-    way = np.stack([-centre[:, 2], 0 * centre[:, 1], centre[:, 0]], axis=1)
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    cosine = np.abs(np.sum(vectors * way, axis=1))[along]
+    center = np.array([face.center for face in ball.data.polygons])
+    near_arc = (np.abs(center[:, 1]) < 0.04) & (center[:, 0] > 0.4) & (center[:, 2] > 0.1)
+    assert near_arc.sum() > 10
+    tangent = np.stack([-center[:, 2], 0 * center[:, 1], center[:, 0]], axis=1)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    cosine = np.abs(np.sum(vectors * tangent, axis=1))[near_arc]
     assert np.degrees(np.arccos(cosine.clip(0, 1))).max() < 5
 
 
-def test_an_empty_guides_around_it(scene):
+def test_an_empty_is_followed(scene):
     def add(ball):
         empty = bpy.data.objects.new("Guide", None)
         bpy.context.scene.collection.objects.link(empty)
@@ -241,10 +242,10 @@ def test_an_empty_guides_around_it(scene):
         empty.empty_display_size = 0.4
         return empty
 
-    ball, guide = ball_with(add)
+    ball, guide = add_ball_and_guide(add)
     assert bpy.ops.rosy.field_generate(kind="guided", degree=1) == {"FINISHED"}
-    place = ball.matrix_world.inverted() @ guide.location
-    face = min(ball.data.polygons, key=lambda face: (face.center - place).length)
+    position = ball.matrix_world.inverted() @ guide.location
+    face = min(ball.data.polygons, key=lambda face: (face.center - position).length)
     axis = np.array((ball.matrix_world.inverted() @ guide.matrix_world).col[2][:3])
     normal = np.array(face.normal)
     axis -= normal * (axis @ normal)
@@ -254,14 +255,14 @@ def test_an_empty_guides_around_it(scene):
 
 def test_marked_edges_uv_and_vectors_together(suzanne):
     assert bpy.ops.rosy.field_generate(kind="axis", degree=4, attribute="wind") == {"FINISHED"}
-    made = bpy.ops.rosy.field_generate(
+    result = bpy.ops.rosy.field_generate(
         kind="guided", degree=4, guides={"EDGES", "UV", "ATTRIBUTE"}, vectors="wind", reach=0.02
     )
-    assert made == {"FINISHED"}
+    assert result == {"FINISHED"}
     assert np.linalg.norm(member_vectors(suzanne.data), axis=1).min() > 0.5
 
 
-def test_guides_that_are_not_there(suzanne):
+def test_missing_guides(suzanne):
     before = contents()
     generate = bpy.ops.rosy.field_generate
     assert "there are no guides" in error_of(generate, kind="guided")
@@ -293,7 +294,7 @@ def test_convert(suzanne):
     assert len(before) == len(length)
 
 
-def test_convert_refuses(suzanne):
+def test_errors_of_convert(suzanne):
     bpy.ops.rosy.field_generate(kind="axis", degree=4)
     before = contents()
     assert "neither a multiple" in error_of(bpy.ops.rosy.field_convert, degree=3)
@@ -305,15 +306,15 @@ def test_convert_refuses(suzanne):
 def test_store(suzanne, form):
     bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
     assert bpy.ops.rosy.field_store(form=form) == {"FINISHED"}
-    wanted = {"VECTOR": "rosy", "DIRECTIONS": "dir3", "ANGLE": "rosy_angle"}[form]
-    assert suzanne.data.attributes[wanted].domain == "FACE"
-    assert "energy" not in error_free_info(suzanne)
+    attribute_name = {"VECTOR": "rosy", "DIRECTIONS": "dir3", "ANGLE": "rosy_angle"}[form]
+    assert suzanne.data.attributes[attribute_name].domain == "FACE"
+    assert "energy" not in names_of_readable_field(suzanne)
 
 
-def error_free_info(thing):
-    """The field can be read again as it is stored now."""
+def names_of_readable_field(obj):
+    """Check that the stored field can be read, and return the names of the attributes."""
     assert bpy.ops.rosy.field_convert(angle=0.0) == {"FINISHED"}
-    return thing.data.attributes.keys()
+    return obj.data.attributes.keys()
 
 
 # --- singularities ---------------------------------------------------------------------------
@@ -329,21 +330,21 @@ def test_singularities_as_points(scene):
     assert points.parent == ball
     values = points.data.attributes["index"].data
     assert sum(value.value for value in values) == 8
-    place = points.data.attributes["position"].data
-    assert all(abs(point.vector.length - 1) < 0.02 for point in place)
+    positions = points.data.attributes["position"].data
+    assert all(abs(point.vector.length - 1) < 0.02 for point in positions)
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
     assert overlay.is_shown("Icosphere")
-    # Again: in their place.
+    # They replace the earlier ones.
     assert bpy.ops.rosy.singularities(show="POINTS") == {"FINISHED"}
-    assert [o.name for o in bpy.data.objects if "singularities" in o.name] == [name]
+    assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == [name]
     assert bpy.ops.rosy.singularities(show="NONE") == {"FINISHED"}
     assert "Icosphere singularities" not in bpy.data.objects
     assert not len(bpy.data.pointclouds) and len(bpy.data.meshes) == len(
-        {o.data for o in bpy.data.objects if o.type == "MESH"}
+        {obj.data for obj in bpy.data.objects if obj.type == "MESH"}
     )
 
 
-def test_another_file_has_no_singularities(scene):
+def test_opening_a_file_hides_singularities(scene):
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
     handlers = len(bpy.app.handlers.load_pre)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
@@ -380,10 +381,10 @@ def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
     bpy.ops.object.mode_set(mode="OBJECT")
     suzanne.data.attributes.remove(suzanne.data.attributes["rosy"])
     assert bpy.ops.rosy.field_import(filepath=str(path)) == {"FINISHED"}
-    found = member_vectors(suzanne.data)
-    assert np.linalg.norm(found, axis=1).mean() > 0.5
+    vectors = member_vectors(suzanne.data)
+    assert np.linalg.norm(vectors, axis=1).mean() > 0.5
     axis = np.array((0.2, 0.3, 1.0)) / np.linalg.norm((0.2, 0.3, 1.0))
-    assert np.median(found @ axis) > 0.4
+    assert np.median(vectors @ axis) > 0.4
 
 
 # --- occlusion ------------------------------------------------------------------------------------

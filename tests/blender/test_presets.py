@@ -1,4 +1,4 @@
-"""Presets of the user's own, through the buttons' operators in the installed extension."""
+"""Presets of the user, with the operators of the installed extension."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def folder():
 
 
 @pytest.fixture(autouse=True)
-def empty_shelf(scene):
-    """No preset of the user's own, before and after."""
+def no_user_presets(scene):
+    """Delete all presets of the user, before and after each test."""
     for path in folder().glob("*"):
         path.unlink()
     yield
@@ -28,11 +28,11 @@ def look():
     return bpy.context.scene.rosy.look
 
 
-def save(name="My Ink", sentence="Long lines", **more):
-    return bpy.ops.rosy.preset_save(name=name, sentence=sentence, **more)
+def save(name="My Ink", sentence="Long lines", **options):
+    return bpy.ops.rosy.preset_save(name=name, sentence=sentence, **options)
 
 
-def test_saved_in_the_folder_of_the_extension(scene):
+def test_presets_are_saved_in_the_folder_of_the_extension(scene):
     look().length, look().ink = 90, "hatch"
     assert save() == {"FINISHED"}
     stored = json.loads((folder() / "my-ink.json").read_text())
@@ -51,13 +51,13 @@ def test_saved_in_the_folder_of_the_extension(scene):
     assert (look().length, look().ink) == (90, "hatch")
 
 
-def test_saved_without_a_trace_in_the_file(suzanne):
+def test_saving_changes_nothing_in_the_file(suzanne):
     before = contents()
     save()
     assert contents() == before
 
 
-def test_replaced_only_if_asked(scene):
+def test_presets_are_replaced_only_on_request(scene):
     save()
     look().length = 7
     assert "already" in error_of(save)
@@ -68,16 +68,16 @@ def test_replaced_only_if_asked(scene):
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "expected"),
     [("Plaid", "a preset of RoSy"), ("..", "letter or a digit"), ("", "letter or a digit")],
 )
-def test_names_that_are_refused(scene, name, said):
+def test_invalid_names(scene, name, expected):
     message = error_of(save, name)
-    assert said in message and "Traceback" not in message
+    assert expected in message and "Traceback" not in message
     assert not list(folder().glob("*")) and scene.rosy.preset == "default"
 
 
-def test_renamed_and_deleted(scene):
+def test_rename_and_delete(scene):
     assert not bpy.ops.rosy.preset_rename.poll() and not bpy.ops.rosy.preset_remove.poll()
     save()
     assert bpy.ops.rosy.preset_rename(name="Your Ink", sentence="Longer") == {"FINISHED"}
@@ -94,32 +94,32 @@ def test_renamed_and_deleted(scene):
     assert "You have no presets" in error_of(bpy.ops.rosy.preset_remove)
 
 
-def test_passed_on(scene, tmp_path):
+def test_export_and_import(scene, tmp_path):
     look().length = 90
     save()
     path = tmp_path / "passed on.json"
     assert bpy.ops.rosy.preset_export(filepath=str(path), preset="my-ink") == {"FINISHED"}
     assert path.read_bytes() == (folder() / "my-ink.json").read_bytes()
-    drawn = (folder() / "my-ink.png").read_bytes()
+    preview = (folder() / "my-ink.png").read_bytes()
     assert "already" in error_of(bpy.ops.rosy.preset_import, filepath=str(path))
     bpy.ops.rosy.preset_remove()
     assert bpy.ops.rosy.preset_import(filepath=str(path)) == {"FINISHED"}
     assert (folder() / "my-ink.json").read_bytes() == path.read_bytes()
-    assert (folder() / "my-ink.png").read_bytes() == drawn
+    assert (folder() / "my-ink.png").read_bytes() == preview
     bpy.ops.rosy.preset_apply(preset="my-ink")
     assert look().length == 90
 
 
-def test_files_of_strangers_are_refused(scene, tmp_path):
+def test_hostile_files_are_refused(scene, tmp_path):
     path = tmp_path / "a.json"
-    for text, said in (
+    for text, expected in (
         ("[" * 50_000, "a.json"),
         ('{"name": "../../a", "description": "", "look": {"length": "x"}}', "'length'"),
         ('{"name": "a", "description": "", "look": {"sparkle": 1}}', "update RoSy"),
     ):
         path.write_text(text)
         message = error_of(bpy.ops.rosy.preset_import, filepath=str(path))
-        assert said in message and "Traceback" not in message
+        assert expected in message and "Traceback" not in message
     assert "no such file" in error_of(bpy.ops.rosy.preset_import, filepath=str(tmp_path / "b.json"))
     assert not list(folder().glob("*"))
     path.write_text('{"name": "../../a b", "description": "", "look": {}}')
@@ -127,29 +127,29 @@ def test_files_of_strangers_are_refused(scene, tmp_path):
     assert (folder() / "a-b.json").is_file()
 
 
-def test_a_scene_starts_from_ones_own(scene):
-    wished = bpy.context.preferences.addons[EXTENSION].preferences
+def test_a_scene_starts_from_the_preferred_preset(scene):
+    preferences = bpy.context.preferences.addons[EXTENSION].preferences
     look().length = 90
     save()
     bpy.ops.wm.read_homefile(use_empty=True)
-    wished.preset = "my-ink"
+    preferences.preset = "my-ink"
     try:
         bpy.ops.mesh.primitive_cube_add()
         bpy.ops.rosy.field_generate(kind="axis", degree=4)
         assert (look().length, bpy.context.scene.rosy.preset) == (90, "my-ink")
     finally:
-        wished.preset = ""
+        preferences.preset = ""
 
 
-def test_the_command_line_knows_ones_own(with_field, tmp_path):
+def test_user_presets_on_the_command_line(with_field, tmp_path):
     from test_command import command
 
     look().length = 90
     save()
     path = tmp_path / "suzanne.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    status, said = command("presets")
-    assert status == 0 and "my-ink" in said and str(folder()) in said
-    words = ("--size", "64x48", "--out", tmp_path / "out")
-    status, said = command("bake", "--preset", "my-ink", *words, scene=path)
-    assert status == 0, said
+    status, output = command("presets")
+    assert status == 0 and "my-ink" in output and str(folder()) in output
+    options = ("--size", "64x48", "--out", tmp_path / "out")
+    status, output = command("bake", "--preset", "my-ink", *options, scene=path)
+    assert status == 0, output

@@ -1,4 +1,4 @@
-"""Strokes in a full Blender: drawn by the operator, rendered where they are, undone, taken away."""
+"""Strokes in a full Blender: drawn by the operator, rendered, undone and removed."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def stroke_objects():
-    return [thing for thing in bpy.data.objects if thing.type in ("GREASEPENCIL", "CURVES")]
+    return [obj for obj in bpy.data.objects if obj.type in ("GREASEPENCIL", "CURVES")]
 
 
 @pytest.fixture
-def drawn(with_field, scene):
-    """Suzanne with a field, and what is asked of her strokes."""
+def with_stroke_settings(with_field, scene):
+    """Suzanne with a field, and the settings of strokes."""
     settings = scene.rosy.strokes
     settings.spacing, settings.width, settings.outline, settings.taper = 7.0, 2.0, True, 0.0
     return with_field
 
 
-def ink(scene, path, engine="BLENDER_WORKBENCH"):
-    """(H, W) how much ink covers each pixel of a render of the strokes alone, rows from the top."""
-    for thing in bpy.data.objects:
-        thing.hide_render = thing.type == "MESH"
+def render_strokes(scene, path, engine="BLENDER_WORKBENCH"):
+    """Render the strokes alone, and return the (H, W) alpha, rows from the top."""
+    for obj in bpy.data.objects:
+        obj.hide_render = obj.type == "MESH"
     scene.render.engine = engine
     scene.render.film_transparent = True
     settings = scene.render.image_settings
@@ -43,67 +43,73 @@ def ink(scene, path, engine="BLENDER_WORKBENCH"):
     return values.reshape(image.size[1], image.size[0], 4)[::-1, :, 3]
 
 
-def ink_of_svg(path, width, height, fine=6):
-    """(H, W) how much of each pixel the paths of a file cover, by many small discs."""
-    canvas = np.zeros((height * fine, width * fine), dtype=bool)
-    y, x = np.mgrid[: height * fine, : width * fine] + 0.5
+def coverage_of_svg(path, width, height, subpixels=6):
+    """Return the (H, W) share of each pixel that the paths of a file cover."""
+    canvas = np.zeros((height * subpixels, width * subpixels), dtype=bool)
+    y, x = np.mgrid[: height * subpixels, : width * subpixels] + 0.5
     for group in ElementTree.parse(path).getroot().findall(SVG + "g"):
         for line in group.findall(SVG + "path"):
-            r = float(line.get("stroke-width", group.get("stroke-width"))) / 2 * fine
+            radius = float(line.get("stroke-width", group.get("stroke-width"))) / 2 * subpixels
             text = line.get("d")[1:].removesuffix("Z").split()
-            points = np.array([[float(v) for v in pair.split(",")] for pair in text]) * fine
+            points = np.array([[float(v) for v in pair.split(",")] for pair in text]) * subpixels
             if line.get("d").endswith("Z"):
                 points = np.concatenate([points, points[:1]])
             for a, b in pairwise(points):
                 steps = int(np.hypot(*(b - a)) / 2) + 1
-                for at in a + np.linspace(0, 1, steps + 1)[:, None] * (b - a):
-                    rows = slice(max(int(at[1] - r) - 1, 0), max(int(at[1] + r) + 2, 0))
-                    columns = slice(max(int(at[0] - r) - 1, 0), max(int(at[0] + r) + 2, 0))
+                for center in a + np.linspace(0, 1, steps + 1)[:, None] * (b - a):
+                    rows = slice(
+                        max(int(center[1] - radius) - 1, 0), max(int(center[1] + radius) + 2, 0)
+                    )
+                    columns = slice(
+                        max(int(center[0] - radius) - 1, 0), max(int(center[0] + radius) + 2, 0)
+                    )
                     box = rows, columns
-                    canvas[box] |= np.hypot(x[box] - at[0], y[box] - at[1]) <= r
-    return canvas.reshape(height, fine, width, fine).mean(axis=(1, 3))
+                    canvas[box] |= np.hypot(x[box] - center[0], y[box] - center[1]) <= radius
+    return canvas.reshape(height, subpixels, width, subpixels).mean(axis=(1, 3))
 
 
 @pytest.mark.parametrize(
     ("kind", "engine"), [("PENCIL", "BLENDER_WORKBENCH"), ("CURVES", "CYCLES")]
 )
-def test_renders_show_ink_where_the_file_has_it(drawn, scene, tmp_path, kind, engine):
+def test_renders_show_ink_where_the_file_has_it(
+    with_stroke_settings, scene, tmp_path, kind, engine
+):
     path = tmp_path / "strokes.svg"
     assert bpy.ops.rosy.strokes(kind="SVG", filepath=str(path)) == {"FINISHED"}
-    expected = ink_of_svg(path, 160, 120)
+    expected = coverage_of_svg(path, 160, 120)
     assert bpy.ops.rosy.strokes(kind=kind) == {"FINISHED"}
-    found = ink(scene, tmp_path / "render.png", engine)
+    rendered = render_strokes(scene, tmp_path / "render.png", engine)
     assert expected.mean() > 0.05
-    alike = np.corrcoef(found.ravel(), expected.ravel())[0, 1]
+    correlation = np.corrcoef(rendered.ravel(), expected.ravel())[0, 1]
 
-    assert alike > 0.93
-    assert np.isclose(found.mean(), expected.mean(), rtol=0.15)
+    assert correlation > 0.93
+    assert np.isclose(rendered.mean(), expected.mean(), rtol=0.15)
     for step in (-1, 1):
         for axis in (0, 1):
-            aside = np.corrcoef(np.roll(found, step, axis).ravel(), expected.ravel())[0, 1]
-            assert aside < alike - 0.05
+            shifted = np.corrcoef(np.roll(rendered, step, axis).ravel(), expected.ravel())[0, 1]
+            assert shifted < correlation - 0.05
 
 
-def test_what_is_hidden_is_not_rendered(drawn, scene, tmp_path):
+def test_hidden_strokes_are_not_rendered(with_stroke_settings, scene, tmp_path):
     bpy.ops.mesh.primitive_plane_add(
         size=1.0, location=(0.0, -2.0, 0.6), rotation=(np.pi / 2, 0, 0)
     )
     scene.rosy.strokes.outline, scene.rosy.strokes.spacing = False, 4.0
     assert bpy.ops.rosy.strokes(kind="PENCIL") == {"FINISHED"}
-    found = ink(scene, tmp_path / "render.png")
-    middle = found[52:68, 72:88]  # what the square covers, and more
-    assert found.mean() > 0.03 and middle.max() < 0.02
+    rendered = render_strokes(scene, tmp_path / "render.png")
+    middle = rendered[52:68, 72:88]  # what the square covers, and more
+    assert rendered.mean() > 0.03 and middle.max() < 0.02
     scene.rosy.strokes.hidden = True
     bpy.data.objects["Suzanne"].hide_render = False
     assert bpy.ops.rosy.strokes(kind="PENCIL") == {"FINISHED"}
-    assert ink(scene, tmp_path / "kept.png")[52:68, 72:88].mean() > 0.1
+    assert render_strokes(scene, tmp_path / "kept.png")[52:68, 72:88].mean() > 0.1
 
 
-def test_grease_pencil_data(drawn, scene):
+def test_grease_pencil_data(with_stroke_settings, scene):
     assert bpy.ops.rosy.strokes(kind="PENCIL") == {"FINISHED"}
-    (thing,) = stroke_objects()
-    assert [layer.name for layer in thing.data.layers] == ["Family 1", "Family 2", "Outline"]
-    for number, layer in enumerate(thing.data.layers):
+    (obj,) = stroke_objects()
+    assert [layer.name for layer in obj.data.layers] == ["Family 1", "Family 2", "Outline"]
+    for index, layer in enumerate(obj.data.layers):
         drawing = layer.frames[0].drawing
         points = drawing.attributes["position"].data
         for name in ("radius", "opacity"):
@@ -112,41 +118,41 @@ def test_grease_pencil_data(drawn, scene):
             assert (values > 0).all()
         materials = np.empty(len(drawing.strokes), dtype=np.int32)
         drawing.attributes["material_index"].data.foreach_get("value", materials)
-        assert (materials == number).all() and len(drawing.strokes) > 0
+        assert (materials == index).all() and len(drawing.strokes) > 0
         assert not layer.use_lights
 
 
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
-def test_undo_and_remove(drawn, scene, kind):
+def test_undo_and_remove(with_stroke_settings, scene, kind):
     before = contents()
     bpy.ops.ed.undo_push(message="before")
     assert bpy.ops.rosy.strokes(kind=kind) == {"FINISHED"}
-    once = contents()
-    assert once != before
+    drawn_once = contents()
+    assert drawn_once != before
     bpy.ops.ed.undo_push(message="after")
     bpy.ops.ed.undo()
     assert contents() == before
     bpy.ops.ed.redo()
-    assert contents() == once
+    assert contents() == drawn_once
     scene = bpy.context.scene
     scene.rosy.strokes.spacing = 12.0
     assert bpy.ops.rosy.strokes(kind=kind) == {"FINISHED"}
-    assert contents() == once
+    assert contents() == drawn_once
     assert bpy.ops.rosy.strokes_remove() == {"FINISHED"}
     assert contents() == before
     assert not bpy.ops.rosy.strokes_remove.poll()
 
 
-def test_refusals(drawn, scene, tmp_path):
+def test_errors(with_stroke_settings, scene, tmp_path):
     before = contents()
     assert ".svg" in error_of(bpy.ops.rosy.strokes, kind="SVG", filepath=str(tmp_path / "a.png"))
     assert "view" in error_of(bpy.ops.rosy.strokes, camera="VIEW")
     scene.rosy.strokes.selected = True
-    drawn.select_set(False)
+    with_stroke_settings.select_set(False)
     assert "no selected object" in error_of(bpy.ops.rosy.strokes)
-    drawn.select_set(True)
+    with_stroke_settings.select_set(True)
     scene.camera = None
     assert "no active camera" in error_of(bpy.ops.rosy.strokes)
     assert contents() == before
-    drawn.rosy.include = False
+    with_stroke_settings.rosy.include = False
     assert not bpy.ops.rosy.strokes.poll()

@@ -1,4 +1,4 @@
-"""Things to put in scenes, and what is in a file."""
+"""Objects for scenes, renders of scenes, and the contents of a file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.write_field import write_mesh_field
 
 
-def link(thing):
+def link(obj):
     """Put an object into the scene."""
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
 def add_camera(name="Camera", location=(0.0, -5.0, 0.5), target=(0.0, 0.0, 0.0)):
@@ -43,7 +43,7 @@ def add_mesh(name, vertices, faces, edges=()):
 
 
 def add_plane(name="Plane", size=1.0, cuts=1):
-    """A square in the plane y = 0 that faces -y."""
+    """Add a square in the plane y = 0 that faces -y."""
     line = np.linspace(-size, size, cuts + 1)
     vertices = [(x, 0.0, z) for z in line for x in line]
     row = cuts + 1
@@ -55,10 +55,10 @@ def add_plane(name="Plane", size=1.0, cuts=1):
     return add_mesh(name, vertices, faces)
 
 
-def add_field(thing, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
-    field = generate(mesh_surface(thing.data), GeneratorSettings(kind, axis), degree)
-    write_mesh_field(thing.data, field)
-    return thing
+def add_field(obj, kind="curvature", degree=4, axis=(0.0, 0.0, 1.0)):
+    field = generate(mesh_surface(obj.data), GeneratorSettings(kind, axis), degree)
+    write_mesh_field(obj.data, field)
+    return obj
 
 
 def member_vectors(mesh, name="rosy"):
@@ -79,14 +79,14 @@ def set_vectors(mesh, vectors, name="rosy", domain="FACE", kind="FLOAT_VECTOR"):
 
 
 def pixels(image):
-    """(H, W, 4) values of an image, rows from the bottom."""
+    """Return the (H, W, 4) values of an image, rows from the bottom."""
     values = np.empty(len(image.pixels), dtype=np.float32)
     image.pixels.foreach_get(values)
     return values.reshape(image.size[1], image.size[0], 4)
 
 
 def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
-    """What Cycles makes of the scene, or another, (H, W, 4) linear values, not premultiplied."""
+    """Render the scene, and return (H, W, 4) linear values, not premultiplied."""
     scene.render.engine = engine
     scene.display.render_aa = "32"
     cycles = scene.cycles
@@ -108,23 +108,23 @@ def render(scene, path, *, samples=16, box=True, engine="CYCLES"):
 
 
 def contents():
-    """All that is in the file: datablocks, and what hangs on objects and meshes."""
+    """Return the contents of the file: all datablocks, and what objects and meshes hold."""
     bpy.context.view_layer.update()
-    found = {
-        prop.identifier: sorted(thing.name for thing in getattr(bpy.data, prop.identifier))
+    result = {
+        prop.identifier: sorted(obj.name for obj in getattr(bpy.data, prop.identifier))
         for prop in bpy.data.bl_rna.properties
         if prop.type == "COLLECTION"
     }
-    for thing in bpy.data.objects:
-        found["object " + thing.name] = [
-            [modifier.name for modifier in thing.modifiers],
-            [slot.material and slot.material.name for slot in thing.material_slots],
-            sorted(key for key, _ in thing.items() if key != "rosy"),
-            thing.type == "MESH" and thing.add_rest_position_attribute,
-            np.round(thing.matrix_world, 6).tolist(),
+    for obj in bpy.data.objects:
+        result["object " + obj.name] = [
+            [modifier.name for modifier in obj.modifiers],
+            [slot.material and slot.material.name for slot in obj.material_slots],
+            sorted(key for key, _ in obj.items() if key != "rosy"),
+            obj.type == "MESH" and obj.add_rest_position_attribute,
+            np.round(obj.matrix_world, 6).tolist(),
         ]
     for mesh in bpy.data.meshes:
-        found["mesh " + mesh.name] = [
+        result["mesh " + mesh.name] = [
             sorted(
                 (attribute.name, attribute.domain, attribute.data_type)
                 for attribute in mesh.attributes
@@ -135,10 +135,10 @@ def contents():
             len(mesh.polygons),
         ]
     for scene in bpy.data.scenes:
-        found["scene " + scene.name] = [
+        result["scene " + scene.name] = [
             len(scene.rosy.bakes),
             scene.view_settings.view_transform,
             bool(scene.render.use_compositing),
             scene.render.engine,
         ]
-    return found
+    return result

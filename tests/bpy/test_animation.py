@@ -1,4 +1,4 @@
-"""Frames: what is drawn, what stays, and what is left when work is broken off."""
+"""Frames of animations: which are drawn, in which processes, and what an interruption leaves."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def moving(scene, camera, monkey):
-    """Suzanne, who turns and opens her mouth, before a camera that moves."""
+    """A scene with Suzanne, who turns and is deformed, and a moving camera."""
     scene.render.resolution_x, scene.render.resolution_y = 96, 72
     for frame, angle in ((1, 0.0), (20, 1.0)):
         monkey.rotation_euler = (0.0, 0.0, angle)
@@ -49,7 +49,7 @@ def moving(scene, camera, monkey):
 
 
 def frames_of(folder):
-    """Names and bytes of the pictures."""
+    """Return the bytes of the pictures by name."""
     return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}
 
 
@@ -65,22 +65,22 @@ def test_ranges():
 
 
 def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
-    (made,) = bake_animation(moving, [5, 9], settings=OutputSettings(folder=tmp_path))
-    assert made.rendered == (5, 9) and made.skipped == () and moving.frame_current == 3
+    (result,) = bake_animation(moving, [5, 9], settings=OutputSettings(folder=tmp_path))
+    assert result.rendered == (5, 9) and result.skipped == () and moving.frame_current == 3
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0009.png")))
     moving.frame_set(9)
     (single,) = bake(moving)
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
 
 
-def test_frames_that_are_up_to_date_stay(moving, tmp_path):
+def test_frames_that_are_up_to_date_are_skipped(moving, tmp_path):
     settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)
     before = frames_of(tmp_path)
     assert len(before) == 4
     (again,) = bake_animation(moving, range(1, 6), settings=settings)
     assert again.rendered == (5,) and again.skipped == (1, 2, 3, 4)
-    # A change draws again what it touches, and a picture that is gone.
+    # Frames that a change affects are drawn again, and missing pictures.
     (tmp_path / "RoSy_Scene_0002.png").unlink()
     (again,) = bake_animation(moving, range(1, 6), settings=settings)
     assert again.rendered == (2,)
@@ -92,7 +92,7 @@ def test_frames_that_are_up_to_date_stay(moving, tmp_path):
     assert {**frames_of(tmp_path), **before} == frames_of(tmp_path)
 
 
-def test_only_what_a_change_touches_is_drawn_again(moving, tmp_path):
+def test_only_affected_frames_are_drawn_again(moving, tmp_path):
     settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)
     monkey = bpy.data.objects["Suzanne"]
@@ -102,14 +102,14 @@ def test_only_what_a_change_touches_is_drawn_again(moving, tmp_path):
             point.interpolation = "LINEAR"
             curve.keyframe_points.insert(3, curve.evaluate(3))
             curve.keyframe_points.insert(2, curve.evaluate(2))
-            for each in curve.keyframe_points:
-                each.interpolation = "CONSTANT"
+            for point in curve.keyframe_points:
+                point.interpolation = "CONSTANT"
     (again,) = bake_animation(moving, range(1, 5), settings=settings)
     assert 1 in again.skipped and 4 in again.rendered
 
 
-def _curves(thing):
-    action = thing.animation_data.action
+def _curves(obj):
+    action = obj.animation_data.action
     if hasattr(action, "fcurves"):
         return action.fcurves
     return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
@@ -125,46 +125,46 @@ def test_markers_choose_the_camera(moving, tmp_path):
     assert [frame_camera(moving, frame) == other for frame in (0, 1, 3, 4, 9)] == [
         False, False, False, True, True,
     ]  # fmt: skip
-    (made,) = bake_animation(moving, range(3, 5), settings=OutputSettings(folder=tmp_path))
+    (result,) = bake_animation(moving, range(3, 5), settings=OutputSettings(folder=tmp_path))
     moving.timeline_markers.clear()
     moving.camera = other
     moving.frame_set(4)
     (single,) = bake(moving)
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
-    assert made.rendered == (3, 4)
+    assert result.rendered == (3, 4)
 
 
-def test_all_cameras_have_a_sequence_each(moving, tmp_path):
+def test_one_sequence_for_each_camera(moving, tmp_path):
     other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
     other.matrix_world = moving.camera.matrix_world.copy()
-    made = bake_animation(
+    results = bake_animation(
         moving,
         range(1, 3),
         cameras=[moving.camera, other],
         settings=OutputSettings(folder=tmp_path),
     )
-    assert [each.camera for each in made] == [moving.camera.name, "Other"]
+    assert [result.camera for result in results] == [moving.camera.name, "Other"]
     assert len(frames_of(tmp_path)) == 4
 
 
 def test_materials_play_the_frames(moving, tmp_path):
     before = contents()
     bake_animation(moving, range(4, 8), settings=OutputSettings(folder=tmp_path / "frames"))
-    (bake_,) = list_bakes(moving)
-    assert bake_.frame_range == "4 to 7" and not bake_.stale_reason
+    (bake_info,) = list_bakes(moving)
+    assert bake_info.frame_range == "4 to 7" and not bake_info.stale_reason
     moving.view_settings.view_transform = "Standard"
     moving.rosy.look.shading = 0.0
     for frame in (4, 6):
         moving.frame_set(frame)
-        seen = render(moving, tmp_path / f"seen{frame}.exr", samples=1)
+        rendered = render(moving, tmp_path / f"seen{frame}.exr", samples=1)
         path = tmp_path / "frames" / f"RoSy_Scene_{frame:04d}.png"
         image = bpy.data.images.load(str(path))
-        wanted = pixels(image)
-        linear = np.where(wanted <= 0.04045, wanted / 12.92, ((wanted + 0.055) / 1.055) ** 2.4)
-        inside = (seen[..., 3] > 0.99) & (wanted[..., 3] > 0.99)
+        stored = pixels(image)
+        linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+        inside = (rendered[..., 3] > 0.99) & (stored[..., 3] > 0.99)
         assert inside.mean() > 0.05
-        assert np.abs(seen[..., :3] - linear[..., :3])[inside].mean() < 0.01, frame
+        assert np.abs(rendered[..., :3] - linear[..., :3])[inside].mean() < 0.01, frame
         bpy.data.images.remove(image)
     moving.frame_set(3)
     remove_bakes(moving)
@@ -213,9 +213,9 @@ def file(moving, tmp_path):
     return path
 
 
-def start(file, folder, *more):
+def start(file, folder, *options):
     return subprocess.Popen(
-        [sys.executable, "-m", "rosy_addon", "bake", str(file), "--out", str(folder), *more],
+        [sys.executable, "-m", "rosy_addon", "bake", str(file), "--out", str(folder), *options],
         cwd=ROOT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -224,52 +224,54 @@ def start(file, folder, *more):
     )
 
 
-def finished(process):
+def wait_for(process):
     out, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
     return out
 
 
-def test_killed_again_and_again_it_ends_the_same(file, tmp_path):
-    finished(start(file, tmp_path / "whole", "--frames", "1-12"))
+def test_killed_processes_can_be_continued(file, tmp_path):
+    wait_for(start(file, tmp_path / "whole", "--frames", "1-12"))
     whole = frames_of(tmp_path / "whole")
     assert len(whole) == 12
-    folder, chance = tmp_path / "broken", random.Random(1)
+    folder, generator = tmp_path / "broken", random.Random(1)
     for _ in range(3):
         process = start(file, folder, "--frames", "1-12")
-        there = len(frames_of(folder)) if folder.exists() else 0
-        late = time.monotonic() + 60
-        while process.poll() is None and time.monotonic() < late:
-            if folder.exists() and len(frames_of(folder)) >= there + chance.randint(1, 3):
+        initial_count = len(frames_of(folder)) if folder.exists() else 0
+        deadline = time.monotonic() + 60
+        while process.poll() is None and time.monotonic() < deadline:
+            if folder.exists() and len(frames_of(folder)) >= initial_count + generator.randint(
+                1, 3
+            ):
                 break
             time.sleep(0.01)
-        time.sleep(chance.random() * 0.05)
+        time.sleep(generator.random() * 0.05)
         process.send_signal(signal.SIGKILL)
         process.communicate()
-    said = finished(start(file, folder, "--frames", "1-12"))
+    output = wait_for(start(file, folder, "--frames", "1-12"))
     assert frames_of(folder) == whole
-    assert "frames of Scene are up to date" in said
+    assert "frames of Scene are up to date" in output
 
 
-def test_two_at_once_do_no_harm(file, tmp_path):
-    finished(start(file, tmp_path / "one", "--frames", "1-8"))
+def test_two_processes_in_one_folder(file, tmp_path):
+    wait_for(start(file, tmp_path / "one", "--frames", "1-8"))
     both = [start(file, tmp_path / "two", "--frames", "1-8") for _ in range(2)]
     for process in both:
-        finished(process)
+        wait_for(process)
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
     assert not [path for path in (tmp_path / "two").iterdir() if path.name.startswith(".")]
 
 
-def test_several_processes(file, tmp_path):
-    finished(start(file, tmp_path / "one", "--frames", "1-7"))
-    finished(start(file, tmp_path / "two", "--frames", "1-7", "--jobs", "3", "--save"))
+def test_jobs_share_the_frames(file, tmp_path):
+    wait_for(start(file, tmp_path / "one", "--frames", "1-7"))
+    wait_for(start(file, tmp_path / "two", "--frames", "1-7", "--jobs", "3", "--save"))
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
     bpy.ops.wm.open_mainfile(filepath=str(file))
-    (bake_,) = list_bakes(bpy.context.scene)
-    assert bake_.frame_range == "1 to 7"
+    (bake_info,) = list_bakes(bpy.context.scene)
+    assert bake_info.frame_range == "1 to 7"
 
 
-def test_a_frame_that_fails_is_named(file, tmp_path, monkeypatch):
+def test_failed_frames_are_named(file, tmp_path, monkeypatch):
     command = [*worker_command("", file), "--out", str(tmp_path / "out"), "--camera", "Nobody"]
     monkeypatch.chdir(ROOT)
     with pytest.raises(RosyError, match=r"frames 1-5:2: there is no camera 'Nobody'"):
@@ -279,27 +281,27 @@ def test_a_frame_that_fails_is_named(file, tmp_path, monkeypatch):
 @pytest.fixture
 def cluster(monkeypatch):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # the workers' processes are to find the package
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # so that workers find the package
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         yield cluster
 
 
-def test_a_cluster_does_the_frames_and_loses_none(file, tmp_path, cluster):
-    finished(start(file, tmp_path / "one", "--frames", "1-20"))
+def test_a_cluster_renders_all_frames(file, tmp_path, cluster):
+    wait_for(start(file, tmp_path / "one", "--frames", "1-20"))
     address = cluster.scheduler_address
     process = start(file, tmp_path / "two", "--frames", "1-20", "--scheduler", address)
-    late = time.monotonic() + 60
-    while len(frames_of(tmp_path / "two")) < 3 and time.monotonic() < late:
+    deadline = time.monotonic() + 60
+    while len(frames_of(tmp_path / "two")) < 3 and time.monotonic() < deadline:
         time.sleep(0.02)
     victim = next(iter(cluster.workers.values()))
     os.kill(victim.pid, signal.SIGKILL)
-    finished(process)
+    wait_for(process)
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
 
 
-def test_a_cluster_names_the_frames_that_fail(file, tmp_path, cluster):
+def test_a_cluster_names_failed_frames(file, tmp_path, cluster):
     monkey = bpy.data.objects["Suzanne"]
     for frame, x in ((4, 0.0), (5, 500.0), (6, 0.0)):
         monkey.location.x = x
@@ -316,20 +318,20 @@ def test_a_cluster_names_the_frames_that_fail(file, tmp_path, cluster):
     assert len(frames_of(tmp_path / "out")) == 9
 
 
-def test_what_makes_no_sense_is_refused(file, tmp_path, monkeypatch):
+def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "1s")
-    for words, wanted in (
+    for options, expected in (
         (["--jobs", "2"], "give --frames"),
         (["--frames", "1-3", "--jobs", "0"], "1 or more"),
         (["--frames", "3-1"], "expected A"),
         (["--frames", "1-3", "--scheduler", "tcp://127.0.0.1:1"], "--scheduler"),
     ):
-        process = start(file, tmp_path / "out", *words)
+        process = start(file, tmp_path / "out", *options)
         _, err = process.communicate(timeout=120)
-        assert process.returncode == 2 and wanted in err, err
+        assert process.returncode == 2 and expected in err, err
 
 
-def test_an_animated_method_is_drawn_by_the_renderer_that_can(moving, tmp_path, monkeypatch):
+def test_the_renderer_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
     """The graphics card does not draw the method "members": the choice is made for each frame."""
     look = moving.rosy.look
     for frame, method in ((1, "sheets"), (2, "members"), (3, "sheets")):
@@ -354,16 +356,16 @@ def test_an_animated_method_is_drawn_by_the_renderer_that_can(moving, tmp_path, 
 
 
 @pytest.mark.parametrize("size", ["64x64", "65x33"])
-def test_a_film_by_blender(size, tmp_path):
+def test_a_video_encoded_by_blender(size, tmp_path):
     mesh = tmp_path / "mesh.obj"
     mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
-    film = tmp_path / "film.mp4"
-    done = subprocess.run(
-        [sys.executable, "-m", "rosy_addon", "turntable", str(mesh), "-o", str(film),
+    video = tmp_path / "film.mp4"
+    process = subprocess.run(
+        [sys.executable, "-m", "rosy_addon", "turntable", str(mesh), "-o", str(video),
          "--pictures", "7", "--size", size, "--generate", "axis"],
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    clip = bpy.data.movieclips.load(str(film))
+    assert process.returncode == 0, process.stderr
+    clip = bpy.data.movieclips.load(str(video))
     width, height = (int(side) // 2 * 2 for side in size.split("x"))
     assert clip.frame_duration == 7 and tuple(clip.size) == (width, height)

@@ -1,4 +1,4 @@
-"""Pictures in the scene: made, replaced, remembered, taken away, and never left half done."""
+"""Pictures on objects: applied, replaced, recorded and removed, as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from rosy.rosy_addon.scene.pictures import show_bake
 from scenes import add_camera, add_field, add_plane, contents, link, pixels, set_vectors
 
 
-def material_of(thing):
-    """What the evaluated object is painted with."""
-    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+def material_of(obj):
+    """Return the material of all faces of an evaluated object."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
-    painted = {mesh.materials[face.material_index] for face in mesh.polygons}
+    materials = {mesh.materials[face.material_index] for face in mesh.polygons}
     evaluated.to_mesh_clear()
-    (material,) = painted
+    (material,) = materials
     return material.original if material else None
 
 
-def test_the_image_is_the_picture(scene, camera, monkey):
+def test_the_image_holds_the_picture(scene, camera, monkey):
     (baked,) = bake(scene)
     image, rgba = baked.image, baked.picture.rgba
     assert (image.name, tuple(image.size)) == ("RoSy Camera", (128, 128))
@@ -42,7 +42,7 @@ def test_the_image_is_the_picture(scene, camera, monkey):
     np.testing.assert_array_equal(stored[..., 3] > 0, covered)
 
 
-def test_it_survives_saving(scene, camera, monkey, tmp_path):
+def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
     (baked,) = bake(scene)
     before = pixels(baked.image)
     path = str(tmp_path / "scene.blend")
@@ -54,36 +54,36 @@ def test_it_survives_saving(scene, camera, monkey, tmp_path):
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
 
 
-@pytest.mark.parametrize(("chosen", "ending"), [("BYTE", ".png"), ("FLOAT", ".exr")])
-def test_saved_to_a_folder(scene, camera, monkey, tmp_path, chosen, ending):
+@pytest.mark.parametrize(("image_format", "suffix"), [("BYTE", ".png"), ("FLOAT", ".exr")])
+def test_saved_to_a_folder(scene, camera, monkey, tmp_path, image_format, suffix):
     scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "pictures")
-    scene.rosy.image_format = chosen
+    scene.rosy.image_format = image_format
     (baked,) = bake(scene)
     (path,) = (tmp_path / "pictures").iterdir()
-    assert path.suffix == ending
+    assert path.suffix == suffix
     assert baked.image.packed_file is None
     covered = baked.picture.rgba[..., 3] > 0
     stored = pixels(baked.image)[covered][:, :3]
-    wanted = baked.picture.rgba[covered][:, :3]
-    if chosen == "BYTE":
-        np.testing.assert_allclose(stored, to_display(wanted), atol=0.5 / 255 + 1e-6)
+    expected = baked.picture.rgba[covered][:, :3]
+    if image_format == "BYTE":
+        np.testing.assert_allclose(stored, to_display(expected), atol=0.5 / 255 + 1e-6)
     else:
-        np.testing.assert_allclose(stored, wanted, atol=1e-3)
+        np.testing.assert_allclose(stored, expected, atol=1e-3)
     bake(scene)
     assert len(list((tmp_path / "pictures").iterdir())) == 1
 
 
 def test_the_users_materials_and_modifiers_stay(scene, camera, monkey):
-    own = bpy.data.materials.new("Own")
-    monkey.data.materials.append(own)
+    user_material = bpy.data.materials.new("Own")
+    monkey.data.materials.append(user_material)
     monkey.modifiers.new("Subdivision", "SUBSURF")
     other = link(bpy.data.objects.new("Other", monkey.data))
     other.rosy.include = False
     (baked,) = bake(scene)
-    assert [slot.material for slot in monkey.material_slots] == [own]
+    assert [slot.material for slot in monkey.material_slots] == [user_material]
     assert [modifier.name for modifier in monkey.modifiers] == ["Subdivision", "RoSy"]
     assert material_of(monkey) == baked.material
-    assert material_of(other) == own
+    assert material_of(other) == user_material
 
 
 def test_baking_again_replaces(scene, camera, monkey):
@@ -98,7 +98,7 @@ def test_baking_again_replaces(scene, camera, monkey):
     assert contents() == before
 
 
-def test_reading_is_not_disturbed_by_an_earlier_bake(scene, camera, monkey):
+def test_an_earlier_bake_does_not_change_the_next(scene, camera, monkey):
     first = bake(scene)[0].picture.rgba
     second = bake(scene)[0].picture.rgba
     np.testing.assert_array_equal(first, second)
@@ -131,22 +131,22 @@ def test_remove_from_one_object(scene, camera, monkey):
     assert not bpy.data.materials
 
 
-def test_cancelled_at_any_step_nothing_is_left(scene, camera, monkey):
+def test_cancelling_at_any_step_changes_nothing(scene, camera, monkey):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
     steps = 0
     BAKE_CACHE.clear()
-    work = bake_task(scene)
-    for _ in work:
+    task = bake_task(scene)
+    for _ in task:
         steps += 1
     remove_bakes(scene)
     assert steps > 3
     for stop in range(steps):
         BAKE_CACHE.clear()
-        work = bake_task(scene)
+        task = bake_task(scene)
         for _ in range(stop + 1):
-            next(work)
-        work.close()
+            next(task)
+        task.close()
         assert contents() == before
 
 
@@ -240,19 +240,19 @@ def delete_camera(scene, camera, monkey):
         delete_camera,
     ],
 )
-def test_out_of_date(scene, camera, monkey, change, monkeypatch):
+def test_stale_reasons(scene, camera, monkey, change, monkeypatch):
     monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 0.0)
     bake(scene)
     assert list_bakes(scene)[0].stale_reason == ""
-    why = change(scene, camera, monkey)
-    assert why in list_bakes(scene)[0].stale_reason
+    reason = change(scene, camera, monkey)
+    assert reason in list_bakes(scene)[0].stale_reason
 
 
-def test_notes(scene, camera, monkey):
+def test_warnings(scene, camera, monkey):
     assert bake(scene)[0].warnings == ()
     scene.view_settings.view_transform = "Filmic"
-    (note,) = bake(scene)[0].warnings
-    assert "Filmic" in note
+    (warning,) = bake(scene)[0].warnings
+    assert "Filmic" in warning
     assert scene.view_settings.view_transform == "Filmic"
 
 
@@ -278,7 +278,7 @@ def test_same_scene_same_bytes(scene, camera, monkey):
     assert bytes(bake(scene)[0].image.packed_file.data) == first
 
 
-def test_lit_by_the_scene(scene, camera, monkey):
+def test_lights_of_the_scene(scene, camera, monkey):
     data = bpy.data.lights.new("Sun", "SUN")
     data.energy = 3.0
     sun = link(bpy.data.objects.new("Sun", data))
@@ -291,27 +291,27 @@ def test_lit_by_the_scene(scene, camera, monkey):
     assert brightness[columns > middle].sum() > 2 * brightness[columns < middle].sum()
 
 
-def test_undo_brings_back_the_former_picture(scene, camera, monkey):
+def test_undo_restores_the_previous_picture(scene, camera, monkey):
     bake(scene)
-    former = pixels(bpy.data.images["RoSy Camera"])
+    first = pixels(bpy.data.images["RoSy Camera"])
     bpy.ops.ed.undo_push(message="first")
     bake(scene, look=Look(seed=3))
-    latter = pixels(bpy.data.images["RoSy Camera"])
-    assert np.abs(former - latter).max() > 0.1
+    second = pixels(bpy.data.images["RoSy Camera"])
+    assert np.abs(first - second).max() > 0.1
     bpy.ops.ed.undo_push(message="second")
     bpy.ops.ed.undo()
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), former)
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), first)
     bpy.ops.ed.redo()
-    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), latter)
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), second)
 
 
-def test_a_look_given_does_not_make_it_stale(scene, camera, monkey):
+def test_a_look_argument_does_not_make_a_bake_stale(scene, camera, monkey):
     bake(scene, look=Look(seed=3))
     assert list_bakes(scene)[0].stale_reason == ""
 
 
-def test_a_view(scene, monkey):
-    """From a 3D view: a camera that is not in the scene."""
+def test_a_bake_of_a_3d_view(scene, monkey):
+    """Its camera is not an object of the scene."""
     from rosy.rosy_addon.projection.camera import look_at, perspective_camera
     from rosy.rosy_addon.scene.cameras import VIEW_NAME
 

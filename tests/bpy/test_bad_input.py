@@ -1,4 +1,4 @@
-"""What cannot be drawn is refused in one line that names it, and nothing is made or lost."""
+"""Errors of input that cannot be drawn: one line that names it, and an unchanged file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from scenes import (
     member_vectors,
     set_vectors,
 )
-from test_reading import member_attributes
+from test_reading import add_directions
 
 
-def refused(*words, **how):
+def assert_refused(*words, **options):
     """Bake, and expect an error of one line with these words that leaves the file as it was."""
     before = contents()
     with pytest.raises(RosyError) as caught:
-        bake(bpy.context.scene, **how)
+        bake(bpy.context.scene, **options)
     message = str(caught.value)
     assert "\n" not in message
     for word in words:
@@ -43,7 +43,7 @@ def refused(*words, **how):
 
 def test_no_field(scene, camera):
     plane = add_plane()
-    refused("no visible object has a RoSy field")
+    assert_refused("no visible object has a RoSy field")
     with pytest.raises(RosyError, match="object 'Plane' has no attribute 'rosy'"):
         field_objects(bpy.context.view_layer, ["Plane"])
     with pytest.raises(RosyError, match="there is no object 'Plain'"):
@@ -57,11 +57,11 @@ def test_no_field(scene, camera):
 
 def test_hidden_in_the_viewport(scene, camera, monkey):
     monkey.hide_viewport = True
-    refused("'Suzanne'", "hidden in the viewport")
+    assert_refused("'Suzanne'", "hidden in the viewport")
 
 
 @pytest.mark.parametrize(
-    ("domain", "kind", "found"),
+    ("domain", "kind", "description"),
     [
         ("FACE", "INT", "INT on FACE"),
         ("FACE", "FLOAT_COLOR", "FLOAT_COLOR on FACE"),
@@ -69,10 +69,12 @@ def test_hidden_in_the_viewport(scene, camera, monkey):
         ("EDGE", "FLOAT_VECTOR", "FLOAT_VECTOR on EDGE"),
     ],
 )
-def test_wrong_type_or_domain(scene, camera, domain, kind, found):
+def test_wrong_type_or_domain(scene, camera, domain, kind, description):
     plane = add_plane()
     plane.data.attributes.new("rosy", kind, domain)
-    refused("object 'Plane', attribute 'rosy'", "expected FLOAT_VECTOR on FACE", f"found {found}")
+    assert_refused(
+        "object 'Plane', attribute 'rosy'", "expected FLOAT_VECTOR on FACE", f"found {description}"
+    )
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -88,7 +90,7 @@ def test_not_finite(scene, camera, value, domain):
         values = np.tile([1.0, 0.0, 0.0], (size, 1))
         values[1, 2] = value
         set_vectors(plane.data, values, domain=domain)
-    refused("'Plane', attribute 'rosy'", f"1 of {size}", "not finite", "undefined")
+    assert_refused("'Plane', attribute 'rosy'", f"1 of {size}", "not finite", "undefined")
     scene.rosy.undefined = True
     (baked,) = bake(scene)
     assert baked.picture.rgba[..., 3].max() == 1
@@ -100,70 +102,70 @@ def test_not_finite(scene, camera, value, domain):
 
 def test_off_the_surface(scene, camera, monkey):
     set_vectors(monkey.data, member_vectors(monkey.data)[:, [1, 2, 0]])
-    refused("'Suzanne', attribute 'rosy'", "are not tangent to the surface", "degrees off, face")
+    assert_refused(
+        "'Suzanne', attribute 'rosy'", "are not tangent to the surface", "degrees off, face"
+    )
 
 
-def test_too_many_members(scene, camera):
+def test_too_many_directions(scene, camera):
     plane = add_plane()
-    member_attributes(plane.data, 13)
-    refused("'Plane'", "13 attributes", "at most 12")
+    add_directions(plane.data, 13)
+    assert_refused("'Plane'", "13 attributes", "at most 12")
 
 
 @pytest.mark.parametrize(
-    ("vertices", "edges", "says"),
+    ("vertices", "edges", "reason"),
     [
         ([], [], "it is empty"),
         ([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [(0, 1), (1, 2)], "only vertices and loose edges"),
     ],
 )
-def test_no_faces(scene, camera, vertices, edges, says):
-    thing = add_mesh("Bare", vertices, [], edges)
-    thing.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
-    refused("object 'Bare'", "no faces", says)
+def test_no_faces(scene, camera, vertices, edges, reason):
+    obj = add_mesh("Bare", vertices, [], edges)
+    obj.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
+    assert_refused("object 'Bare'", "no faces", reason)
     with pytest.raises(RosyError, match="Bare: the mesh has no faces"):
-        mesh_surface(thing.data)
+        mesh_surface(obj.data)
 
 
-def test_loose_edges_beside_faces_do_no_harm(scene, camera):
-    thing = add_mesh(
-        "Plane", [(-1, 0, -1), (1, 0, -1), (0, 0, 1), (2, 0, 2)], [(0, 1, 2)], [(2, 3)]
-    )
-    add_field(thing, kind="axis")
+def test_loose_edges_are_ignored(scene, camera):
+    obj = add_mesh("Plane", [(-1, 0, -1), (1, 0, -1), (0, 0, 1), (2, 0, 2)], [(0, 1, 2)], [(2, 3)])
+    add_field(obj, kind="axis")
     assert bake(scene)
 
 
-def test_non_manifold_edges_do_no_harm(scene, camera):
+def test_non_manifold_edges_are_drawn(scene, camera):
     vertices = [(0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)]
-    thing = add_mesh("Fan", vertices, [(0, 2, 1), (0, 3, 1), (0, 4, 1)])
-    add_field(thing, kind="axis")
+    obj = add_mesh("Fan", vertices, [(0, 2, 1), (0, 3, 1), (0, 4, 1)])
+    add_field(obj, kind="axis")
     assert bake(scene)
 
 
 def test_a_modifier_loses_the_attribute(scene, camera, monkey):
     modifier = monkey.modifiers.new("Rebuild", "REMESH")
     modifier.mode, modifier.voxel_size = "VOXEL", 0.2
-    refused("'Suzanne'", "Rebuild", "has no attribute 'rosy'")
+    assert_refused("'Suzanne'", "Rebuild", "has no attribute 'rosy'")
 
 
 def test_a_modifier_leaves_no_faces(scene, camera, monkey):
     monkey.vertex_groups.new(name="None")
     modifier = monkey.modifiers.new("Hide All", "MASK")
     modifier.vertex_group = "None"
-    refused("'Suzanne'", "Hide All", "no faces")
+    assert_refused("'Suzanne'", "Hide All", "no faces")
 
 
 def test_outside_the_frame(scene, camera, monkey):
     monkey.location.x = 100.0
-    refused("'Camera'", "Suzanne", "outside the frame")
+    assert_refused("'Camera'", "Suzanne", "outside the frame")
 
 
-def test_hidden_behind(scene, camera, monkey):
+def test_occluded(scene, camera, monkey):
     wall = add_plane("Wall", size=3.0)
     wall.location.y = -3.0
-    refused("'Camera'", "Suzanne", "hidden behind")
+    assert_refused("'Camera'", "Suzanne", "hidden behind")
 
 
-def test_inside_the_camera_is_drawn(scene, camera):
+def test_a_mesh_around_the_camera_is_drawn(scene, camera):
     bpy.ops.mesh.primitive_uv_sphere_add()
     sphere = add_field(bpy.context.object, kind="axis")
     aim(camera, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -174,12 +176,12 @@ def test_inside_the_camera_is_drawn(scene, camera):
 
 def test_panoramic(scene, camera, monkey):
     camera.data.type = "PANO"
-    refused("camera 'Camera' is panoramic")
+    assert_refused("camera 'Camera' is panoramic")
 
 
 def test_no_camera(scene, monkey):
-    refused("scene 'Scene' has no active camera")
-    refused("'Suzanne'", "not a camera", cameras=[monkey])
+    assert_refused("scene 'Scene' has no active camera")
+    assert_refused("'Suzanne'", "not a camera", cameras=[monkey])
 
 
 def test_mirrored_camera(scene, camera, monkey):
@@ -193,9 +195,9 @@ def test_mirrored_camera(scene, camera, monkey):
 
 @pytest.mark.parametrize("size", [(0, 10), (10, -1), (100_000, 10)])
 def test_size(scene, camera, monkey, size):
-    refused(f"size {size[0]}x{size[1]}", size=size)
-    # As many pixels by supersampling.
-    refused("size 40000x40", size=(10_000, 10), look=Look(supersampling=4))
+    assert_refused(f"size {size[0]}x{size[1]}", size=size)
+    # Supersampling counts as well.
+    assert_refused("size 40000x40", size=(10_000, 10), look=Look(supersampling=4))
 
 
 @pytest.mark.parametrize("degree", [0, -1, 1000])
@@ -224,7 +226,7 @@ def test_writing(scene, monkey):
     assert contents() == before
 
 
-def test_edit_mode_bakes_and_loses_nothing(scene, camera, monkey):
+def test_bake_in_edit_mode(scene, camera, monkey):
     bpy.context.view_layer.objects.active = monkey
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
@@ -260,29 +262,29 @@ def linked(path, kind, name):
 
 def test_linked_object(library):
     link(linked(library, "objects", "Suzanne"))
-    refused("object 'Suzanne' is linked from", "library.blend")
+    assert_refused("object 'Suzanne' is linked from", "library.blend")
 
 
 def test_linked_collection(library):
     empty = link(bpy.data.objects.new("Instance", None))
     empty.instance_type = "COLLECTION"
     empty.instance_collection = linked(library, "collections", "Monkeys")
-    refused("object 'Suzanne' is linked from", "library.blend")
+    assert_refused("object 'Suzanne' is linked from", "library.blend")
 
 
 def test_linked_mesh_can_be_drawn_but_not_written(library):
     mesh = linked(library, "meshes", "Suzanne")
-    thing = link(bpy.data.objects.new("Local", mesh))
+    obj = link(bpy.data.objects.new("Local", mesh))
     (baked,) = bake(bpy.context.scene)
-    assert baked.objects == (thing,)
+    assert baked.objects == (obj,)
     field = read_mesh_field(mesh)
     with pytest.raises(RosyError, match=r"mesh 'Suzanne' is linked from .*library\.blend"):
         write_mesh_field(mesh, field)
 
 
 def test_override_can_be_drawn(library):
-    thing = link(linked(library, "objects", "Suzanne"))
-    local = thing.override_create(remap_local_usages=True)
+    obj = link(linked(library, "objects", "Suzanne"))
+    local = obj.override_create(remap_local_usages=True)
     (baked,) = bake(bpy.context.scene)
     assert baked.objects == (local,)
 
@@ -294,14 +296,14 @@ def test_unwritable_folder(scene, camera, monkey, tmp_path, as_float):
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     scene.rosy.directory = str(blocked)
-    refused(str(blocked))
+    assert_refused(str(blocked))
     scene.rosy.directory = str(blocked / "below")
-    refused(str(blocked))
+    assert_refused(str(blocked))
     scene.rosy.directory = "//pictures"
-    refused("save the .blend file first")
+    assert_refused("save the .blend file first")
 
 
-def test_camera_of_a_scene_without_pixels_is_at_least_one(scene, camera):
+def test_the_smallest_camera_has_one_pixel(scene, camera):
     scene.render.resolution_percentage = 1
     scene.render.resolution_x = scene.render.resolution_y = 10
     view = camera_of_object(scene, bpy.context.evaluated_depsgraph_get(), camera)

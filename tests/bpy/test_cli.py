@@ -1,4 +1,4 @@
-"""``bake`` and ``strokes`` of Blender files on the command line, in Python with Blender's module and in processes of their own."""
+"""``bake`` and ``strokes`` of Blender files on the command line, with Blender's module."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def saved(monkey, camera, tmp_path):
     return path
 
 
-def test_bake_writes_the_picture_and_leaves_the_file(saved, tmp_path):
+def test_bake_writes_the_picture_and_keeps_the_file(saved, tmp_path):
     before = saved.read_bytes()
-    done = rosy(saved, "--out", tmp_path / "out", "--size", "96x64", "--set", "length=10")
-    assert done.returncode == 0, done.stderr
+    process = rosy(saved, "--out", tmp_path / "out", "--size", "96x64", "--set", "length=10")
+    assert process.returncode == 0, process.stderr
     (picture,) = (tmp_path / "out").iterdir()
-    assert str(picture) in done.stdout
+    assert str(picture) in process.stdout
     data = picture.read_bytes()
     assert data.startswith(b"\x89PNG")
     assert (int.from_bytes(data[16:20]), int.from_bytes(data[20:24])) == (96, 64)
@@ -43,8 +43,8 @@ def test_bake_writes_the_picture_and_leaves_the_file(saved, tmp_path):
 
 
 def test_bake_from_all_cameras_and_save(saved):
-    done = rosy(saved, "--all-cameras", "--preset", "plaid", "--save", "--object", "Suzanne")
-    assert done.returncode == 0, done.stderr
+    process = rosy(saved, "--all-cameras", "--preset", "plaid", "--save", "--object", "Suzanne")
+    assert process.returncode == 0, process.stderr
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     assert sorted(record.name for record in bpy.context.scene.rosy.bakes) == ["Camera", "Side"]
     assert [modifier.type for modifier in bpy.data.objects["Suzanne"].modifiers] == ["NODES"]
@@ -52,7 +52,7 @@ def test_bake_from_all_cameras_and_save(saved):
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("options", "expected"),
     [
         (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
         (["--camera", "Suzanne"], "object 'Suzanne' is a mesh, not a camera"),
@@ -62,34 +62,34 @@ def test_bake_from_all_cameras_and_save(saved):
         (["--out", "{saved}"], "suzanne.blend: is not a folder"),
     ],
 )
-def test_bad_input_is_one_line_and_changes_nothing(words, wanted, saved):
+def test_bad_input_is_one_line_and_changes_nothing(options, expected, saved):
     before = saved.read_bytes()
-    done = rosy(saved, "--save", *(word.format(saved=saved) for word in words))
-    assert done.returncode == 2
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith("rosy: ")]
-    assert wanted in line
-    assert "Traceback" not in done.stderr
+    process = rosy(saved, "--save", *(word.format(saved=saved) for word in options))
+    assert process.returncode == 2
+    (line,) = [line for line in process.stderr.splitlines() if line.startswith("rosy: ")]
+    assert expected in line
+    assert "Traceback" not in process.stderr
     assert saved.read_bytes() == before
 
 
-def test_files_that_are_not_there_or_not_blends(tmp_path):
-    done = rosy(tmp_path / "none.blend", "--save")
-    assert done.returncode == 2 and "none.blend: cannot be read: no such file" in done.stderr
+def test_missing_and_invalid_files(tmp_path):
+    process = rosy(tmp_path / "none.blend", "--save")
+    assert process.returncode == 2 and "none.blend: cannot be read: no such file" in process.stderr
     (tmp_path / "text.blend").write_text("no")
-    done = rosy(tmp_path / "text.blend", "--save")
-    assert done.returncode == 2 and "text.blend: cannot be read" in done.stderr
-    assert "Traceback" not in done.stderr
+    process = rosy(tmp_path / "text.blend", "--save")
+    assert process.returncode == 2 and "text.blend: cannot be read" in process.stderr
+    assert "Traceback" not in process.stderr
 
 
-def test_what_was_never_saved_cannot_be_saved():
-    done = rosy("--save")
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
+def test_unsaved_files_cannot_be_saved():
+    process = rosy("--save")
+    assert process.returncode == 2
+    assert "Traceback" not in process.stderr
 
 
 @pytest.fixture
-def drawable(saved):
-    """The same file, with settings of strokes that are not those of the command line."""
+def with_stroke_settings(saved):
+    """The same file, with stroke settings that differ from those of the command line."""
     settings = bpy.context.scene.rosy.strokes
     settings.spacing, settings.width, settings.tone, settings.light = 16.0, 1.7, True, "lamp"
     settings.inks, settings.outline, settings.overshoot = "FAMILIES", True, 6.0
@@ -97,29 +97,29 @@ def drawable(saved):
     return saved
 
 
-def test_strokes_of_a_file_are_what_the_button_draws(drawable, tmp_path):
+def test_strokes_of_a_file_are_those_of_the_button(with_stroke_settings, tmp_path):
     scene = bpy.context.scene
-    before = drawable.read_bytes()
-    for words, more in (
+    before = with_stroke_settings.read_bytes()
+    for options, changes in (
         ([], {}),
         (["--camera", "Side", "--size", "120x90"], {"camera": "Side", "size": (120, 90)}),
     ):
-        wanted = {**more, "camera": scene.objects[more.get("camera", "Camera")]}
-        draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", **wanted)
-        done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
-        assert done.returncode == 0, done.stderr
-        assert f"{more.get('camera', 'Camera')}: {tmp_path / 'out.svg'}" in done.stdout
+        keywords = {**changes, "camera": scene.objects[changes.get("camera", "Camera")]}
+        draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", **keywords)
+        process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
+        assert process.returncode == 0, process.stderr
+        assert f"{changes.get('camera', 'Camera')}: {tmp_path / 'out.svg'}" in process.stdout
         assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
-    assert drawable.read_bytes() == before
+    assert with_stroke_settings.read_bytes() == before
 
 
-def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
+def test_options_override_the_settings_of_the_scene(with_stroke_settings, tmp_path):
     scene = bpy.context.scene
     settings = scene.rosy.strokes
-    words = ["--distance", "0.5", "--no-tone", "--taper", "0", "--overshoot", "0"]
-    words += ["--plotter", "--colours", "red,blue"]
-    done = rosy(drawable, "-o", tmp_path / "out.svg", *words, verb="strokes")
-    assert done.returncode == 0, done.stderr
+    options = ["--distance", "0.5", "--no-tone", "--taper", "0", "--overshoot", "0"]
+    options += ["--plotter", "--colours", "red,blue"]
+    process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
+    assert process.returncode == 0, process.stderr
     settings.unit, settings.distance, settings.tone = "world", 0.5, False
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
@@ -127,37 +127,45 @@ def test_options_come_before_the_settings_of_the_scene(drawable, tmp_path):
     assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
 
 
-def test_only_what_is_selected_is_drawn_on_if_the_scene_says_so(drawable, tmp_path):
+def test_strokes_on_selected_objects_only(with_stroke_settings, tmp_path):
     bpy.context.scene.rosy.strokes.selected = True
     bpy.ops.object.select_all(action="DESELECT")
     bpy.ops.wm.save_mainfile()
-    done = rosy(drawable, "-o", tmp_path / "out.svg", verb="strokes")
-    assert done.returncode == 2 and "no selected object has a field" in done.stderr
-    done = rosy(drawable, "-o", tmp_path / "out.svg", "--object", "Suzanne", verb="strokes")
-    assert done.returncode == 0, done.stderr
+    process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", verb="strokes")
+    assert process.returncode == 2 and "no selected object has a field" in process.stderr
+    process = rosy(
+        with_stroke_settings, "-o", tmp_path / "out.svg", "--object", "Suzanne", verb="strokes"
+    )
+    assert process.returncode == 0, process.stderr
 
 
-def test_strokes_of_frames(drawable, tmp_path):
+def test_strokes_of_frames(with_stroke_settings, tmp_path):
     monkey = bpy.data.objects["Suzanne"]
-    for frame, turn in ((1, 0.0), (3, 1.0)):
-        monkey.rotation_euler.z = turn
+    for frame, angle in ((1, 0.0), (3, 1.0)):
+        monkey.rotation_euler.z = angle
         monkey.keyframe_insert("rotation_euler", frame=frame)
     bpy.ops.wm.save_mainfile()
-    words = "--spacing", "20", "--frames", "1-3:2", "--size", "120x90"
-    done = rosy(drawable, "-o", tmp_path / "out-###.svg", *words, verb="strokes")
-    assert done.returncode == 0, done.stderr
+    options = "--spacing", "20", "--frames", "1-3:2", "--size", "120x90"
+    process = rosy(with_stroke_settings, "-o", tmp_path / "out-###.svg", *options, verb="strokes")
+    assert process.returncode == 0, process.stderr
     drawn = sorted(tmp_path.glob("out-*.svg"))
     assert [path.name for path in drawn] == ["out-001.svg", "out-003.svg"]
     assert drawn[0].read_bytes() != drawn[1].read_bytes()
     alone = rosy(
-        drawable, "-o", tmp_path / "alone.svg", *words[:3], "3", *words[4:], verb="strokes"
+        with_stroke_settings,
+        "-o",
+        tmp_path / "alone.svg",
+        *options[:3],
+        "3",
+        *options[4:],
+        verb="strokes",
     )
     assert alone.returncode == 0, alone.stderr
     assert (tmp_path / "alone.svg").read_bytes() == drawn[1].read_bytes()
 
 
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("options", "expected"),
     [
         (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
         (["--object", "Nobody"], "there is no object 'Nobody'"),
@@ -173,17 +181,17 @@ def test_strokes_of_frames(drawable, tmp_path):
         (["-o", "/nowhere/a.svg"], "the folder /nowhere does not exist"),
     ],
 )
-def test_bad_input_for_strokes_is_one_line(words, wanted, drawable, tmp_path):
-    out = [] if "-o" in words else ["-o", tmp_path / "out.svg"]
-    done = rosy(drawable, *words, *out, verb="strokes")
-    assert done.returncode == 2
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith("rosy: ")]
-    assert wanted in line and "Traceback" not in done.stderr
+def test_bad_input_for_strokes_is_one_line(options, expected, with_stroke_settings, tmp_path):
+    out = [] if "-o" in options else ["-o", tmp_path / "out.svg"]
+    process = rosy(with_stroke_settings, *options, *out, verb="strokes")
+    assert process.returncode == 2
+    (line,) = [line for line in process.stderr.splitlines() if line.startswith("rosy: ")]
+    assert expected in line and "Traceback" not in process.stderr
     assert not (tmp_path / "out.svg").exists()
 
 
-def test_strokes_of_files_that_are_not_there(tmp_path):
-    done = rosy(tmp_path / "none.blend", "-o", tmp_path / "out.svg", verb="strokes")
-    assert done.returncode == 2 and "none.blend: cannot be read: no such file" in done.stderr
-    done = rosy("-o", tmp_path / "out.svg", verb="strokes")
-    assert done.returncode == 2 and "give a mesh file, or SCENE.blend" in done.stderr
+def test_strokes_of_missing_files(tmp_path):
+    process = rosy(tmp_path / "none.blend", "-o", tmp_path / "out.svg", verb="strokes")
+    assert process.returncode == 2 and "none.blend: cannot be read: no such file" in process.stderr
+    process = rosy("-o", tmp_path / "out.svg", verb="strokes")
+    assert process.returncode == 2 and "give a mesh file, or SCENE.blend" in process.stderr

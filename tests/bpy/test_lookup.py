@@ -1,4 +1,4 @@
-"""A render through the material is the compositor's picture."""
+"""Renders of the baked material, compared with the picture of the compositor."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from scenes import add_field, add_plane, aim, link, render
 #: No shading, so that only the picture is compared.
 LOOK = Look(shading=0.0)
 
-#: Eight bits, and lookups that fall on the far side of a pixel's border.
+#: For 8-bit values, and for lookups that fall into an adjacent pixel.
 TOLERANCE = 0.004
 
 
-def difference(scene, path, picture, **how):
-    """Mean absolute difference on covered pixels, as displayed, and how many these are."""
-    seen = render(scene, path, **how)
-    assert seen.shape == picture.rgba.shape
-    covered = (picture.rgba[..., 3] > 0.999) & (seen[..., 3] > 0.999)
-    gap = to_display(seen[..., :3]) - to_display(picture.rgba[..., :3])
-    return np.abs(gap[covered]).mean(), covered.mean()
+def difference(scene, path, picture, **options):
+    """Return the mean absolute difference of display values on covered pixels, and their share."""
+    rendered = render(scene, path, **options)
+    assert rendered.shape == picture.rgba.shape
+    covered = (picture.rgba[..., 3] > 0.999) & (rendered[..., 3] > 0.999)
+    error = to_display(rendered[..., :3]) - to_display(picture.rgba[..., :3])
+    return np.abs(error[covered]).mean(), covered.mean()
 
 
 def far_lens(camera, scene):
@@ -50,21 +50,21 @@ def vertical_sensor(camera, scene):
 
 @pytest.mark.parametrize("change", [None, far_lens, odd_pixels, orthographic, vertical_sensor])
 @pytest.mark.parametrize("placement", ["PROJECTION", "WINDOW"])
-def test_render_is_the_picture(scene, camera, monkey, tmp_path, change, placement):
+def test_the_render_is_the_picture(scene, camera, monkey, tmp_path, change, placement):
     if change is not None:
         change(camera, scene)
     scene.rosy.placement = placement
     (baked,) = bake(scene, look=LOOK)
-    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    error, share = difference(scene, tmp_path / "render.exr", baked.picture)
     assert share > 0.02
-    assert gap < TOLERANCE
+    assert error < TOLERANCE
 
 
 def test_with_the_default_filter(scene, camera, monkey, tmp_path):
-    """Blender's own pixel filter reaches into neighbouring pixels, and so blurs any picture."""
+    """Blender's own pixel filter extends into adjacent pixels, and so blurs every picture."""
     (baked,) = bake(scene, look=LOOK)
-    gap, _ = difference(scene, tmp_path / "render.exr", baked.picture, box=False)
-    assert gap < 0.06
+    error, _ = difference(scene, tmp_path / "render.exr", baked.picture, box=False)
+    assert error < 0.06
 
 
 @pytest.mark.parametrize("as_float", [False, True])
@@ -74,8 +74,8 @@ def test_subdivided(scene, camera, monkey, tmp_path, as_float):
     scene.rosy.image_format = "FLOAT" if as_float else "BYTE"
     (baked,) = bake(scene, look=LOOK)
     assert baked.image.is_float == as_float
-    gap, _ = difference(scene, tmp_path / "render.exr", baked.picture)
-    assert gap < (1e-3 if as_float else TOLERANCE)
+    error, _ = difference(scene, tmp_path / "render.exr", baked.picture)
+    assert error < (1e-3 if as_float else TOLERANCE)
 
 
 def test_supersampled(scene, camera, monkey, tmp_path):
@@ -85,23 +85,23 @@ def test_supersampled(scene, camera, monkey, tmp_path):
 
 
 def test_large_faces_under_perspective(scene, camera, tmp_path):
-    """One quad, seen steeply: texture coordinates at its corners would bend."""
+    """One quad at a steep angle, where interpolated texture coordinates would be wrong."""
     plane = add_field(add_plane(), kind="axis")
     plane.rotation_euler = (1.2, 0.3, 0.5)
     camera.data.lens = 15.0
     aim(camera, (0.0, -1.2, 0.0))
     (baked,) = bake(scene, look=LOOK)
-    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    error, share = difference(scene, tmp_path / "render.exr", baked.picture)
     assert share > 0.1
-    assert gap < TOLERANCE
+    assert error < TOLERANCE
 
 
-def test_it_stays_when_the_camera_and_the_object_move(scene, camera, monkey, tmp_path):
+def test_camera_and_object_moved_together(scene, camera, monkey, tmp_path):
     """Object and camera moved together show the same picture, with the baked projection."""
     (baked,) = bake(scene, look=LOOK)
     parent = link(bpy.data.objects.new("Parent", None))
-    for thing in (camera, monkey):
-        thing.parent = parent
+    for obj in (camera, monkey):
+        obj.parent = parent
     parent.location, parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.2, 1.0)
     assert difference(scene, tmp_path / "render.exr", baked.picture)[0] < TOLERANCE
 
@@ -111,15 +111,15 @@ def test_instances(scene, camera, monkey, tmp_path):
     collection = bpy.data.collections.new("Monkeys")
     scene.collection.objects.unlink(monkey)
     collection.objects.link(monkey)
-    for x, turn in ((-0.9, 0.4), (0.9, -0.8)):
+    for x, angle in ((-0.9, 0.4), (0.9, -0.8)):
         empty = link(bpy.data.objects.new("Instance", None))
         empty.instance_type, empty.instance_collection = "COLLECTION", collection
-        empty.location, empty.rotation_euler = (x, 0, 0), (0, 0, turn)
+        empty.location, empty.rotation_euler = (x, 0, 0), (0, 0, angle)
         empty.scale = (0.7, 0.7, 0.7)
     (baked,) = bake(scene, look=LOOK)
-    gap, share = difference(scene, tmp_path / "render.exr", baked.picture)
+    error, share = difference(scene, tmp_path / "render.exr", baked.picture)
     assert share > 0.1
-    assert gap < TOLERANCE
+    assert error < TOLERANCE
 
 
 def test_two_objects_share_a_mesh(scene, camera, monkey, tmp_path):

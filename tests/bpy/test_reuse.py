@@ -1,4 +1,4 @@
-"""What has not changed is not done again, and what has changed is."""
+"""Reuse of results: a change runs the stages that it affects, and no others."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from scenes import add_camera, add_field, add_plane, set_vectors
 
 
 @pytest.fixture(autouse=True)
-def empty():
+def empty_cache():
     BAKE_CACHE.clear()
     yield
     BAKE_CACHE.clear()
 
 
 @pytest.fixture
-def done(monkeypatch):
+def run_stages(monkeypatch):
     """The names of the slow steps that were run, in their order."""
     names = []
 
-    def watch(room, name):
-        real = getattr(room, name)
+    def watch(module, name):
+        real = getattr(module, name)
 
         def watched(*arguments):
             names.append(name)
             return real(*arguments)
 
-        monkeypatch.setattr(room, name, watched)
+        monkeypatch.setattr(module, name, watched)
 
     watch(projection, "project_task")
     watch(stages, "surface_pixel_field")
@@ -38,50 +38,50 @@ def done(monkeypatch):
     return names
 
 
-def drawn(scene):
+def draw(scene):
     return bake(scene)[0].picture.rgba
 
 
-def drawn_anew(scene):
+def draw_uncached(scene):
     BAKE_CACHE.clear()
-    return drawn(scene)
+    return draw(scene)
 
 
-def move_vertex(scene, thing):
-    thing.data.vertices[100].co.z += 0.2
-    thing.data.update()
+def move_vertex(scene, obj):
+    obj.data.vertices[100].co.z += 0.2
+    obj.data.update()
 
 
-def turn_field(scene, thing):
-    add_field(thing, kind="axis", axis=(0.3, 1.0, 0.2))
+def turn_field(scene, obj):
+    add_field(obj, kind="axis", axis=(0.3, 1.0, 0.2))
 
 
-def turn_object(scene, thing):
-    thing.rotation_euler.z += 0.1
+def turn_object(scene, obj):
+    obj.rotation_euler.z += 0.1
 
 
-def subdivide(scene, thing):
-    thing.modifiers.new("Subdivision", "SUBSURF").levels = 1
+def subdivide(scene, obj):
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
 
 
-def hide_behind_a_plane(scene, thing):
+def hide_behind_a_plane(scene, obj):
     screen = add_plane("Screen", size=0.5)
     screen.location = (0.3, -2.0, 0.5)
 
 
-def flatten(scene, thing):
-    thing.data.shade_flat()
+def flatten(scene, obj):
+    obj.data.shade_flat()
 
 
-def move_camera(scene, thing):
+def move_camera(scene, obj):
     scene.camera.location.x += 0.1
 
 
-def zoom(scene, thing):
+def zoom(scene, obj):
     scene.camera.data.lens += 3
 
 
-def show_faces(scene, thing):
+def show_faces(scene, obj):
     scene.rosy.look.display = "flat"
 
 
@@ -99,18 +99,18 @@ def show_faces(scene, thing):
         show_faces,
     ],
 )
-def test_a_change_is_seen(scene, camera, monkey, done, change):
-    before = drawn(scene)
+def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
+    before = draw(scene)
     change(scene, monkey)
-    done.clear()
-    after = drawn(scene)
-    assert done == ["project_task", "surface_pixel_field", "lic_task"]
+    run_stages.clear()
+    after = draw(scene)
+    assert run_stages == ["project_task", "surface_pixel_field", "lic_task"]
     assert not np.array_equal(before, after)
-    np.testing.assert_array_equal(after, drawn_anew(scene))
+    np.testing.assert_array_equal(after, draw_uncached(scene))
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "again"),
+    ("setting", "value", "stages_run"),
     [
         ("gain", 1.0, []),
         ("shading", 0.2, []),
@@ -125,34 +125,36 @@ def test_a_change_is_seen(scene, camera, monkey, done, change):
         ("supersampling", 2, ["project_task", "surface_pixel_field", "lic_task"]),
     ],
 )
-def test_a_look_does_again_what_depends_on_it(scene, camera, monkey, done, setting, value, again):
-    before = drawn(scene)
+def test_a_setting_runs_the_stages_that_depend_on_it(
+    scene, camera, monkey, run_stages, setting, value, stages_run
+):
+    before = draw(scene)
     setattr(scene.rosy.look, setting, value)
-    done.clear()
-    after = drawn(scene)
-    assert done == again
+    run_stages.clear()
+    after = draw(scene)
+    assert run_stages == stages_run
     assert not np.array_equal(before, after)
-    np.testing.assert_array_equal(after, drawn_anew(scene))
+    np.testing.assert_array_equal(after, draw_uncached(scene))
 
 
-def test_nothing_changed_nothing_done(scene, camera, monkey, done):
-    before = drawn(scene)
-    done.clear()
-    np.testing.assert_array_equal(drawn(scene), before)
-    assert not done
+def test_no_change_runs_no_stage(scene, camera, monkey, run_stages):
+    before = draw(scene)
+    run_stages.clear()
+    np.testing.assert_array_equal(draw(scene), before)
+    assert not run_stages
 
 
-def test_two_cameras_are_both_kept(scene, camera, monkey, done):
+def test_results_of_two_cameras_are_kept(scene, camera, monkey, run_stages):
     other = add_camera("Other", location=(3, -4, 2))
     cameras = [scene.camera, other]
     bake(scene, cameras=cameras)
-    done.clear()
+    run_stages.clear()
     bake(scene, cameras=cameras)
-    assert not done
+    assert not run_stages
 
 
-def test_another_object_may_move_alone(scene, camera, monkey, done):
-    """What is known of an instance does not go when another changes."""
+def test_a_change_adds_only_results_of_its_object(scene, camera, monkey, run_stages):
+    """The results of other instances stay in the cache."""
     plane = add_field(add_plane("Other"), kind="axis")
     bake(scene)
     entries = len(BAKE_CACHE)
@@ -162,17 +164,17 @@ def test_another_object_may_move_alone(scene, camera, monkey, done):
     assert len(BAKE_CACHE) == entries + 4
     set_vectors(plane.data, np.zeros((len(plane.data.polygons), 3)) + (1, 0, 0.5))
     bake(scene)
-    # Its field as it was given and as it is drawn, its instance, its corner field, and the same.
+    # Its original and its evaluated field, its instance, its corner field, and those three.
     assert len(BAKE_CACHE) == entries + 11
 
 
-def test_what_is_over_the_limit_is_given_up_oldest_first():
-    kept = Cache(max_bytes=10_000)
+def test_the_least_recently_used_entries_are_evicted():
+    cache = Cache(max_bytes=10_000)
     for number in range(5):
-        kept.put(number, np.zeros(500))
-    assert kept.get(0) is not None
-    kept.evict_over_limit()
-    assert [kept.get(number) is not None for number in range(5)] == [
+        cache.put(number, np.zeros(500))
+    assert cache.get(0) is not None
+    cache.evict_over_limit()
+    assert [cache.get(number) is not None for number in range(5)] == [
         True,
         False,
         False,
@@ -182,15 +184,15 @@ def test_what_is_over_the_limit_is_given_up_oldest_first():
 
 
 def test_a_shared_array_counts_once():
-    kept = Cache(max_bytes=10_000)
+    cache = Cache(max_bytes=10_000)
     array = np.zeros(1000)
     for number in range(5):
-        kept.put(number, [array, array[:10]])
-    kept.evict_over_limit()
-    assert len(kept) == 5
+        cache.put(number, [array, array[:10]])
+    cache.evict_over_limit()
+    assert len(cache) == 5
 
 
-def test_digests_tell_apart_what_differs():
+def test_hashes_of_different_contents_differ():
     array = np.arange(6.0)
     assert content_hash(array) == content_hash(array.copy())
     others = (

@@ -32,6 +32,6 @@ def test_blender_can_read_the_properties_of_every_operator():
     operators = importlib.import_module("rosy.operators")
     classes = [cls for module in operators.MODULES for cls in module.CLASSES]
     for cls in classes:
-        # As Blender does when it registers a class; it prints what fails and goes on without.
+        # Blender does the same when it registers a class. It prints errors and goes on.
         assert set(inspect.get_annotations(cls)) <= set(typing.get_type_hints(cls))
     assert classes

@@ -1,4 +1,4 @@
-"""Strokes on Suzanne, who comes with Blender."""
+"""The spacing of strokes on Suzanne."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ pytestmark = pytest.mark.long
 
 
 def suzanne(levels=2):
+    """Return the surface of Suzanne, subdivided."""
     bpy.ops.mesh.primitive_monkey_add()
     monkey = bpy.context.object
     monkey.modifiers.new("smooth", "SUBSURF").levels = levels

@@ -1,4 +1,4 @@
-"""Strokes in a scene: what they are made into, where they are, and that nothing else changes."""
+"""Stroke objects of a scene: their data, what renders show, and that nothing else changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
 
-#: Type of a Grease Pencil object: Blender 4.3 replaced Grease Pencil by a new one.
+#: Type of a Grease Pencil object, which is another one since Blender 4.3.
 PENCIL = "GREASEPENCIL" if has_grease_pencil_drawings() else "GPENCIL"
 
 
@@ -33,13 +33,13 @@ def view(scene):
 
 
 def values(attribute, key="value", columns=1):
-    found = np.empty(columns * len(attribute.data), dtype=np.float32)
-    attribute.data.foreach_get(key, found)
-    return found.reshape(-1, columns) if columns > 1 else found
+    result = np.empty(columns * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get(key, result)
+    return result.reshape(-1, columns) if columns > 1 else result
 
 
 def pencil_strokes(layer):
-    """(points, widths, material index) of each stroke of a layer: (n, 3) and (n,), world units."""
+    """Return the points (n, 3), widths (n,) and material index of each stroke, in world units."""
     (frame,) = layer.frames
     if has_grease_pencil_drawings():
         return [
@@ -60,55 +60,56 @@ def pencil_strokes(layer):
     ]
 
 
-def coverage(points, start, radius, camera, fine=8):
-    """(H, W) share of each pixel, rows from the bottom, that lines cover, by many small discs."""
+def coverage(points, start, radius, camera, subpixels=8):
+    """Return the share of each pixel that lines cover, (H, W), rows from the bottom."""
     pixels, _ = project_to_pixels(points, camera)
     size = radius / pixel_size(points, camera)
-    canvas = np.zeros((camera.height * fine, camera.width * fine), dtype=bool)
-    y, x = np.mgrid[: camera.height * fine, : camera.width * fine]
+    canvas = np.zeros((camera.height * subpixels, camera.width * subpixels), dtype=bool)
+    y, x = np.mgrid[: camera.height * subpixels, : camera.width * subpixels]
     for first, last in pairwise(start):
         for a in range(first, last - 1):
-            steps = max(int(np.ceil(np.hypot(*(pixels[a + 1] - pixels[a])) * fine / 2)), 1)
+            steps = max(int(np.ceil(np.hypot(*(pixels[a + 1] - pixels[a])) * subpixels / 2)), 1)
             for share in np.arange(steps + 1) / steps:
-                at = (pixels[a] + share * (pixels[a + 1] - pixels[a])) * fine
-                r = (size[a] + share * (size[a + 1] - size[a])) * fine
+                center = (pixels[a] + share * (pixels[a + 1] - pixels[a])) * subpixels
+                r = (size[a] + share * (size[a + 1] - size[a])) * subpixels
                 box = [
-                    slice(max(int(at[k] - r) - 1, 0), max(int(at[k] + r) + 2, 0)) for k in (1, 0)
+                    slice(max(int(center[k] - r) - 1, 0), max(int(center[k] + r) + 2, 0))
+                    for k in (1, 0)
                 ]
-                near = np.hypot(x[*box] + 0.5 - at[0], y[*box] + 0.5 - at[1]) <= r
-                canvas[*box] |= near
-    return canvas.reshape(camera.height, fine, camera.width, fine).mean(axis=(1, 3))
+                is_covered = np.hypot(x[*box] + 0.5 - center[0], y[*box] + 0.5 - center[1]) <= r
+                canvas[*box] |= is_covered
+    return canvas.reshape(camera.height, subpixels, camera.width, subpixels).mean(axis=(1, 3))
 
 
 def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
-    made = draw_strokes(scene, kind="PENCIL", style=PLAIN, pen=BLACK)
-    data, strokes = made.obj.data, made.drawing.strokes
-    assert made.obj.type == PENCIL
+    result = draw_strokes(scene, kind="PENCIL", style=PLAIN, pen=BLACK)
+    data, strokes = result.obj.data, result.drawing.strokes
+    assert result.obj.type == PENCIL
     titles = [layer.name if has_grease_pencil_drawings() else layer.info for layer in data.layers]
     assert titles == ["Family 1", "Family 2", "Outline"]
     assert not any(material.grease_pencil.show_fill for material in data.materials)
-    eye = view(scene)
-    for number, layer in enumerate(data.layers):
+    camera_view = view(scene)
+    for index, layer in enumerate(data.layers):
         lines = pencil_strokes(layer)
-        own = np.array([strokes.names[family] in OUTLINE_KINDS for family in strokes.family])
-        own = own if number == 2 else strokes.family == number
-        assert len(lines) == own.sum() and not layer.use_lights
-        assert {material for _, _, material in lines} == {number}
-        for (points, width, _), stroke in zip(lines, np.flatnonzero(own), strict=True):
+        in_layer = np.array([strokes.names[family] in OUTLINE_KINDS for family in strokes.family])
+        in_layer = in_layer if index == 2 else strokes.family == index
+        assert len(lines) == in_layer.sum() and not layer.use_lights
+        assert {material for _, _, material in lines} == {index}
+        for (points, width, _), stroke in zip(lines, np.flatnonzero(in_layer), strict=True):
             part = slice(*strokes.start[stroke : stroke + 2])
-            where, _ = project_to_pixels(points, eye)
-            wanted, _ = project_to_pixels(strokes.points[part], eye)
-            np.testing.assert_allclose(where[[0, -1]], wanted[[0, -1]], atol=0.01)
-            width = width / pixel_size(points, eye)
+            positions, _ = project_to_pixels(points, camera_view)
+            expected, _ = project_to_pixels(strokes.points[part], camera_view)
+            np.testing.assert_allclose(positions[[0, -1]], expected[[0, -1]], atol=0.01)
+            width = width / pixel_size(points, camera_view)
             assert np.isclose(width.max(), 1.5 * strokes.width[part].max(), rtol=0.03)
 
 
-def test_curves_hold_the_strokes_and_what_is_known_of_them(monkey, camera, scene):
-    made = draw_strokes(scene, kind="CURVES", style=PLAIN, pen=BLACK)
-    data, strokes = made.obj.data, made.drawing.strokes
-    assert made.obj.type == "CURVES" and len(data.curves) == len(strokes)
-    found = {name: data.attributes[name] for name in data.attributes.keys()}  # noqa: SIM118
-    wanted = {
+def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
+    result = draw_strokes(scene, kind="CURVES", style=PLAIN, pen=BLACK)
+    data, strokes = result.obj.data, result.drawing.strokes
+    assert result.obj.type == "CURVES" and len(data.curves) == len(strokes)
+    attributes = {name: data.attributes[name] for name in data.attributes.keys()}  # noqa: SIM118
+    expected = {
         "radius": ("POINT", "FLOAT"),
         "opacity": ("POINT", "FLOAT"),
         "spacing": ("POINT", "FLOAT"),
@@ -119,58 +120,58 @@ def test_curves_hold_the_strokes_and_what_is_known_of_them(monkey, camera, scene
         "object": ("CURVE", "INT"),
         "ink": ("CURVE", "FLOAT_COLOR"),
     }
-    for name, (domain, kind) in wanted.items():
-        assert (found[name].domain, found[name].data_type) == (domain, kind)
-    np.testing.assert_array_equal(values(found["family"]), strokes.family)
+    for name, (domain, kind) in expected.items():
+        assert (attributes[name].domain, attributes[name].data_type) == (domain, kind)
+    np.testing.assert_array_equal(values(attributes["family"]), strokes.family)
     assert {curve.points[0].radius for curve in data.curves} > {0.0} or values(
-        found["radius"]
+        attributes["radius"]
     ).all()
-    # Of every point, the face is one of the mesh's, and the normal is that face's, about.
+    # The faces of the points are those of the mesh, and the normals are about those of the faces.
     faces = bpy.data.objects["Suzanne"].data.polygons
-    along = values(found["member"], "vector", 3)
-    normal = values(found["surface_normal"], "vector", 3)
-    drawn = along.any(axis=1)
-    assert np.allclose(np.linalg.norm(along[drawn], axis=1), 1, atol=1e-4)
-    flat = np.array([faces[int(face)].normal for face in values(found["face_index"])])
+    member = values(attributes["member"], "vector", 3)
+    normal = values(attributes["surface_normal"], "vector", 3)
+    has_member = member.any(axis=1)
+    assert np.allclose(np.linalg.norm(member[has_member], axis=1), 1, atol=1e-4)
+    flat = np.array([faces[int(face)].normal for face in values(attributes["face_index"])])
     assert np.einsum("ni,ni->n", flat, normal).mean() > 0.85
-    points = values(found["position"], "vector", 3)
-    eye = view(scene)
+    points = values(attributes["position"], "vector", 3)
+    camera_view = view(scene)
     assert (
-        np.einsum("ni,ni->n", np.array(camera.location) - points, normal)[drawn] > 0
+        np.einsum("ni,ni->n", np.array(camera.location) - points, normal)[has_member] > 0
     ).mean() > 0.95
     first = np.array([curve.first_point_index for curve in data.curves])
-    where, _ = project_to_pixels(points[first].astype(float), eye)
+    positions, _ = project_to_pixels(points[first].astype(float), camera_view)
     np.testing.assert_allclose(
-        where, project_to_pixels(strokes.points[strokes.start[:-1]], eye)[0], atol=0.01
+        positions, project_to_pixels(strokes.points[strokes.start[:-1]], camera_view)[0], atol=0.01
     )
 
 
-def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
-    monkey, camera, scene, tmp_path
-):
+def test_cycles_renders_curves_without_the_hidden_ones(monkey, camera, scene, tmp_path):
     wall = add_plane("Wall", size=0.5)
     wall.location = (0.5, -2.0, 0.3)
     bpy.context.view_layer.update()
-    made = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=5), pen=Pen(width=2.0))
-    eye = view(scene)
+    result = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=5), pen=Pen(width=2.0))
+    camera_view = view(scene)
     corners = np.array([[x, 0, z] for x in (-0.5, 0.5) for z in (-0.5, 0.5)]) + wall.location
-    low, high = (edge(project_to_pixels(corners, eye)[0], axis=0) for edge in (np.min, np.max))
+    low, high = (
+        edge(project_to_pixels(corners, camera_view)[0], axis=0) for edge in (np.min, np.max)
+    )
     covered = (slice(int(low[1]) + 2, int(high[1]) - 2), slice(int(low[0]) + 2, int(high[0]) - 2))
     wall.hide_render = monkey.hide_render = True
     alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
-    strokes = made.drawing.strokes
-    radius = pixel_size(strokes.points, eye) * strokes.width
-    expected = coverage(strokes.points, strokes.start, radius, eye)
+    strokes = result.drawing.strokes
+    radius = pixel_size(strokes.points, camera_view) * strokes.width
+    expected = coverage(strokes.points, strokes.start, radius, camera_view)
     assert expected.mean() > 0.03
     assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
     assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
-    # Behind the wall was nothing to be seen, and it is not there now that the wall is gone.
+    # Strokes behind the wall were left out, so nothing appears there without the wall.
     assert alpha[covered].size > 300 and alpha[covered].mean() < 1e-4
     monkey.hide_render = False
     kept = draw_strokes(
         scene, kind="CURVES", style=StrokeStyle(spacing=5, hidden=True), pen=Pen(width=2.0)
     )
-    assert kept.obj == made.obj
+    assert kept.obj == result.obj
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "kept.exr", samples=8)[..., 3]
     assert alpha[covered].mean() > 0.1
@@ -178,7 +179,7 @@ def test_cycles_shows_curves_where_they_are_and_none_that_are_hidden(
 
 @pytest.fixture(scope="module")
 def workbench():
-    """Skip where there is nothing that this module of Blender could draw with."""
+    """Skip tests if this module of Blender has nothing to draw with."""
     if bpy.app.version >= (4, 3):
         pytest.skip("full Blenders draw the new kind of Grease Pencil, in their own tests")
     trial = (
@@ -189,31 +190,31 @@ def workbench():
         pytest.skip("no graphics context without a window on this machine")
 
 
-def test_workbench_shows_grease_pencil_of_the_old_kind(workbench, monkey, camera, scene, tmp_path):
-    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=6), pen=Pen(width=3.0))
-    eye = view(scene)
+def test_workbench_renders_legacy_grease_pencil(workbench, monkey, camera, scene, tmp_path):
+    result = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=6), pen=Pen(width=3.0))
+    camera_view = view(scene)
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "pencil.exr", engine="BLENDER_WORKBENCH")[..., 3]
-    strokes = made.drawing.strokes
-    radius = pixel_size(strokes.points, eye) * strokes.width * 3 / 2
-    expected = coverage(strokes.points, strokes.start, radius, eye)
+    strokes = result.drawing.strokes
+    radius = pixel_size(strokes.points, camera_view) * strokes.width * 3 / 2
+    expected = coverage(strokes.points, strokes.start, radius, camera_view)
     assert expected.mean() > 0.05
     assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.95
     assert np.isclose(alpha.mean(), expected.mean(), rtol=0.1)
 
 
-def test_strokes_that_run_on_are_covered_by_nothing(monkey, camera, scene, tmp_path):
-    """Past silhouettes and on what is in front, with that still there."""
+def test_overshoot_is_not_occluded(monkey, camera, scene, tmp_path):
+    """Renders show strokes past silhouettes and over surfaces in front."""
     wall = add_plane("Wall", size=0.5)
     wall.location = (0.5, -2.0, 0.3)
     bpy.context.view_layer.update()
     style = StrokeStyle(spacing=7, overshoot=15)
-    made = draw_strokes(scene, kind="CURVES", style=style, pen=Pen(width=2.0))
+    result = draw_strokes(scene, kind="CURVES", style=style, pen=Pen(width=2.0))
     wall.is_holdout = monkey.is_holdout = True
     alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
-    strokes, eye = made.drawing.strokes, view(scene)
-    radius = pixel_size(strokes.points, eye) * strokes.width
-    expected = coverage(strokes.points, strokes.start, radius, eye)
+    strokes, camera_view = result.drawing.strokes, view(scene)
+    radius = pixel_size(strokes.points, camera_view) * strokes.width
+    expected = coverage(strokes.points, strokes.start, radius, camera_view)
     assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
     assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
     short = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=7)).drawing.strokes
@@ -226,10 +227,10 @@ def pencil_modifiers(obj):
 
 
 @pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
-def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
+def test_strokes_are_replaced_and_removed(monkey, camera, scene, kind):
     before = contents()
     first = draw_strokes(scene, kind=kind, style=PLAIN).obj
-    once = contents()
+    drawn_once = contents()
     first.name = "Mine"
     if kind == "PENCIL":
         noise = "GREASE_PENCIL_NOISE" if has_grease_pencil_drawings() else "GP_NOISE"
@@ -240,19 +241,19 @@ def test_again_replaces_and_remove_leaves_nothing(monkey, camera, scene, kind):
     assert kind == "CURVES" or pencil_modifiers(again)[0].name == "Noise"
     assert np.allclose(again.matrix_basis, np.eye(4))
     again.name = f"RoSy Strokes {camera.name}"
-    after = contents()
-    assert {key for key in after if key != "object " + again.name} == {
-        key for key in once if key != "object " + again.name
+    drawn_twice = contents()
+    assert {key for key in drawn_twice if key != "object " + again.name} == {
+        key for key in drawn_once if key != "object " + again.name
     }
-    assert [after[key] for key in ("objects", "materials")] == [
-        once[key] for key in ("objects", "materials")
+    assert [drawn_twice[key] for key in ("objects", "materials")] == [
+        drawn_once[key] for key in ("objects", "materials")
     ]
     assert remove_strokes(scene) == 1
     assert contents() == before
     assert remove_strokes(scene) == 0
 
 
-def test_copies_are_the_users(monkey, camera, scene):
+def test_copies_belong_to_the_user(monkey, camera, scene):
     first = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     copy = first.copy()
     copy.data = first.data.copy()
@@ -267,7 +268,7 @@ def test_copies_are_the_users(monkey, camera, scene):
     assert {copy.name, linked.name} <= set(scene.objects.keys())
 
 
-def test_deleted_by_the_user_it_is_made_anew(monkey, camera, scene):
+def test_a_deleted_object_is_created_again(monkey, camera, scene):
     first = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     bpy.data.objects.remove(first)
     assert not stroke_objects(scene)
@@ -276,43 +277,43 @@ def test_deleted_by_the_user_it_is_made_anew(monkey, camera, scene):
     assert not stroke_objects(scene)
     second = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     assert stroke_objects(scene) == [second]
-    assert [thing.name for thing in bpy.data.objects if thing.type == PENCIL] == [second.name]
+    assert [obj.name for obj in bpy.data.objects if obj.type == PENCIL] == [second.name]
 
 
 def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
     side = add_camera("Side", (5.0, 0.0, 0.5))
-    made = [
+    objects = [
         draw_strokes(scene, kind=kind, camera=source, style=StrokeStyle(spacing=12)).obj
         for kind in ("PENCIL", "CURVES")
         for source in (camera, side, camera)
     ]
-    assert len(set(made)) == 4 and set(stroke_objects(scene)) == set(made)
+    assert len(set(objects)) == 4 and set(stroke_objects(scene)) == set(objects)
 
 
 def test_strokes_of_one_mesh_move_with_it(monkey, camera, scene):
     monkey.location, monkey.scale = (0.2, 0.0, 0.1), (1.2, 1.0, 0.9)
     bpy.context.view_layer.update()
-    thing = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
+    obj = draw_strokes(scene, kind="CURVES", style=PLAIN).obj
     bpy.context.view_layer.update()
-    assert np.allclose(thing.matrix_world, np.eye(4), atol=1e-6)
+    assert np.allclose(obj.matrix_world, np.eye(4), atol=1e-6)
     monkey.location.x += 1.0
     bpy.context.view_layer.update()
-    assert np.allclose(thing.matrix_world.translation, (1, 0, 0), atol=1e-6)
+    assert np.allclose(obj.matrix_world.translation, (1, 0, 0), atol=1e-6)
     add_field(add_plane("Other", cuts=4), "axis")
     assert draw_strokes(scene, kind="CURVES", style=PLAIN).obj.parent is None
 
 
-def test_chosen_objects_are_drawn_on_and_the_others_hide(monkey, camera, scene):
+def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     wall = add_field(add_plane("Wall", size=0.6, cuts=3), "axis")
     wall.location.y = -2.0
     bpy.context.view_layer.update()
     instances = read_scene(bpy.context.evaluated_depsgraph_get()).instances
     assert len(instances) == 2
-    made = draw_strokes(
+    result = draw_strokes(
         scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=12)
     )
-    assert np.allclose(made.drawing.strokes.points[:, 1], -2.0)
-    alone = len(
+    assert np.allclose(result.drawing.strokes.points[:, 1], -2.0)
+    monkey_count = len(
         draw_strokes(
             scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=12)
         ).drawing.strokes
@@ -320,31 +321,31 @@ def test_chosen_objects_are_drawn_on_and_the_others_hide(monkey, camera, scene):
     wall.hide_render = True
     assert (
         len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12)).drawing.strokes)
-        > alone
+        > monkey_count
     )
 
 
-def test_what_was_made_of_strokes_hides_nothing(monkey, camera, scene):
-    """Geometry Nodes may make meshes of them; these are not what is drawn on."""
-    wanted = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
-    thicken(wanted.obj, 0.3)
+def test_meshes_from_strokes_do_not_occlude(monkey, camera, scene):
+    """Geometry Nodes may turn stroke objects into meshes; these are not read as occluders."""
+    first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
+    thicken(first.obj, 0.3)
     again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
-    np.testing.assert_array_equal(again.drawing.strokes.points, wanted.drawing.strokes.points)
+    np.testing.assert_array_equal(again.drawing.strokes.points, first.drawing.strokes.points)
 
 
-def thicken(thing, radius):
-    """A tube around each curve, by Geometry Nodes."""
+def thicken(obj, radius):
+    """Add a tube around each curve, by Geometry Nodes."""
     group = bpy.data.node_groups.new("Tubes", "GeometryNodeTree")
-    for way in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
     names = "NodeGroupInput", "GeometryNodeCurveToMesh", "GeometryNodeCurvePrimitiveCircle"
-    inside, tube, circle = (group.nodes.new(name) for name in names)
-    outside = group.nodes.new("NodeGroupOutput")
+    group_input, tube, circle = (group.nodes.new(name) for name in names)
+    group_output = group.nodes.new("NodeGroupOutput")
     circle.inputs["Radius"].default_value = radius
-    group.links.new(inside.outputs[0], tube.inputs["Curve"])
+    group.links.new(group_input.outputs[0], tube.inputs["Curve"])
     group.links.new(circle.outputs["Curve"], tube.inputs["Profile Curve"])
-    group.links.new(tube.outputs["Mesh"], outside.inputs[0])
-    thing.modifiers.new("Tubes", "NODES").node_group = group
+    group.links.new(tube.outputs["Mesh"], group_output.inputs[0])
+    obj.modifiers.new("Tubes", "NODES").node_group = group
     bpy.context.view_layer.update()
 
 
@@ -362,20 +363,20 @@ def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, 
     assert text == (tmp_path / "b.svg").read_text() and 'stroke="#ff0000"' in text
 
 
-def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
+def test_cancelling_leaves_nothing(monkey, camera, scene):
     before = contents()
-    work = draw_strokes_task(scene, kind="PENCIL", style=PLAIN)
+    task = draw_strokes_task(scene, kind="PENCIL", style=PLAIN)
     labels = []
-    for step in work:
+    for step in task:
         labels.append(step.label)
         if step.fraction > 0.9:
-            work.close()
+            task.close()
             break
     assert "tracing strokes" in labels and contents() == before
 
 
 @pytest.mark.parametrize(
-    ("spoil", "more", "wanted"),
+    ("problem", "options", "expected"),
     [
         ("camera", {}, "scene 'Scene' has no active camera"),
         ("field", {}, "no visible object has a RoSy field"),
@@ -391,25 +392,27 @@ def test_stopped_before_the_end_nothing_is_there(monkey, camera, scene):
         ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "too many"),
     ],
 )
-def test_wrong_input_is_one_line_and_changes_nothing(monkey, camera, scene, spoil, more, wanted):
-    if spoil == "camera":
+def test_wrong_input_is_one_line_and_changes_nothing(
+    monkey, camera, scene, problem, options, expected
+):
+    if problem == "camera":
         scene.camera = None
-    elif spoil == "field":
+    elif problem == "field":
         monkey.data.attributes.remove(monkey.data.attributes["rosy"])
-    elif spoil == "away":
+    elif problem == "away":
         monkey.location.y = -50.0
         bpy.context.view_layer.update()
     before = contents()
     with pytest.raises(RosyError) as caught:
-        draw_strokes(scene, **{"kind": "PENCIL", **more})
-    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+        draw_strokes(scene, **{"kind": "PENCIL", **options})
+    assert expected in str(caught.value) and "\n" not in str(caught.value)
     assert contents() == before
 
 
-def test_other_meshes_without_a_field_do_not_matter(camera, scene):
+def test_meshes_without_faces_are_ignored(camera, scene):
     add_mesh("Points", [(0, 0, 0)], [])
     add_field(add_plane("Square", cuts=4), "axis")
-    made = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=12))
-    assert made.obj.data.layers[0].frames[0].frame_number == min(
+    result = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=12))
+    assert result.obj.data.layers[0].frames[0].frame_number == min(
         scene.frame_start, scene.frame_current
     )

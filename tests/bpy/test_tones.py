@@ -1,4 +1,4 @@
-"""Where tones come from in Blender: attributes, images, files, and occlusion."""
+"""Sources of tone in Blender: attributes, images, reference renders, shadows and occlusion."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def add_attribute(mesh, name, domain, kind, values):
 
 
 def add_image(name="Board", values=((0.0, 1.0), (0.5, 0.25)), *, as_float=False, space=None):
-    """An image of grey values, rows from the bottom."""
+    """Create an image of gray values, rows from the bottom."""
     values = np.asarray(values, dtype=np.float32)
     height, width = values.shape
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
@@ -51,7 +51,7 @@ def add_image(name="Board", values=((0.0, 1.0), (0.5, 0.25)), *, as_float=False,
 
 
 def save_picture(path, values):
-    """A .png file of display values, rows from the bottom."""
+    """Write a .png file of display values, rows from the bottom."""
     image = add_image("aside", values)
     image.filepath_raw, image.file_format = str(path), "PNG"
     image.save()
@@ -64,9 +64,9 @@ def wall(scene, camera):
     return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
 
 
-def tone_of(wish, name="Plane"):
-    reading = read_scene(depsgraph(), tone_request=wish)
-    return reading.instances[[owner.name for owner in reading.objects].index(name)].tone
+def tone_of(tone_request, name="Plane"):
+    scene_data = read_scene(depsgraph(), tone_request=tone_request)
+    return scene_data.instances[[owner.name for owner in scene_data.objects].index(name)].tone
 
 
 # --- attributes -----------------------------------------------------------------------------------
@@ -79,57 +79,64 @@ def test_attributes_of_all_domains(wall, domain, kind):
     count = {"POINT": len(mesh.vertices), "FACE": 4, "CORNER": len(mesh.loops)}[domain]
     numbers = (np.arange(count) + 0.5) / count
     if kind == "FLOAT":
-        values, wanted = numbers, numbers
+        values, expected = numbers, numbers
     else:
         values = np.stack([numbers, 1 - numbers, 0.3 + 0 * numbers, 1 + 0 * numbers], axis=1)
-        wanted = values[:, :3] @ LUMINANCE
+        expected = values[:, :3] @ LUMINANCE
     add_attribute(mesh, "Ink", domain, kind, values)
     corner = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corner)
     face = np.repeat(np.arange(4), 4)
-    at = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
-    found = tone_of(ToneRequest("attribute", "Ink")).values
-    np.testing.assert_allclose(found[:, 0], wanted[at], atol=0.01 if kind == "BYTE_COLOR" else 1e-6)
+    element = {"POINT": corner, "FACE": face, "CORNER": np.arange(len(corner))}[domain]
+    tone = tone_of(ToneRequest("attribute", "Ink")).values
+    np.testing.assert_allclose(
+        tone[:, 0], expected[element], atol=0.01 if kind == "BYTE_COLOR" else 1e-6
+    )
 
 
-def test_no_name_is_the_active_colour(wall):
+def test_the_default_is_the_active_color_attribute(wall):
     add_attribute(wall.data, "Some", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.2))
     add_attribute(wall.data, "Paint", "POINT", "FLOAT_COLOR", np.full((9, 4), 0.7))
     wall.data.color_attributes.active_color_name = "Paint"
-    found = tone_of(ToneRequest("attribute")).values
-    np.testing.assert_allclose(found, 0.7, atol=1e-6)
+    tone = tone_of(ToneRequest("attribute")).values
+    np.testing.assert_allclose(tone, 0.7, atol=1e-6)
 
 
-def test_modifiers_carry_attributes(wall):
+def test_modifiers_copy_attributes(wall):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.linspace(0, 1, 9))
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
-    found = tone_of(ToneRequest("attribute", "Ink")).values
-    assert len(found) == 4 * 16
-    height = depsgraph().id_eval_get(wall).data
-    places = np.empty(3 * len(height.vertices), dtype=np.float32)
-    height.vertices.foreach_get("co", places)
-    corner = np.empty(len(height.loops), dtype=np.int32)
-    height.loops.foreach_get("vertex_index", corner)
-    x, _, z = places.reshape(-1, 3)[corner].T
-    np.testing.assert_allclose(found[:, 0], 0.5 + x / 8 + 3 * z / 8, atol=1e-5)
+    tone = tone_of(ToneRequest("attribute", "Ink")).values
+    assert len(tone) == 4 * 16
+    mesh = depsgraph().id_eval_get(wall).data
+    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    x, _, z = positions.reshape(-1, 3)[corner].T
+    np.testing.assert_allclose(tone[:, 0], 0.5 + x / 8 + 3 * z / 8, atol=1e-5)
 
 
-def test_objects_without_the_attribute_have_the_light(wall, monkey):
+def test_objects_without_the_attribute_have_no_tone(wall, monkey):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
     assert tone_of(ToneRequest("attribute", "Ink"), "Suzanne") is None
 
 
-def test_attributes_that_nobody_has(wall, monkey):
+def test_missing_attributes(wall, monkey):
     add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
     with pytest.raises(RosyError) as caught:
         read_scene(depsgraph(), tone_request=ToneRequest("attribute", "Pain"))
-    said = str(caught.value)
-    assert "'Pain'" in said and "'Paint'" in said and "'Plane'" in said and "'Suzanne'" in said
+    message = str(caught.value)
+    assert (
+        "'Pain'" in message
+        and "'Paint'" in message
+        and "'Plane'" in message
+        and "'Suzanne'" in message
+    )
     with pytest.raises(RosyError, match="no color attribute"):
         read_scene(depsgraph(), tone_request=ToneRequest("attribute"))
 
 
-def test_attributes_that_will_not_do(wall):
+def test_unsuitable_attributes(wall):
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected"):
         read_scene(depsgraph(), tone_request=ToneRequest("attribute", "rosy"))
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
@@ -142,8 +149,8 @@ def test_attributes_that_will_not_do(wall):
 
 def test_luminance_of_images():
     values = np.array([[0.0, 1.0], [0.5, 0.25]])
-    eight = image_luminance(add_image(values=values))
-    np.testing.assert_allclose(eight, to_linear(np.rint(values * 255) / 255), atol=1e-3)
+    byte_values = image_luminance(add_image(values=values))
+    np.testing.assert_allclose(byte_values, to_linear(np.rint(values * 255) / 255), atol=1e-3)
     linear = image_luminance(add_image("deep", values, as_float=True))
     np.testing.assert_allclose(linear, values, atol=1e-6)
     data = add_image("data", values, space="Non-Color")
@@ -154,18 +161,18 @@ def test_luminance_of_images():
 
 
 def add_uv(mesh):
-    """From 0 to 1 over the square."""
+    """Add a UV map from 0 to 1 over the square."""
     layer = mesh.uv_layers.new(name="Map")
     corner = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corner)
-    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
-    uv = places.reshape(-1, 3)[corner][:, [0, 2]] * 0.5 + 0.5
+    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    uv = positions.reshape(-1, 3)[corner][:, [0, 2]] * 0.5 + 0.5
     layer.uv.foreach_set("vector", uv.ravel())
 
 
 def test_images_on_uv_maps_are_drawn(scene, wall):
-    """Streaks of a picture are as light as the image says, quarter by quarter."""
+    """The streaks of each quarter of the picture have the tone of the image."""
     add_uv(wall.data)
     quarters = np.array([[0.1, 0.9], [0.6, 0.3]])
     wall.rosy.tone_image = add_image(values=np.kron(quarters, np.ones((8, 8))), as_float=True)
@@ -175,15 +182,15 @@ def test_images_on_uv_maps_are_drawn(scene, wall):
     covered = np.argwhere(rgba[..., 3] == 1)
     low, high = covered.min(axis=0), covered.max(axis=0)
     size = high - low
-    for place, wanted in np.ndenumerate(quarters):
-        # The middle of each.
-        start, stop = (low + size * (np.array(place) + part) // 2 for part in (0.2, 0.8))
+    for quarter, expected in np.ndenumerate(quarters):
+        # The middle of each quarter.
+        start, stop = (low + size * (np.array(quarter) + share) // 2 for share in (0.2, 0.8))
         (bottom, left), (top, right) = start.astype(int), stop.astype(int)
-        got = to_linear(rgba[bottom:top, left:right, 1]).mean()
-        assert got == pytest.approx(wanted, abs=0.08)
+        tone = to_linear(rgba[bottom:top, left:right, 1]).mean()
+        assert tone == pytest.approx(expected, abs=0.08)
 
 
-def test_images_without_a_map_or_none_at_all(wall):
+def test_missing_images_and_uv_maps(wall):
     with pytest.raises(RosyError, match="'Plane': choose an image for the tone"):
         read_scene(depsgraph(), tone_request=ToneRequest("image"))
     wall.rosy.tone_image = add_image()
@@ -203,27 +210,27 @@ PICTURE = Look(ink="hatch", tone="picture", grain=2.0)
 
 
 def test_pictures_from_files(scene, wall, tmp_path):
-    """Each half of the frame as light as in the file."""
+    """Each half of the frame has the tone of the file."""
     values = np.full((32, 32), 0.9)
     values[:, 16:] = 0.4
     save_picture(tmp_path / "shot.png", values)
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
-    rendered = load_reference(scene, depsgraph(), scene.camera, PICTURE)
+    reference = load_reference(scene, depsgraph(), scene.camera, PICTURE)
     np.testing.assert_allclose(
-        rendered.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
+        reference.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
     )
     assert set(bpy.data.images) == images
     rgba = pixels(bake(scene, look=PICTURE, size=(256, 256))[0].image)
-    whole = rgba[..., 3] == 1
-    left, right = whole.copy(), whole.copy()
+    opaque = rgba[..., 3] == 1
+    left, right = opaque.copy(), opaque.copy()
     left[:, 120:], right[:, :136] = False, False
-    for side, wanted in ((left, 0.9), (right, 0.4)):
-        got = to_linear(rgba[..., 1][side]).mean()
-        assert got == pytest.approx(float(to_linear(np.array(wanted))), abs=0.06)
+    for side, expected in ((left, 0.9), (right, 0.4)):
+        tone = to_linear(rgba[..., 1][side]).mean()
+        assert tone == pytest.approx(float(to_linear(np.array(expected))), abs=0.06)
 
 
-def test_pictures_that_will_not_do(scene, wall, tmp_path):
+def test_unsuitable_pictures(scene, wall, tmp_path):
     def error(path):
         scene.rosy.tone_picture = str(path)
         with pytest.raises(RosyError) as caught:
@@ -238,8 +245,8 @@ def test_pictures_that_will_not_do(scene, wall, tmp_path):
     assert "text.png" in error(tmp_path / "text.png")
     assert set(bpy.data.images) == images
     save_picture(tmp_path / "wide.png", np.zeros((16, 32)))
-    said = error(tmp_path / "wide.png")
-    assert "wide.png" in said and "32 x 16" in said and "128 x 128" in said
+    message = error(tmp_path / "wide.png")
+    assert "wide.png" in message and "32 x 16" in message and "128 x 128" in message
     assert not scene.rosy.bakes
 
 
@@ -251,10 +258,10 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
     settings = read_output_settings(scene)
 
     def run():
-        made = bake_animation(
+        results = bake_animation(
             scene, [1, 2], look=PICTURE, size=(128, 128), settings=settings, show=False
         )
-        return made[0].rendered
+        return results[0].rendered
 
     assert run() == (1, 2)
     means = []
@@ -262,16 +269,16 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
         rgba = pixels(bpy.data.images.load(str(path)))
         means.append(rgba[..., 1][rgba[..., 3] == 1].mean())
     assert means[0] > means[1] + 0.3
-    # Another picture of a frame is another frame, and only that.
+    # If the picture of a frame changes, only this frame is drawn again.
     assert run() == ()
     save_picture(tmp_path / "shot_002.png", np.full((16, 16), 0.6))
     assert run() == (2,)
 
 
-# --- the rest -------------------------------------------------------------------------------------
+# --- requests, shadows and occlusion --------------------------------------------------------------
 
 
-def test_wishes_of_looks(scene):
+def test_tone_requests_of_looks(scene):
     scene.rosy.tone_attribute = "Ink"
     assert make_tone_request(scene, Look()) is None
     assert make_tone_request(scene, Look(tone="attribute")) == ToneRequest("attribute", "Ink")
@@ -281,21 +288,21 @@ def test_wishes_of_looks(scene):
 
 def test_a_live_view_reads_tones_again_when_they_change(wall):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    wish, follower = ToneRequest("attribute", "Ink"), SceneCache()
-    (first,) = follower.read(depsgraph(), tone_request=wish)
-    (again,) = follower.read(depsgraph(), tone_request=wish)
-    assert again.version == first.version and not first.instance.tone.values.any()
+    tone_request, scene_cache = ToneRequest("attribute", "Ink"), SceneCache()
+    (first,) = scene_cache.read(depsgraph(), tone_request=tone_request)
+    (second,) = scene_cache.read(depsgraph(), tone_request=tone_request)
+    assert second.version == first.version and not first.instance.tone.values.any()
     wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
     wall.data.update()
-    follower.invalidate({"Plane"})
-    (changed,) = follower.read(depsgraph(), tone_request=wish)
+    scene_cache.invalidate({"Plane"})
+    (changed,) = scene_cache.read(depsgraph(), tone_request=tone_request)
     assert changed.version != first.version and changed.instance.tone.values.all()
-    (none,) = follower.read(depsgraph())
-    assert none.instance.tone is None
+    (without_tone,) = scene_cache.read(depsgraph())
+    assert without_tone.instance.tone is None
 
 
-def test_shadows_are_of_what_renders_show(scene, wall):
-    """Something between a sun and the wall, itself out of the frame, darkens it."""
+def test_shadows_of_objects_that_renders_show(scene, wall):
+    """An object between a sun and the wall, outside the frame, darkens the wall."""
     light = link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
     light.data.energy = np.pi
     light.rotation_euler = (np.radians(60), 0, 0)
@@ -307,11 +314,11 @@ def test_shadows_are_of_what_renders_show(scene, wall):
         rgba = pixels(bake(scene, look=look, size=(64, 64))[0].image)
         return rgba[..., 1][rgba[..., 3] == 1].mean()
 
-    bare, shaded = mean(look), mean(look.with_settings({"shadows": True}))
-    assert shaded < 0.8 * bare
+    unshadowed, shadowed = mean(look), mean(look.with_settings({"shadows": True}))
+    assert shadowed < 0.8 * unshadowed
     bpy.data.objects["Lid"].hide_render = True
     bpy.context.view_layer.update()
-    assert mean(look.with_settings({"shadows": True})) == pytest.approx(bare, abs=0.01)
+    assert mean(look.with_settings({"shadows": True})) == pytest.approx(unshadowed, abs=0.01)
 
 
 def test_occlusion_is_stored_and_drawn(scene, wall):
@@ -326,16 +333,16 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     attribute.data.foreach_get("value", values)
     corner = np.array([loop.vertex_index for loop in wall.data.loops])
     height = np.array([wall.data.vertices[index].co.z for index in corner])
-    # In the edge with the floor, which is as good as endless, half of the sky; more above.
+    # At the edge with the floor, which is practically infinite, half of the sky is visible.
     assert values[height == -1].mean() == pytest.approx(0.5, abs=0.05)
     assert values[height == 1].mean() > values[height == 0].mean() > 0.55
     assert tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)) is not None
-    # Once more in its place.
+    # Storing it again replaces it.
     run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
     assert sum(a.name.startswith(OCCLUSION_ATTRIBUTE) for a in wall.data.attributes) == 1
 
 
-def test_occlusion_of_meshes_that_modifiers_make_anew(scene, wall):
+def test_occlusion_of_meshes_with_new_faces(scene, wall):
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
     bpy.context.view_layer.update()
     run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
@@ -343,7 +350,7 @@ def test_occlusion_of_meshes_that_modifiers_make_anew(scene, wall):
     assert len(tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)).values) == 64
 
 
-def test_occlusion_leaves_other_attributes_alone(scene, wall):
+def test_occlusion_does_not_replace_other_attributes(scene, wall):
     add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
     with pytest.raises(RosyError, match="object 'Plane' already has an attribute 'Occlusion'"):
         run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=4))

@@ -1,5 +1,5 @@
 // Directions with the gradients of their angles on screen, by differences over connected neighbors.
-// Streamlines use them for positions beside the center of a pixel.
+// Streamlines use them at positions away from the center of a pixel.
 
 // The sine of the angle from a direction to that of the same sheet at a neighbor.
 float angle_difference(ivec2 pixel, int line, ivec2 offset, vec2 direction, float phase)

@@ -1,4 +1,4 @@
-// The picture on the visible surface.
+// The color of the picture at a fragment, for drawing over the 3D view.
 
 vec4 sample_picture(vec2 position)
 {

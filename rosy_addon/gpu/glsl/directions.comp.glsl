@@ -31,7 +31,7 @@ bool is_continuous(ivec2 pixel, ivec2 offset, vec4 value, vec4 normal, vec4 slop
   return dot(normal.xyz, other_normal.xyz) >= min_normal_cosine;
 }
 
-// A tangent of the view plane, moved to the surface and projected to the screen, in pixels.
+// A tangent of the view plane, transported to the surface and projected to the screen, in pixels.
 vec2 screen_direction(vec3 tangent, vec3 toward_eye, vec3 normal, vec2 ray)
 {
   vec3 tangent_on_surface = parallel_transport(tangent, toward_eye, normal);
@@ -94,7 +94,7 @@ void main()
 
   vec2 ray = pixel_ray(pixel, vec2(imageSize(cells)), clip_to_camera, lens_shift);
   vec3 eye = direction_to_eye(ray, is_perspective != 0);
-  // The camera's axes, moved to the plane perpendicular to the ray, as `frames`.
+  // The camera's axes, transported to the plane perpendicular to the ray, as in `frames`.
   float a = 1.0 / (1.0 + eye.z);
   vec3 x = vec3(1.0 - eye.x * eye.x * a, -eye.x * eye.y * a, -eye.x);
   vec3 y = vec3(-eye.x * eye.y * a, 1.0 - eye.y * eye.y * a, -eye.y);

@@ -1,5 +1,6 @@
 // The picture: line integral convolution along each line through a pixel, in both directions. The
-// mean of the images of all lines gets the contrast of one of them; then follow color, ink and light.
+// mean of the images of all lines gets the contrast of one of them. Then color, ink and light are
+// applied.
 
 vec3 color_of_magnitude(float value)
 {
@@ -12,7 +13,7 @@ vec3 color_of_magnitude(float value)
 }
 
 // The family of a line, as `family_hues`, from the angle of line 0 and the stored angle of the
-// families. `known_families` is 1 where the field has no families.
+// families. `known_families` is the number of families, or 1 at a pixel without families.
 int line_family(int line, float first_angle, float family_angle, int known_families)
 {
   // For odd N, every other line is the opposite half of a member.

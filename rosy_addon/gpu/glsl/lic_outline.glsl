@@ -5,8 +5,8 @@ bool is_inside(ivec2 pixel)
   return all(greaterThanEqual(pixel, ivec2(0))) && all(lessThan(pixel, imageSize(picture)));
 }
 
-// The width of the outline beside a pixel at which its surface ends. 0 if a surface in front begins
-// there, which has the outline (`outline`).
+// The width of the outline at a pixel at the border of its surface. It is 0 at other pixels, and
+// where a surface in front begins: the outline is then drawn on that surface (`outline`).
 float edge_width(ivec2 pixel, vec4 value, vec4 slope)
 {
   float width = 0.0;

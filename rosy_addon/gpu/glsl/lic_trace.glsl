@@ -7,8 +7,8 @@ struct Sums {
   float square_sum;
 };
 
-// Sums over half a streamline, and over its first steps with weights of their own. `tones` is the sum
-// of the tones along the overshoot, and their number.
+// Sums over half a streamline: `all` over all its steps, `near` over its first steps with weights of
+// their own. `tones` is the sum of the tones along the overshoot, and their number.
 struct Half {
   Sums all;
   Sums near;

@@ -1,5 +1,5 @@
-// The largest magnitude in each block of pixels. The first run reads the field, later runs the result
-// of the run before.
+// The largest magnitude in each block of pixels. The first run reads the field, each later run the
+// result of the previous one.
 
 void main()
 {

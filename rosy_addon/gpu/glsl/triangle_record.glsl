@@ -33,7 +33,8 @@ Corners corner_normals(int triangle)
                  record_texel(triangle, NORMAL_TEXEL + 2).xyz);
 }
 
-// The rest positions: x beside the positions, y beside the normals, z in the last texel.
+// The rest positions: x is the fourth component of positions, y that of normals; z is in the last
+// texel.
 Corners rest_positions(int triangle)
 {
   vec3 z = record_texel(triangle, texels_per_record - 1).xyz;
@@ -53,7 +54,7 @@ vec3 interpolated(Corners values, vec3 weights)
   return weights.x * values.first + weights.y * values.second + weights.z * values.third;
 }
 
-// The offset of a point from a ray, times the depth of the point.
+// The offset of a point from a ray, times the depth of the point if perspective.
 vec2 relative_to_ray(vec3 point, vec2 ray)
 {
   return is_perspective != 0 ? point.xy + ray * point.z : point.xy - ray;

@@ -1,4 +1,4 @@
-// As visibility.frag, without what the clip planes cut away.
+// As visibility.frag, without the fragments that the clip planes cut away.
 
 void main()
 {

@@ -22,11 +22,12 @@ COMMON = {0.0, 0.001, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 13.0, 1
 
 
 def constants_of(code):
-    """Names in capitals, with an underscore or of several letters."""
+    """Return the names in capitals, of at least two characters."""
     return set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", code))
 
 
 def literals_of(code):
+    """Return the values of all numbers in a source."""
     numbers = re.findall(r"(?<![\w.])(?:0x[0-9A-Fa-f]+|\d+\.?\d*(?:e[+-]?\d+)?)u?\b", code)
     return {
         float(int(text.rstrip("u"), 16) if text.startswith("0x") else text.rstrip("u"))

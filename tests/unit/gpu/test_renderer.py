@@ -1,7 +1,7 @@
-"""The graphics card's part: what goes to it and, where there is an OpenGL context, what comes back.
+"""The GPU renderer: its input data and, where there is an OpenGL context, its pictures.
 
-Every picture is compared with numpy's, of the same pixels, by brute force. Without moderngl or
-without a context (EGL; software OpenGL will do) those tests are skipped.
+Every picture is compared with numpy's picture of the same pixels, by brute force. These tests are
+skipped without moderngl or without a context (EGL; software OpenGL is enough).
 """
 
 from __future__ import annotations
@@ -44,39 +44,40 @@ from rosy_addon.render.view_input import ViewInput
 
 AXIS = (0.3, 0.2, 1.0)
 
-# --- what goes to the card -----------------------------------------------------------------------
+# --- input data ----------------------------------------------------------------------------------
 
 
 def rotation(x, y, z):
-    """About the three axes, one after the other."""
-    turns = []
+    """Return the rotation about the three axes, one after the other."""
+    rotations = []
     for axis, angle in enumerate((x, y, z)):
-        one = np.eye(3)
+        matrix = np.eye(3)
         a, b = [(1, 2), (2, 0), (0, 1)][axis]
-        one[[a, a, b, b], [a, b, a, b]] = (
+        matrix[[a, a, b, b], [a, b, a, b]] = (
             np.cos(angle),
             -np.sin(angle),
             np.sin(angle),
             np.cos(angle),
         )
-        turns.append(one)
-    return turns[2] @ turns[1] @ turns[0]
+        rotations.append(matrix)
+    return rotations[2] @ rotations[1] @ rotations[0]
 
 
 def smooth_field(surface, degree, families=1):
-    """One of index 1 / N around each singularity, and of a magnitude that changes.
+    """Return a field with singularities of index 1 / N and a magnitude that varies.
 
-    Not that of an axis, which all N members run into at its ends: brute force keeps to the N
-    directions there, the covering to the lines through a pixel, and beyond no two streamlines that
-    differ in their last digit stay together.
+    An axis field is not suitable, because all N members run into the ends of the axis. There, brute
+    force follows the N directions and the covering the lines through a pixel, and streamlines that
+    differ in the last digit diverge.
     """
     field = generate(surface, "smoothest", degree)
-    centre = surface.vertices[surface.corner_vertex[surface.face_start[:-1]]]
-    size = 0.8 + 0.4 * np.sin(3 * centre @ np.array(AXIS) + 1)
-    return RosyField(degree, field.vectors * size[:, None], family_count=families)
+    center = surface.vertices[surface.corner_vertex[surface.face_start[:-1]]]
+    magnitude = 0.8 + 0.4 * np.sin(3 * center @ np.array(AXIS) + 1)
+    return RosyField(degree, field.vectors * magnitude[:, None], family_count=families)
 
 
 def placed(linear=None, shift=(0, 0, 0)):
+    """Return the (4, 4) matrix with a linear part and a translation."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.eye(3) if linear is None else linear
     matrix[:3, 3] = shift
@@ -89,32 +90,34 @@ MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
 @given(ANGLES, ANGLES, ANGLES, st.floats(1e-3, 1e3), st.tuples(*[st.floats(-1e4, 1e4)] * 3))
-def test_what_merely_turns_scales_and_shifts_keeps_the_shape(x, y, z, scale, shift):
+def test_similarities_keep_the_shape(x, y, z, scale, shift):
     matrix = placed(scale * rotation(x, y, z), shift)
-    linear, moving = split_matrix(matrix)
+    linear, model_matrix = split_matrix(matrix)
     np.testing.assert_array_equal(linear, np.eye(3))
-    np.testing.assert_array_equal(moving, matrix)
+    np.testing.assert_array_equal(model_matrix, matrix)
 
 
 @given(ANGLES, ANGLES, ANGLES, st.floats(1e-3, 1e3), st.tuples(*[st.floats(-1e4, 1e4)] * 3))
-@pytest.mark.parametrize("bent", [SHEAR, MIRROR, np.diag([1.0, 1.0, 2.0]), np.diag([1.0, 1.0, 0])])
-def test_what_does_more_is_in_the_shape(bent, x, y, z, scale, shift):
-    matrix = placed(scale * rotation(x, y, z) @ bent, shift)
-    linear, moving = split_matrix(matrix)
+@pytest.mark.parametrize(
+    "distortion", [SHEAR, MIRROR, np.diag([1.0, 1.0, 2.0]), np.diag([1.0, 1.0, 0])]
+)
+def test_other_matrices_change_the_shape(distortion, x, y, z, scale, shift):
+    matrix = placed(scale * rotation(x, y, z) @ distortion, shift)
+    linear, model_matrix = split_matrix(matrix)
     np.testing.assert_array_equal(linear, matrix[:3, :3])
-    np.testing.assert_allclose(moving @ placed(linear), matrix)
-    # What is left may only shift: the shaders take vectors through it, and normals.
-    np.testing.assert_array_equal(moving[:3, :3], np.eye(3))
+    np.testing.assert_allclose(model_matrix @ placed(linear), matrix)
+    # The rest may only translate: the shaders transform vectors and normals by it.
+    np.testing.assert_array_equal(model_matrix[:3, :3], np.eye(3))
 
 
-def test_matrices_of_single_precision_are_similar():
+def test_rotations_in_single_precision_are_similarities():
     matrix = placed(7.3 * rotation(0.3, -1.2, 2.9), (1, 2, 3)).astype(np.float32)
     np.testing.assert_array_equal(split_matrix(matrix)[0], np.eye(3))
 
 
 @st.composite
 def surfaces(draw):
-    """A few triangles anywhere, with vertices that none uses, far away."""
+    """Return a few random triangles, with an unused vertex far away."""
     seed, count = draw(st.integers(0, 10**6)), draw(st.integers(1, 12))
     random = np.random.default_rng(seed)
     points = random.normal(size=(count + 2, 3)) * draw(st.sampled_from([0.01, 1.0, 100.0]))
@@ -124,14 +127,14 @@ def surfaces(draw):
     return from_triangles(points, triangles, name="some")
 
 
-def wavering(surface, degree, lengths=None, seed=0):
-    """N directions a face, each up to 0.3 from those of a RoSy."""
+def perturbed_field(surface, degree, lengths=None, seed=0):
+    """Return N directions on each face, each up to 0.3 radians from those of a RoSy."""
     x, y = face_frames(surface)
     base = axis_field(surface, degree, AXIS).vectors
-    start = np.arctan2((base * y).sum(axis=1), (base * x).sum(axis=1))[:, None]
+    first_angle = np.arctan2((base * y).sum(axis=1), (base * x).sum(axis=1))[:, None]
     step = np.arange(degree) * 2 * np.pi / degree
-    off = 0.3 * np.sin(np.arange(degree) * 2.1 + seed)
-    angles = (start + step + off)[..., None]
+    offsets = 0.3 * np.sin(np.arange(degree) * 2.1 + seed)
+    angles = (first_angle + step + offsets)[..., None]
     lengths = np.ones(degree) if lengths is None else np.asarray(lengths)
     return field_from_directions(
         surface, lengths[:, None] * (np.cos(angles) * x[:, None] + np.sin(angles) * y[:, None])
@@ -139,229 +142,234 @@ def wavering(surface, degree, lengths=None, seed=0):
 
 
 def conjugate_field(surface):
-    """Four directions of which opposite ones are on one line, at 1.2 radians to the other."""
+    """Return four directions on two lines, at 1.2 radians to each other."""
     x, y = face_frames(surface)
     base = axis_field(surface, 4, AXIS).vectors
-    start = np.arctan2((base * y).sum(axis=1), (base * x).sum(axis=1))[:, None]
-    angles = (start + np.array([0, 1.2, np.pi, np.pi + 1.2]))[..., None]
+    first_angle = np.arctan2((base * y).sum(axis=1), (base * x).sum(axis=1))[:, None]
+    angles = (first_angle + np.array([0, 1.2, np.pi, np.pi + 1.2]))[..., None]
     return field_from_directions(surface, np.cos(angles) * x[:, None] + np.sin(angles) * y[:, None])
 
 
 @given(surfaces(), st.sampled_from([1, 2, 5]), st.sampled_from(["smooth", "flat"]))
 @settings(max_examples=60)
-def test_records_are_what_numpy_has_at_the_corners(surface, degree, display):
+def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, display):
     field = axis_field(surface, degree, AXIS)
     assume(np.abs(surface.vertices[:-1]).max() < 1e7)
-    shape = build_mesh_buffers(surface, np.eye(3), field, display)
+    buffers = build_mesh_buffers(surface, np.eye(3), field, display)
     count = len(surface.triangles)
-    assert shape.corners.shape == (3 * count, 4)
-    assert shape.triangle_records.shape[1:] == (ROW_TEXELS, 4)
-    assert shape.texels_per_record == 9 and shape.channel_count == 0
-    corners = shape.corners.reshape(count, 3, 4)
+    assert buffers.corners.shape == (3 * count, 4)
+    assert buffers.triangle_records.shape[1:] == (ROW_TEXELS, 4)
+    assert buffers.texels_per_record == 9 and buffers.channel_count == 0
+    corners = buffers.corners.reshape(count, 3, 4)
     np.testing.assert_array_equal(corners[..., 3], np.arange(count)[:, None] + np.zeros(3))
-    where = surface.vertices[surface.triangle_vertex]
-    size = np.ptp(where.reshape(-1, 3), axis=0).max()
-    np.testing.assert_allclose(corners[..., :3] + shape.center, where, atol=1e-6 * size, rtol=1e-12)
-    # The vertex that nobody uses has no say.
+    corner_points = surface.vertices[surface.triangle_vertex]
+    extent = np.ptp(corner_points.reshape(-1, 3), axis=0).max()
     np.testing.assert_allclose(
-        shape.bounds.max(axis=0), -shape.bounds.min(axis=0), atol=1e-9 * size
+        corners[..., :3] + buffers.center, corner_points, atol=1e-6 * extent, rtol=1e-12
     )
-    assert np.abs(shape.bounds).max() <= size
-    records = shape.triangle_records.reshape(-1, 4)[: 9 * count].reshape(count, 9, 4)
-    assert not shape.triangle_records.reshape(-1, 4)[9 * count :].any()
-    at_rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 8, :3]]
-    np.testing.assert_allclose(np.stack(at_rest, axis=2), where, rtol=1e-6)
+    # The unused vertex does not change the bounds.
+    np.testing.assert_allclose(
+        buffers.bounds.max(axis=0), -buffers.bounds.min(axis=0), atol=1e-9 * extent
+    )
+    assert np.abs(buffers.bounds).max() <= extent
+    records = buffers.triangle_records.reshape(-1, 4)[: 9 * count].reshape(count, 9, 4)
+    assert not buffers.triangle_records.reshape(-1, 4)[9 * count :].any()
+    rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 8, :3]]
+    np.testing.assert_allclose(np.stack(rest, axis=2), corner_points, rtol=1e-6)
     np.testing.assert_array_equal(records[:, :3, :3], corners[..., :3])
     np.testing.assert_allclose(np.linalg.norm(records[:, 3:6, :3], axis=2), 1, atol=1e-5)
     z = records[:, 6:8].reshape(count, 4, 2)[:, :3]
-    rho = np.linalg.norm(z, axis=2)
+    magnitude = np.linalg.norm(z, axis=2)
     if display == "flat":
-        wanted = field.magnitude[surface.triangle_face]
-        np.testing.assert_allclose(rho, wanted[:, None] + np.zeros(3), atol=1e-5)
+        expected = field.magnitude[surface.triangle_face]
+        np.testing.assert_allclose(magnitude, expected[:, None] + np.zeros(3), atol=1e-5)
     assert (records[:, 7, 2] == degree).all() and (records[:, 7, 3] == 0).all()
 
 
-def test_records_of_traits_are_in_their_layers():
+def test_channels_are_in_their_layers():
     surface = icosphere(1)
-    field = wavering(surface, 3, (1.0, 1.3, 0.8))
+    field = perturbed_field(surface, 3, (1.0, 1.3, 0.8))
     kind = field_kinds([field])[3]
     assert kind.channels == (("deviation", -1), ("deviation", 0), ("deviation", 1), ("family", 3))
-    shape = build_mesh_buffers(surface, np.eye(3), field, "smooth", kind.channels)
-    assert shape.texels_per_record == 9 + 2 * 4 and shape.channel_count == 4
+    buffers = build_mesh_buffers(surface, np.eye(3), field, "smooth", kind.channels)
+    assert buffers.texels_per_record == 9 + 2 * 4 and buffers.channel_count == 4
     count = len(surface.triangles)
-    records = shape.triangle_records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
+    records = buffers.triangle_records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
     np.testing.assert_array_equal(records[0, 7:16:2, 2], [3, 1, 0, -1, 1])
     np.testing.assert_array_equal(records[0, 7:16:2, 3], [0, 0, 1, 2, 3])
-    # Beside such a field a RoSy deviates from itself by the factor 1, and knows no families.
-    plain = build_mesh_buffers(surface, np.eye(3), axis_field(surface, 3), "smooth", kind.channels)
-    records = plain.triangle_records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
+    # A RoSy with the same channels has the constant harmonic 1, and no families.
+    rosy_buffers = build_mesh_buffers(
+        surface, np.eye(3), axis_field(surface, 3), "smooth", kind.channels
+    )
+    records = rosy_buffers.triangle_records.reshape(-1, 4)[: 17 * count].reshape(count, 17, 4)
     np.testing.assert_array_equal(records[:, 8], np.tile([0, 0, 0, 0], (count, 1)))
     np.testing.assert_array_equal(records[:, 10], np.tile([1, 0, 1, 0], (count, 1)))
     np.testing.assert_array_equal(records[:, 14], np.tile([0, 0, 0, 0], (count, 1)))
 
 
-def test_what_only_hides_has_no_records(error_of, monkeypatch):
+def test_occluders_have_no_records(error_of, monkeypatch):
     monkeypatch.setattr(mesh_buffers, "MAX_TRIANGLES", 79)
     surface = icosphere(1)
-    shape = build_mesh_buffers(surface, np.eye(3), None, "smooth")
-    assert shape.triangle_records is None and shape.texels_per_record == 0
-    said = error_of(build_mesh_buffers, surface, np.eye(3), axis_field(surface, 2), "smooth")
-    assert "sphere" in said and "80" in said
+    buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
+    assert buffers.triangle_records is None and buffers.texels_per_record == 0
+    message = error_of(build_mesh_buffers, surface, np.eye(3), axis_field(surface, 2), "smooth")
+    assert "sphere" in message and "80" in message
 
 
-def test_numbers_of_triangles_are_whole_in_single_precision():
-    most = np.float32(mesh_buffers.MAX_TRIANGLES)
-    assert int(most) == mesh_buffers.MAX_TRIANGLES
-    assert int(most - np.float32(1)) == mesh_buffers.MAX_TRIANGLES - 1
+def test_triangle_ids_are_exact_in_single_precision():
+    limit = np.float32(mesh_buffers.MAX_TRIANGLES)
+    assert int(limit) == mesh_buffers.MAX_TRIANGLES
+    assert int(limit - np.float32(1)) == mesh_buffers.MAX_TRIANGLES - 1
 
 
-def test_kinds_say_what_the_flow_of_numpy_says():
+def test_kinds_agree_with_the_pixel_field_of_numpy():
     surface = icosphere(2)
     camera = perspective_camera(look_at((0, -4, 1), (0, 0, 0)), 40, 40)
     for field in (
         *(axis_field(surface, degree) for degree in (1, 2, 3, 4, 5, 6)),
-        wavering(surface, 2),
-        wavering(surface, 3),
-        wavering(surface, 4),
-        wavering(surface, 5),
-        wavering(surface, 6),
+        perturbed_field(surface, 2),
+        perturbed_field(surface, 3),
+        perturbed_field(surface, 4),
+        perturbed_field(surface, 5),
+        perturbed_field(surface, 6),
         conjugate_field(surface),
-        tensors(surface),
+        sign_changing_tensors(surface),
     ):
         gbuffer = rooms().project([MeshInstance(surface, np.eye(4), field)], camera)
-        flow = surface_pixel_field(gbuffer, field.degree, 0.7, False)
+        pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7, False)
         (kind,) = field_kinds([field]).values()
         assert (kind.line_count, kind.sheets_per_turn) == (
-            flow.line_count,
-            flow.symmetry.sheets_per_turn,
+            pixel_field.line_count,
+            pixel_field.symmetry.sheets_per_turn,
         )
-        assert set(flow.channels) == set(field_channels(field)) <= set(kind.channels)
+        assert set(pixel_field.channels) == set(field_channels(field)) <= set(kind.channels)
         orders = kind.harmonic_orders
         assert orders == list(range(orders[0], orders[-1] + 1)) if orders else True
 
 
 def test_kinds_of_several_fields():
     surface = icosphere(1)
-    two, free, other = axis_field(surface, 2), wavering(surface, 3), axis_field(surface, 3)
+    two, free, other = axis_field(surface, 2), perturbed_field(surface, 3), axis_field(surface, 3)
     kinds = field_kinds([other, two, free])
     assert list(kinds) == [2, 3]
     assert kinds[2].channels == () and kinds[2].family_count == 1
     assert kinds[3].channels == field_kinds([free])[3].channels
 
 
-def tensors(surface):
-    """Symmetric ones, of one sign here and another there."""
+def sign_changing_tensors(surface):
+    """Return the field of symmetric tensors whose eigenvalues change sign."""
     x, y, z = surface.vertices[surface.corner_vertex[surface.face_start[:-1]]].T
-    one = np.zeros((surface.face_count, 3, 3))
-    one[:, 0, 0], one[:, 1, 1], one[:, 2, 2] = 1 + x, 0.3 - y, 2 * z
-    one[:, 0, 2] = one[:, 2, 0] = 0.5
-    return tensor_field(surface, one)
+    tensor = np.zeros((surface.face_count, 3, 3))
+    tensor[:, 0, 0], tensor[:, 1, 1], tensor[:, 2, 2] = 1 + x, 0.3 - y, 2 * z
+    tensor[:, 0, 2] = tensor[:, 2, 0] = 0.5
+    return tensor_field(surface, tensor)
 
 
-# --- constants and sources -----------------------------------------------------------------------
+# --- uniforms and sources ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
-def test_constants_lie_as_std140_wants(shader):
-    """Each at a multiple of its own size, one after the other, and whole rows of 16 bytes."""
+def test_uniforms_are_aligned_as_in_std140(shader):
+    """Each is at a multiple of its own size, without gaps, in whole rows of 16 bytes."""
     aligned = _std140_order(shader.uniforms)
     assert sorted(aligned) == sorted(shader.uniforms)
-    at, places = 0, {}
+    offset, slices = 0, {}
     for name, kind in aligned:
-        assert at % UNIFORM_WORDS[kind] == 0
-        places[name] = slice(at, at + UNIFORM_WORDS[kind])
-        at += UNIFORM_WORDS[kind]
+        assert offset % UNIFORM_WORDS[kind] == 0
+        slices[name] = slice(offset, offset + UNIFORM_WORDS[kind])
+        offset += UNIFORM_WORDS[kind]
     values = {
-        name: tuple(range(100 * number, 100 * number + UNIFORM_WORDS[kind]))
-        for number, (name, kind) in enumerate(shader.uniforms)
+        name: tuple(range(100 * index, 100 * index + UNIFORM_WORDS[kind]))
+        for index, (name, kind) in enumerate(shader.uniforms)
     }
     packed = _pack_uniforms(shader.uniforms, values)
-    assert len(packed) % 4 == 0 and 0 <= len(packed) - at < 4
+    assert len(packed) % 4 == 0 and 0 <= len(packed) - offset < 4
     for name, kind in shader.uniforms:
-        words = packed[places[name]]
+        words = packed[slices[name]]
         words = words.view(np.int32) if kind in ("int", "ivec2") else words
         np.testing.assert_array_equal(words, values[name])
 
 
-def code_of(source):
-    """GLSL without comments."""
+def without_comments(source):
+    """Return GLSL without comments."""
     return re.sub(r"//[^\n]*|/\*.*?\*/", "", source, flags=re.S)
 
 
-def words_of(source):
-    """Names, but for those after a dot: parts of others."""
-    return set(re.findall(r"(?<![.\w])[A-Za-z_]\w*", code_of(source)))
+def names_in(source):
+    """Return the names in a source, except those after a dot, which are members."""
+    return set(re.findall(r"(?<![.\w])[A-Za-z_]\w*", without_comments(source)))
 
 
 def own_source(shader):
-    """Without what is common to all."""
+    """Return the source of a pass without the file that is common to all."""
     return "".join(passes.read_source(name) for name in shader.files if name != "common.glsl")
 
 
-def plain(names):
+def base_names(names):
+    """Return names without the mark of arrays."""
     return {name.removesuffix("[]") for name in names}
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
-def test_sources_use_what_is_listed(shader):
-    words = words_of(own_source(shader))
-    listed = plain(shader.textures) | {name for name, _ in shader.uniforms}
+def test_sources_use_all_listed_names(shader):
+    words = names_in(own_source(shader))
+    listed = base_names(shader.textures) | {name for name, _ in shader.uniforms}
     if isinstance(shader, passes.ComputePass):
-        listed |= plain(name for name, _ in shader.images)
+        listed |= base_names(name for name, _ in shader.images)
     else:
         listed |= {shader.output, *(name for name, _ in shader.varyings)}
     assert listed <= words, f"not used: {sorted(listed - words)}"
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
-def test_sources_use_nothing_else_of_other_passes(shader):
-    """A constant, texture or image of some pass that this one uses has to be listed here."""
+def test_sources_use_no_other_names_of_passes(shader):
+    """A pass that uses a uniform, texture or image of another pass has to list it, too."""
     known = set()
     for other in passes.ALL_PASSES:
-        known |= plain(other.textures) | {name for name, _ in other.uniforms}
+        known |= base_names(other.textures) | {name for name, _ in other.uniforms}
         if isinstance(other, passes.ComputePass):
-            known |= plain(name for name, _ in other.images)
-    code = code_of(own_source(shader))
-    listed = plain(shader.textures) | {name for name, _ in shader.uniforms}
+            known |= base_names(name for name, _ in other.images)
+    code = without_comments(own_source(shader))
+    listed = base_names(shader.textures) | {name for name, _ in shader.uniforms}
     if isinstance(shader, passes.ComputePass):
-        listed |= plain(name for name, _ in shader.images)
+        listed |= base_names(name for name, _ in shader.images)
     else:
-        # "vertex_data" is what a vertex is given there.
+        # `vertex_data` is the attribute of the vertices.
         listed |= {shader.output, "vertex_data"}
-    # What is declared in the source is its own: parameters and variables may have any name.
+    # Parameters and variables that are declared in the source may have any name.
     kinds = r"(?:float|int|uint|bool|[iu]?vec[234])"
     declared = set(re.findall(rf"\b{kinds}\s+([A-Za-z_]\w*)", code))
     declared |= {
-        name for line in re.findall(rf"\b{kinds}\s+[^;()]*;", code) for name in words_of(line)
+        name for line in re.findall(rf"\b{kinds}\s+[^;()]*;", code) for name in names_in(line)
     }
-    used = (words_of(own_source(shader)) & known) - declared
+    used = (names_in(own_source(shader)) & known) - declared
     assert used <= listed, f"not listed: {sorted(used - listed)}"
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
 def test_arrays_are_read_and_written_as_arrays(shader):
-    code = code_of(own_source(shader))
+    code = without_comments(own_source(shader))
     names = list(shader.textures)
     if isinstance(shader, passes.ComputePass):
         names += [name for name, _ in shader.images]
     for name in names:
-        own = name.removesuffix("[]")
-        for call in re.findall(rf"(?:texelFetch|imageStore)\({own},\s*(\w+)\(", code):
+        base_name = name.removesuffix("[]")
+        for call in re.findall(rf"(?:texelFetch|imageStore)\({base_name},\s*(\w+)\(", code):
             if call in ("ivec2", "ivec3"):
                 assert (call == "ivec3") == name.endswith("[]"), (name, call)
 
 
-def test_common_code_is_told_nothing():
-    """It is part of every pass: it may use no pass's constants but by parameters."""
+def test_common_code_uses_no_uniforms():
+    """The common code is part of every pass: it gets uniforms only as parameters of functions."""
     known = {name for shader in passes.ALL_PASSES for name, _ in shader.uniforms}
-    known |= {name for shader in passes.ALL_PASSES for name in plain(shader.textures)}
-    assert not words_of(passes.read_source("common.glsl")) & known
+    known |= {name for shader in passes.ALL_PASSES for name in base_names(shader.textures)}
+    assert not names_in(passes.read_source("common.glsl")) & known
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
-def test_nothing_else_has_the_name_of_a_constant(shader):
-    """In Blender constants are macros, which know no scope: neither variables nor members may."""
-    source = code_of(own_source(shader))
+def test_no_variable_has_the_name_of_a_uniform(shader):
+    """In Blender uniforms are macros without scope: no variable or member may have their names."""
+    source = without_comments(own_source(shader))
     kinds = "float|int|bool|vec[234]|ivec[234]|mat[34]"
     declared = set(re.findall(rf"\b(?:{kinds})\s+(\w+)", source))
     declared |= set(re.findall(rf"\b(?:{kinds})\s[^;(]*?,\s*(\w+)\s*[=;,]", source))
@@ -369,15 +377,15 @@ def test_nothing_else_has_the_name_of_a_constant(shader):
     assert not declared & {name for name, _ in shader.uniforms}
 
 
-# --- windows -------------------------------------------------------------------------------------
+# --- screen boxes --------------------------------------------------------------------------------
 
 
-def entry_of(surface, matrix=None):
+def draw_item(surface, matrix=None):
     matrix = np.eye(4) if matrix is None else matrix
-    shape = build_mesh_buffers(surface, np.eye(3), None, "smooth")
-    on_card = resources.GpuMesh(shape, None, None, ())
+    buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
+    mesh = resources.GpuMesh(buffers, None, None, ())
     return resources.DrawItem(
-        on_card, None, matrix @ mesh_buffers.translation_matrix(shape.center), 1.0, None
+        mesh, None, matrix @ mesh_buffers.translation_matrix(buffers.center), 1.0, None
     )
 
 
@@ -389,13 +397,13 @@ def camera_at(eye=(0, -5, 0), size=(64, 48), perspective=True, clip=(0.1, 100.0)
 
 
 @pytest.mark.parametrize("perspective", [True, False])
-def test_windows_hold_the_pixels_of_a_body(perspective):
+def test_screen_boxes_contain_all_pixels_of_a_mesh(perspective):
     surface = icosphere(3)
     camera = camera_at(perspective=perspective)
     field = axis_field(surface, 2)
     for shift in ((0, 0, 0), (1.5, 0, -0.5), (0, -4.5, 0.2), (0.3, -5, 0)):
         matrix = placed(shift=shift)
-        left, bottom, right, top = screen_box(entry_of(surface, matrix), camera)
+        left, bottom, right, top = screen_box(draw_item(surface, matrix), camera)
         row, column = np.divmod(
             rooms().project([MeshInstance(surface, matrix, field)], camera).pixel, camera.width
         )
@@ -405,21 +413,21 @@ def test_windows_hold_the_pixels_of_a_body(perspective):
 
 @pytest.mark.parametrize("perspective", [True, False])
 @pytest.mark.parametrize("shift", [(40, 0, 0), (-40, 0, 0), (0, 0, 40), (0, -40, 0)])
-def test_windows_of_what_is_not_seen_are_empty(perspective, shift):
+def test_screen_boxes_out_of_view_are_empty(perspective, shift):
     """Beside the frame, above it, and behind the camera."""
     box = screen_box(
-        entry_of(icosphere(1), placed(shift=shift)), camera_at(perspective=perspective)
+        draw_item(icosphere(1), placed(shift=shift)), camera_at(perspective=perspective)
     )
     assert is_empty(box)
 
 
-def test_the_window_around_some():
+def test_union_of_boxes():
     assert union_box([(1, 2, 5, 6), (0, 0, 0, 0), (9, 3, 9, 8), (3, 1, 8, 4)]) == (1, 1, 8, 6)
     assert is_empty(union_box([]))
     assert is_empty(union_box([(0, 0, 0, 0)]))
 
 
-# --- parity --------------------------------------------------------------------------------------
+# --- pictures, compared with numpy's -------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -446,20 +454,20 @@ BALL = icosphere(3)
 
 
 def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1):
-    """A camera that looks at the origin, its lens shifted."""
+    """Return a camera that looks at the origin, with a shifted lens."""
     eye = distance * np.array([np.sin(azimuth), -np.cos(azimuth), 0.5])
     size = [side * supersampling for side in size]
-    at = look_at(eye, (0, 0, 0), (0, 0, 1))
+    view_matrix = look_at(eye, (0, 0, 0), (0, 0, 1))
     if perspective:
-        return perspective_camera(at, *size, fov=0.65, shift=(0.06, -0.04))
-    return orthographic_camera(at, *size, scale=2.6, shift=(0.06, -0.04))
+        return perspective_camera(view_matrix, *size, fov=0.65, shift=(0.06, -0.04))
+    return orthographic_camera(view_matrix, *size, scale=2.6, shift=(0.06, -0.04))
 
 
-def alike(
-    card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, rendered=None
+def assert_parity(
+    card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, reference=None
 ):
-    """Compare with numpy; the pictures."""
-    pair = draw_pair(ROSY, card, instances, camera, look, lights, rendered)
+    """Compare the picture of the card with numpy's, and return both."""
+    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500
@@ -474,8 +482,8 @@ def alike(
     return pair
 
 
-def texture_of(card, items, camera, look, lights=(), clip_planes=None):
-    """The picture, on the card."""
+def render_texture(card, items, camera, look, lights=(), clip_planes=None):
+    """Render a picture, and return its texture on the card."""
     view_input = ViewInput((), camera, look, tuple(lights), None, clip_planes)
     return run_to_completion(card.render_texture_task(items, view_input))
 
@@ -492,25 +500,25 @@ def ball(degree=4, matrix=None, surface=BALL):
 @pytest.mark.parametrize("perspective", [True, False])
 @pytest.mark.parametrize("degree", [1, 3, 4, 12, *long(2, 5, 6, 7)])
 def test_all_degrees(card, degree, perspective):
-    alike(card, [ball(degree)], view(perspective=perspective))
+    assert_parity(card, [ball(degree)], view(perspective=perspective))
 
 
 LOOKS = {
-    "as it comes": {},
-    "colour noise": {"noise": "colour"},
-    "colour noise, three directions": {"noise": "colour", "degree": 3},
-    "magnitude in colour": {"magnitude": "colour"},
-    "magnitude in colour, its range": {"magnitude": "colour", "magnitude_range": 0.8},
-    "magnitude in grey": {"magnitude": "colour", "colour_map": "grey"},
-    "magnitude in length": {"magnitude": "length"},
-    "magnitude in length, its range": {"magnitude": "length", "magnitude_range": 1.5},
-    "magnitude in both": {"magnitude": "both", "colour_map": "magma"},
-    "magnitude in both, its range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
-    "families that are not told apart": {"hue": "families"},
+    "default": {},
+    "color noise": {"noise": "colour"},
+    "color noise, three directions": {"noise": "colour", "degree": 3},
+    "magnitude as color": {"magnitude": "colour"},
+    "magnitude as color, with a range": {"magnitude": "colour", "magnitude_range": 0.8},
+    "magnitude as gray": {"magnitude": "colour", "colour_map": "grey"},
+    "magnitude as length": {"magnitude": "length"},
+    "magnitude as length, with a range": {"magnitude": "length", "magnitude_range": 1.5},
+    "magnitude as both": {"magnitude": "both", "colour_map": "magma"},
+    "magnitude as both, with a range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
+    "families, of a field without families": {"hue": "families"},
     "foreshortened": {"foreshorten": True},
     "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
-    "supersampled colours": {"supersampling": 2, "noise": "colour", "degree": 3},
+    "supersampled color noise": {"supersampling": 2, "noise": "colour", "degree": 3},
     "guided": {"guiding_angle": 0.7},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},
@@ -521,11 +529,11 @@ LOOKS = {
     "coarse noise": {"grain": 5.0, "seed": 7},
     "long": {"length": 200},
     "on the surface": {"anchor": "surface"},
-    "on the surface, colours": {"anchor": "surface", "noise": "colour", "high_pass": 0.0},
+    "on the surface, color noise": {"anchor": "surface", "noise": "colour", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
     "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
     "hatched, three directions": {"ink": "hatch", "shading": 0.8, "degree": 3, "layers": 2},
-    "hatched in colour, guided": {
+    "hatched in color, guided": {
         "ink": "hatch",
         "ink_colour": "#203080",
         "paper_colour": "#f0e8d0",
@@ -539,16 +547,22 @@ LOOKS = {
         "paper_colour": "#101020",
         "shading": 0.9,
     },
-    "hatched, broken": {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
-    "hatched, broken and as long as the magnitude": {
+    "hatched, with breaks": {
+        "ink": "hatch",
+        "breaks": 1.0,
+        "shading": 1.0,
+        "grain": 2.5,
+        "length": 60,
+    },
+    "hatched, breaks and length by magnitude": {
         "ink": "hatch",
         "breaks": 0.8,
         "shading": 0.9,
         "magnitude": "both",
         "degree": 3,
     },
-    "hatched, by a hand that wavers": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5},
-    "hatched, by a hand that wavers with the surface": {
+    "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5},
+    "hatched, wobbling with the surface": {
         "ink": "hatch",
         "wobble": 1.0,
         "anchor": "surface",
@@ -557,8 +571,8 @@ LOOKS = {
         "supersampling": 2,
         "degree": 3,
     },
-    "hatched on paper with a tooth": {"ink": "hatch", "paper_grain": 1.0, "shading": 1.0},
-    "hatched on paper with a tooth, supersampled": {
+    "hatched on paper grain": {"ink": "hatch", "paper_grain": 1.0, "shading": 1.0},
+    "hatched on paper grain, supersampled": {
         "ink": "hatch",
         "paper_grain": 0.6,
         "supersampling": 2,
@@ -567,14 +581,14 @@ LOOKS = {
         "seed": 5,
         "shading": 0.9,
     },
-    "hatched, an ink each": {
+    "hatched, an ink per family": {
         "ink": "hatch",
         "hue": "families",
         "degree": 6,
         "layering": 0.1,
         "shading": 1.0,
     },
-    "hatched, an ink each, light on dark": {
+    "hatched, an ink per family, light on dark": {
         "ink": "hatch",
         "hue": "families",
         "ink_colour": "#ffd060",
@@ -584,14 +598,14 @@ LOOKS = {
         "ink_ramp": True,
         "ink_colour_light": "#fff0f0",
     },
-    "hatched, from one ink to another": {
+    "hatched, ink ramp": {
         "ink": "hatch",
         "ink_ramp": True,
         "ink_colour": "#101848",
         "ink_colour_light": "#e08050",
         "shading": 1.0,
     },
-    "hatched, through a third ink": {
+    "hatched, ink ramp with a middle ink": {
         "ink": "hatch",
         "hue": "families",
         "ink_ramp": True,
@@ -599,8 +613,12 @@ LOOKS = {
         "shading": 1.0,
     },
     "in Blender units": {"anchor": "surface", "unit": "world", "unit_size": 0.007},
-    "in Blender units, of the picture": {"unit": "world", "unit_size": 0.03, "supersampling": 2},
-    "hatched in Blender units, by hand": {
+    "in Blender units, anchored to the picture": {
+        "unit": "world",
+        "unit_size": 0.03,
+        "supersampling": 2,
+    },
+    "hatched in Blender units, uneven": {
         "anchor": "surface",
         "unit": "world",
         "unit_size": 0.012,
@@ -621,7 +639,7 @@ LOOKS = {
         "ink_colour": "#ffe0b0",
         "paper_colour": "#102030",
     },
-    "hatched, running on": {
+    "hatched, overshoot": {
         "ink": "hatch",
         "light": "lamp",
         "shadows": True,
@@ -629,7 +647,7 @@ LOOKS = {
         "overshoot": 9.0,
         "length": 7,
     },
-    "hatched light, running on by magnitude": {
+    "hatched light on dark, overshoot by magnitude": {
         "ink": "hatch",
         "ink_colour": "#ffd060",
         "paper_colour": "#101020",
@@ -637,7 +655,7 @@ LOOKS = {
         "overshoot": 20.0,
         "magnitude": "length",
     },
-    "hatched, all at once": {
+    "hatched, all effects": {
         "ink": "hatch",
         "hue": "families",
         "shading": 0.9,
@@ -657,52 +675,53 @@ LOOKS = {
 
 @pytest.mark.parametrize("name", mainly(list(LOOKS)[1::2], LOOKS))
 def test_looks(card, name):
-    chosen = {"degree": 4, **LOOKS[name]}
-    degree = chosen.pop("degree")
-    look = LOOK.with_settings(chosen)
-    alike(card, [ball(degree)], view(supersampling=look.supersampling), look)
+    look_settings = {"degree": 4, **LOOKS[name]}
+    degree = look_settings.pop("degree")
+    look = LOOK.with_settings(look_settings)
+    assert_parity(card, [ball(degree)], view(supersampling=look.supersampling), look)
 
 
 @pytest.mark.parametrize("side", [2, 3])
 def test_subpixels(card, side):
-    """Borders have the colour of what is covered there; streaks the contrast of those drawn once."""
+    """Borders have the color of their covered part; streaks the contrast without supersampling."""
     look = replace(LOOK, supersampling=side, grain=3.0)
-    pair = alike(card, [ball(2)], view(supersampling=side), look)
+    pair = assert_parity(card, [ball(2)], view(supersampling=side), look)
     border = (pair.numpy[..., 3] > 0) & (pair.numpy[..., 3] < 1) & (pair.card[..., 3] > 0)
     assert border.sum() > 100
     np.testing.assert_allclose(
         pair.card[border][:, :3].mean(), pair.numpy[border][:, :3].mean(), atol=0.01
     )
-    constants = uniforms.look_uniforms(field_kinds([ball(2).field])[2], look)
-    wanted = look.gain * supersampling_gain(supersampled_look(look))
-    assert constants["gain"] == pytest.approx(wanted)
+    look_uniforms = uniforms.look_uniforms(field_kinds([ball(2).field])[2], look)
+    expected = look.gain * supersampling_gain(supersampled_look(look))
+    assert look_uniforms["gain"] == pytest.approx(expected)
 
 
 def test_triangles_smaller_than_pixels(card):
-    """OpenGL rounds corners: it may see a triangle that the pixel's centre is just beside."""
+    """OpenGL rounds corners: it may see a triangle just beside the center of a pixel."""
     fine = icosphere(6)
     instance = MeshInstance(fine, np.eye(4), axis_field(fine, 4, AXIS))
-    alike(card, [instance], view(), agreement=0.9995)
+    assert_parity(card, [instance], view(), agreement=0.9995)
 
 
-def test_streamlines_end_where_another_body_begins(card):
-    """Even if it lies beside this one in one plane, and runs the same way."""
+def test_streamlines_end_where_another_mesh_begins(card):
+    """Even if the other mesh continues in the same plane, with the same field."""
     surface = plane(2, 2)
     field = RosyField(2, np.tile([1.0, 0.2, 0.0], (surface.face_count, 1)))
     instances = [
-        MeshInstance(surface, placed(0.5 * np.eye(3), (0.5 * way, 0, 0)), field) for way in (-1, 1)
+        MeshInstance(surface, placed(0.5 * np.eye(3), (0.5 * side, 0, 0)), field)
+        for side in (-1, 1)
     ]
     camera = perspective_camera(look_at((0.2, -1.0, 3.0), (0, 0, 0)), *SIZE, fov=0.6)
-    alike(card, instances, camera, likeness=0.99)
+    assert_parity(card, instances, camera, likeness=0.99)
 
 
 @pytest.mark.parametrize("perspective", [True, False])
-def test_a_surface_of_one_side(card, perspective):
-    """Front and back go over into each other where the picture shows no border."""
+def test_a_one_sided_surface(card, perspective):
+    """On a Möbius strip, front and back meet where the picture shows no border."""
     points, triangles = moebius(96)
     surface = from_triangles(points, triangles)
     instance = MeshInstance(surface, placed(rotation(0.9, 0.2, 0)), axis_field(surface, 4, AXIS))
-    alike(card, [instance], view(perspective=perspective))
+    assert_parity(card, [instance], view(perspective=perspective))
 
 
 SUN = Light("sun", np.array([0.6, 0.0, 0.8]), np.array([1.0, 0.6, 0.3]), 0.9)
@@ -713,45 +732,45 @@ POINT = Light("point", np.array([-1.0, 0.5, -2.0]), np.array([0.2, 0.5, 1.0]), 3
 @pytest.mark.parametrize("perspective", [True, False])
 def test_lights_of_the_scene(card, lights, perspective):
     look = replace(LOOK, shading=0.8, light="scene")
-    alike(card, [ball()], view(perspective=perspective), look, lights)
+    assert_parity(card, [ball()], view(perspective=perspective), look, lights)
 
 
-def test_lights_do_not_count_for_a_headlight(card):
+def test_a_headlight_ignores_lights(card):
     look, camera = replace(LOOK, shading=0.8), view()
-    drawn = card.upload([ball()], "smooth")
+    items = card.upload([ball()], "smooth")
     dark, lit = (
-        card.read(texture_of(card, drawn, camera, look, lights), *SIZE).copy()
+        card.read(render_texture(card, items, camera, look, lights), *SIZE).copy()
         for lights in ((), [SUN])
     )
     np.testing.assert_array_equal(dark, lit)
 
 
-# --- tones -----------------------------------------------------------------------------------------
+# --- tones ---------------------------------------------------------------------------------------
 
 TONED = {
-    "as it is": {},
+    "unchanged": {},
     "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
-    "bent": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
-    "turned over": {"tone_black": 1.0, "tone_white": 0.0},
+    "tone curve": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
+    "inverted": {"tone_black": 1.0, "tone_white": 0.0},
     "hatched": {"ink": "hatch", "grain": 3.0},
 }
 
 
 def toned(tone, surface=BALL, matrix=None):
-    """A ball with a tone of its own."""
+    """Return a ball with a surface tone."""
     return MeshInstance(
         surface, np.eye(4) if matrix is None else matrix, field_of(surface, 4), tone
     )
 
 
 def waves(surface=BALL):
-    """Numbers at corners."""
+    """Return a tone of waves, as numbers at corners."""
     values = 0.5 + 0.4 * np.sin(3 * surface.vertices[surface.corner_vertex] @ (1.0, 0.3, 0.5))
     return SurfaceTone(values[:, None].astype(np.float32))
 
 
-def chequered(side=200, repeat=2.0):
-    """An image on a map of the ball that is not continuous everywhere; some of it is very fine."""
+def checkerboard(side=200, repeat=2.0):
+    """Return a checkerboard image and a UV map of the ball, on which some texels are very small."""
     x, y, z = BALL.vertices[BALL.corner_vertex].T
     uv = np.stack([0.5 + 0.5 * x + 0.1 * z, 0.5 + 0.5 * z - 0.1 * y], axis=1) * repeat
     row, column = np.indices((side, side + 30))
@@ -763,38 +782,42 @@ def chequered(side=200, repeat=2.0):
 @pytest.mark.parametrize("perspective", [True, False])
 def test_tones_of_attributes(card, name, perspective):
     look = replace(LOOK, tone="attribute", **TONED[name])
-    alike(card, [toned(waves())], view(perspective=perspective), look)
+    assert_parity(card, [toned(waves())], view(perspective=perspective), look)
 
 
 @pytest.mark.parametrize("name", TONED)
 @pytest.mark.parametrize("repeat", [0.5, 3.0])
 def test_tones_of_images(card, name, repeat):
     look = replace(LOOK, tone="image", **TONED[name])
-    alike(card, [toned(chequered(repeat=repeat))], view(), look)
+    assert_parity(card, [toned(checkerboard(repeat=repeat))], view(), look)
 
 
 @pytest.mark.parametrize("name", TONED)
-@pytest.mark.parametrize("finer", [1, 3])
-def test_tones_of_pictures(card, name, finer):
+@pytest.mark.parametrize("resolution", [1, 3])
+def test_tones_of_pictures(card, name, resolution):
     look = replace(LOOK, tone="picture", **TONED[name])
-    taken = view(azimuth=0.5)
-    shown = np.random.default_rng(1).random((18 * finer, 20 * finer)).astype(np.float32)
-    alike(card, [ball()], view(), look, rendered=ReferenceRender(shown, taken))
+    reference_camera = view(azimuth=0.5)
+    luminance = (
+        np.random.default_rng(1).random((18 * resolution, 20 * resolution)).astype(np.float32)
+    )
+    assert_parity(
+        card, [ball()], view(), look, reference=ReferenceRender(luminance, reference_camera)
+    )
 
 
-def test_bodies_without_a_tone_have_the_light(card):
+def test_meshes_without_a_tone_use_the_light(card):
     instances = [toned(waves(), matrix=placed(0.5 * np.eye(3), (-0.6, 0, 0)))]
     instances.append(ball(4, placed(0.5 * np.eye(3), (0.6, 0, 0))))
     look = replace(LOOK, tone="attribute", tone_gamma=1.5, shading=0.8)
-    alike(card, instances, view(), look)
+    assert_parity(card, instances, view(), look)
 
 
-def test_tones_beside_traits(card):
-    """Of free directions: records have more in them."""
+def test_tones_with_free_directions(card):
+    """The records then contain channels as well."""
     surface = icosphere(3)
-    thing = MeshInstance(surface, np.eye(4), conjugate_field(surface), waves(surface))
+    instance = MeshInstance(surface, np.eye(4), conjugate_field(surface), waves(surface))
     look = replace(LOOK, tone="attribute", anchor="surface")
-    alike(card, [thing], view(), look)
+    assert_parity(card, [instance], view(), look)
 
 
 @pytest.mark.parametrize(
@@ -803,7 +826,7 @@ def test_tones_beside_traits(card):
 )
 @pytest.mark.parametrize("ink", ["soft", "hatch"])
 def test_shadows(card, lights, ink):
-    """On the ground, on each other, and of what has no field; from one view of a light and from six."""
+    """On the ground, on each other, and of an occluder; with one shadow map of a light or six."""
     ground = plane(4, 4)
     instances = [
         MeshInstance(ground, placed(2 * np.eye(3), (0, 0, -0.6)), field_of(ground, 4)),
@@ -811,7 +834,7 @@ def test_shadows(card, lights, ink):
         MeshInstance(BALL, placed(0.3 * np.eye(3), (0.6, -0.3, 0.1)), None),
     ]
     look = replace(LOOK, light="scene", shading=0.9, shadows=True, ink=ink)
-    shaded = alike(card, instances, view(), look, lights, agreement=0.995)
+    shaded = assert_parity(card, instances, view(), look, lights, agreement=0.995)
     bare = draw_pair(ROSY, card, instances, view(), replace(look, shadows=False), lights)
     assert shaded.card[..., :3].mean() < 0.98 * bare.card[..., :3].mean()
 
@@ -823,45 +846,50 @@ def test_shadows(card, lights, ink):
 def test_creases_of_a_cube(card, crossing, degree, display):
     """Axis-aligned walls, whose normals have zeros of either sign.
 
-    Few directions are not asked to cross: those of one wall lie between those of the next.
+    Low degrees are not tested across creases: the directions on one wall lie between those on the
+    next.
     """
-    soft = cube()
-    surface = build_surface(soft.vertices, soft.corner_vertex, soft.face_start, sharp_angle=1.0)
+    smooth_cube = cube()
+    surface = build_surface(
+        smooth_cube.vertices, smooth_cube.corner_vertex, smooth_cube.face_start, sharp_angle=1.0
+    )
     field = axis_field(surface, degree, (0.9, 0.4, 0.1))
     instance = MeshInstance(surface, placed(2 * np.eye(3), (-1, -1, -1)), field)
     look = replace(LOOK, cross_creases=crossing, display=display)
     for perspective in (True, False):
-        alike(card, [instance], view(perspective=perspective, distance=8.0), look)
+        assert_parity(card, [instance], view(perspective=perspective, distance=8.0), look)
         outlined = replace(look, ink="hatch", outline=3.0)
-        alike(card, [instance], view(perspective=perspective, distance=8.0), outlined)
+        assert_parity(card, [instance], view(perspective=perspective, distance=8.0), outlined)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4])
-def test_walls_whose_normals_have_zeros_of_either_sign(card, degree):
-    """The frame of a normal depends on the sign of its z, that of 0 as well."""
+def test_normals_with_zeros_of_either_sign(card, degree):
+    """The frame of a normal depends on the sign of its z, also if z is 0."""
     for turn in range(4):
         surface = cylinder(24, 8)
         matrix = placed(rotation(0, 0, turn * np.pi / 2))
         field = axis_field(surface, degree, (0.4, 0.5, 0.6))
-        alike(card, [MeshInstance(surface, matrix, field)], view(distance=6.0, perspective=False))
+        assert_parity(
+            card, [MeshInstance(surface, matrix, field)], view(distance=6.0, perspective=False)
+        )
         walls = from_triangles(
             np.array([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)]) * (1.0, -0.0, 1.0),
             [(0, 1, 2), (0, 2, 3)] if turn % 2 else [(0, 2, 1), (0, 3, 2)],
         )
         field = axis_field(walls, degree, (0.4, 0.5, 0.6))
-        alike(
+        assert_parity(
             card, [MeshInstance(walls, np.eye(4), field)], view(distance=6.0, perspective=turn < 2)
         )
 
 
 FREE = {
-    "two": lambda surface: wavering(surface, 2),
-    "three": lambda surface: wavering(surface, 3, (1.0, 1.5, 0.7)),
-    "four": lambda surface: wavering(surface, 4),
-    "five": lambda surface: wavering(surface, 5, seed=3),
-    "six": lambda surface: wavering(surface, 6),
+    "two": lambda surface: perturbed_field(surface, 2),
+    "three": lambda surface: perturbed_field(surface, 3, (1.0, 1.5, 0.7)),
+    "four": lambda surface: perturbed_field(surface, 4),
+    "five": lambda surface: perturbed_field(surface, 5, seed=3),
+    "six": lambda surface: perturbed_field(surface, 6),
     "two lines": conjugate_field,
-    "tensors": tensors,
+    "tensors": sign_changing_tensors,
 }
 
 
@@ -873,8 +901,8 @@ def test_free_directions(card, name, hue):
     if hue == "families":
         assert field.family_count > 1
     look = replace(LOOK, hue=hue)
-    alike(card, [MeshInstance(BALL, np.eye(4), field)], view(), look)
-    alike(
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], view(), look)
+    assert_parity(
         card,
         [MeshInstance(BALL, np.eye(4), field)],
         view(azimuth=2.0),
@@ -886,161 +914,165 @@ def test_free_directions(card, name, hue):
 def test_families_of_rosys(card, degree):
     lines = degree if degree % 2 else degree // 2
     field = smooth_field(BALL, degree, lines)
-    # A pixel whose streamlines part beside a singularity differs in hue as well as in brightness.
-    # Of degree 5, which has the most singularities in view, the pictures correlate by 0.9785.
+    # Where streamlines diverge near a singularity, pixels differ in hue as well as in brightness.
+    # Degree 5 has the most singularities in view: its pictures correlate by 0.9785.
     likeness = 0.975 if degree == 5 else 0.98
-    for guide in (0.0, 0.9):
-        look = replace(LOOK, hue="families", guiding_angle=guide)
-        alike(card, [MeshInstance(BALL, np.eye(4), field)], view(), look, likeness=likeness)
+    for angle in (0.0, 0.9):
+        look = replace(LOOK, hue="families", guiding_angle=angle)
+        assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], view(), look, likeness=likeness)
 
 
 @pytest.mark.parametrize("name", ["three", "two lines", "tensors"])
-def test_free_directions_by_hand(card, name):
-    """Each family in its ink, lines that waver together, whatever the angles between them."""
+def test_free_directions_with_uneven_lines(card, name):
+    """Each family has its ink, and all lines wobble together, whatever the angles between them."""
     look = replace(
         LOOK, ink="hatch", shading=0.9, grain=2.5, hue="families", wobble=1.0, breaks=0.5
     )
-    alike(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
 
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_clear_paper(card, hue):
     look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
     pair = draw_pair(ROSY, card, [ball(4)], view(), look)
-    laid, wanted = (picture[..., 3] for picture in (pair.card, pair.numpy))
-    assert 0.2 < wanted[wanted > 0].mean() < 0.8
-    assert np.corrcoef(laid.ravel(), wanted.ravel())[0, 1] > 0.98
-    both = (laid > 0.2) & (wanted > 0.2)
+    card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
+    assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
+    assert np.corrcoef(card_alpha.ravel(), numpy_alpha.ravel())[0, 1] > 0.98
+    both = (card_alpha > 0.2) & (numpy_alpha > 0.2)
     np.testing.assert_allclose(
         np.median(pair.card[both], axis=0), np.median(pair.numpy[both], axis=0), atol=0.01
     )
 
 
-def test_families_beside_a_field_without(card):
-    """Of one degree: what knows no families has the hue of the first."""
-    told = smooth_field(BALL, 4, 2)
+def test_families_with_a_field_without_families(card):
+    """In one degree: a field without families has the hue of the first family."""
+    labeled = smooth_field(BALL, 4, 2)
     instances = [
-        MeshInstance(BALL, placed(0.6 * np.eye(3), (0.5, 0, 0.5)), told),
+        MeshInstance(BALL, placed(0.6 * np.eye(3), (0.5, 0, 0.5)), labeled),
         ball(4, placed(0.6 * np.eye(3), (-0.5, 0, -0.5))),
     ]
     for order in (instances, instances[::-1]):
-        alike(card, order, view(), replace(LOOK, hue="families"))
+        assert_parity(card, order, view(), replace(LOOK, hue="families"))
 
 
-def apart(number):
-    """Places side by side."""
-    return (0.75 * (number % 2) - 0.4, 0.2 * number, 0.9 * (number // 2) - 0.45)
+def grid_position(index):
+    """Return positions side by side."""
+    return (0.75 * (index % 2) - 0.4, 0.2 * index, 0.9 * (index // 2) - 0.45)
 
 
 @pytest.mark.parametrize("magnitude", ["none", "both"])
-def test_several_bodies_of_several_degrees(card, magnitude):
-    """One behind another, too, and instances."""
+def test_several_meshes_of_several_degrees(card, magnitude):
+    """Some are occluded, and some are instances of one mesh."""
     instances = [
-        ball(degree, placed((0.3 + 0.05 * number) * rotation(number, 0, 1), apart(number)))
-        for number, degree in enumerate((1, 4, 3, 4))
+        ball(degree, placed((0.3 + 0.05 * index) * rotation(index, 0, 1), grid_position(index)))
+        for index, degree in enumerate((1, 4, 3, 4))
     ]
     instances.append(ball(6, placed(0.9 * np.eye(3), (0, 2, 0))))
-    alike(card, instances, view(), replace(LOOK, magnitude=magnitude))
+    assert_parity(card, instances, view(), replace(LOOK, magnitude=magnitude))
 
 
-def test_free_directions_beside_rosys_of_one_degree(card):
+def test_free_directions_and_a_rosy_of_one_degree(card):
     instances = [
-        MeshInstance(BALL, placed(0.5 * np.eye(3), (0.4, 0, 0.4)), wavering(BALL, 4)),
+        MeshInstance(BALL, placed(0.5 * np.eye(3), (0.4, 0, 0.4)), perturbed_field(BALL, 4)),
         ball(4, placed(0.5 * np.eye(3), (-0.4, 0, -0.4))),
     ]
-    alike(card, instances, view())
+    assert_parity(card, instances, view())
 
 
 MIXED = {
     "families": lambda: (smooth_field(BALL, 4, 2), smooth_field(BALL, 3, 3)),
     "families and none": lambda: (smooth_field(BALL, 6, 3), smooth_field(BALL, 5)),
-    "free directions and a RoSy": lambda: (wavering(BALL, 3), smooth_field(BALL, 4)),
-    "free directions, both": lambda: (wavering(BALL, 3), conjugate_field(BALL)),
+    "free directions and a RoSy": lambda: (perturbed_field(BALL, 3), smooth_field(BALL, 4)),
+    "free directions, both": lambda: (perturbed_field(BALL, 3), conjugate_field(BALL)),
 }
 
 
 @pytest.mark.parametrize("hue", ["one", "families"])
 @pytest.mark.parametrize("name", MIXED)
-def test_fields_of_one_degree_have_no_say_in_those_of_another(card, name, hue):
+def test_fields_of_different_degrees_are_independent(card, name, hue):
     instances = [
         MeshInstance(BALL, placed(0.5 * np.eye(3), (shift, 0, shift)), field)
         for field, shift in zip(MIXED[name](), (0.4, -0.4), strict=True)
     ]
-    alike(card, instances, view(), replace(LOOK, hue=hue, length=15))
+    assert_parity(card, instances, view(), replace(LOOK, hue=hue, length=15))
 
 
-def test_what_has_no_field_hides(card):
-    hiding = MeshInstance(BALL, placed(0.4 * np.eye(3), (0.3, -0.9, 0.2)), None)
+def test_meshes_without_a_field_occlude(card):
+    occluder = MeshInstance(BALL, placed(0.4 * np.eye(3), (0.3, -0.9, 0.2)), None)
     ring = torus(48, 24)
-    through = MeshInstance(ring, placed(rotation(1, 0.3, 0)), None)
-    whole = alike(card, [ball()], view())
-    pair = alike(card, [hiding, ball(), through], view())
-    assert (pair.card[..., 3] > 0).sum() < 0.8 * (whole.card[..., 3] > 0).sum()
+    ring_instance = MeshInstance(ring, placed(rotation(1, 0.3, 0)), None)
+    unoccluded = assert_parity(card, [ball()], view())
+    pair = assert_parity(card, [occluder, ball(), ring_instance], view())
+    assert (pair.card[..., 3] > 0).sum() < 0.8 * (unoccluded.card[..., 3] > 0).sum()
 
 
 @pytest.mark.parametrize("look", [{}, {"hue": "families"}, {"magnitude": "both"}])
 @pytest.mark.parametrize("degree", [3, 4])
 def test_where_the_field_is_undefined(card, degree, look):
     field = smooth_field(BALL, degree)
-    centre = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
-    vectors = np.where((centre[:, :1] > 0.2) | (centre[:, 2:] > 0.6), 0.0, field.vectors)
+    center = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
+    vectors = np.where((center[:, :1] > 0.2) | (center[:, 2:] > 0.6), 0.0, field.vectors)
     field = RosyField(degree, vectors, family_count=2 if degree == 4 else 3)
-    alike(card, [MeshInstance(BALL, np.eye(4), field)], view(), replace(LOOK, **look))
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], view(), replace(LOOK, **look))
 
 
-def test_a_field_that_is_undefined_all_over(card):
+def test_a_field_that_is_undefined_everywhere(card):
     field = RosyField(4, np.zeros((BALL.face_count, 3)))
-    drawn = card.upload([MeshInstance(BALL, np.eye(4), field)], "smooth")
+    items = card.upload([MeshInstance(BALL, np.eye(4), field)], "smooth")
     for look in (LOOK, replace(LOOK, magnitude="both"), replace(LOOK, hue="families")):
-        found = card.read(texture_of(card, drawn, view(), look), *SIZE)
-        assert np.isfinite(found).all()
-        assert found[..., 3].any()
+        rgba = card.read(render_texture(card, items, view(), look), *SIZE)
+        assert np.isfinite(rgba).all()
+        assert rgba[..., 3].any()
 
 
-BENT = {
+LINEAR_PARTS = {
     "sheared": SHEAR,
     "mirrored": MIRROR,
     "stretched": np.diag([1.0, 0.5, 1.4]),
-    "turned": 1.1 * rotation(0.4, 2.0, -1.0),
+    "rotated": 1.1 * rotation(0.4, 2.0, -1.0),
     "small": 1e-3 * rotation(1.0, 0.2, 0.4),
     "large": 1e4 * rotation(1.0, 0.2, 0.4),
 }
 
 
-@pytest.mark.parametrize("name", BENT)
+@pytest.mark.parametrize("name", LINEAR_PARTS)
 @pytest.mark.parametrize("degree", [3, 4])
 def test_matrices(card, name, degree):
-    linear = BENT[name]
+    linear = LINEAR_PARTS[name]
     scale = np.cbrt(abs(np.linalg.det(linear)))
     eye = 4.5 * scale * np.array([0.4, -0.9, 0.5])
     camera = perspective_camera(
         look_at(eye, (0, 0, 0)), *SIZE, fov=0.75, clip=(0.1 * scale, 100 * scale)
     )
-    alike(card, [ball(degree, placed(linear))], camera)
+    assert_parity(card, [ball(degree, placed(linear))], camera)
 
 
 @pytest.mark.parametrize("degree", [1, 3, 4])
-@pytest.mark.parametrize("bent", [np.eye(3), MIRROR])
-def test_the_back_of_an_open_surface(card, degree, bent):
+@pytest.mark.parametrize("distortion", [np.eye(3), MIRROR])
+def test_the_back_of_an_open_surface(card, degree, distortion):
     surface = plane(8, 8)
     field = axis_field(surface, degree, (1.0, 0.4, 0.0))
     for height in (3.0, -3.0):
         camera = perspective_camera(look_at((0.4, -1.0, height), (0, 0, 0)), *SIZE, fov=0.7)
-        alike(card, [MeshInstance(surface, placed(bent), field)], camera)
+        assert_parity(card, [MeshInstance(surface, placed(distortion), field)], camera)
     tube = cylinder(64, 16)
     field = axis_field(tube, degree, (0.2, 0.4, 1.0))
     camera = perspective_camera(look_at((0.5, -2.0, 3.0), (0, 0, 0)), *SIZE, fov=0.8)
-    alike(card, [MeshInstance(tube, placed(bent), field)], camera)
+    assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
 def test_far_from_the_origin(card):
-    """A surface far from its own origin, brought back; and one far from the world's."""
+    """A mesh far from its own origin, moved back; and one far from the origin of the world."""
     far = np.array([3e5, -2e5, 1e5])
-    away = from_triangles(BALL.vertices + far, BALL.corner_vertex.reshape(-1, 3))
-    alike(card, [MeshInstance(away, placed(shift=-far), axis_field(away, 4, AXIS))], view())
+    far_surface = from_triangles(BALL.vertices + far, BALL.corner_vertex.reshape(-1, 3))
+    assert_parity(
+        card,
+        [MeshInstance(far_surface, placed(shift=-far), axis_field(far_surface, 4, AXIS))],
+        view(),
+    )
     eye = far + 4 * np.array([0.4, -0.9, 0.5])
     camera = perspective_camera(look_at(eye, far), *SIZE, fov=0.65)
-    alike(card, [ball(4, placed(shift=far))], camera)
+    assert_parity(card, [ball(4, placed(shift=far))], camera)
 
 
 def test_close_to_a_wide_plane(card):
@@ -1048,100 +1080,110 @@ def test_close_to_a_wide_plane(card):
     corners = 500.0 * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
     wide = from_triangles(corners, [(0, 1, 2), (0, 2, 3)])
     camera = perspective_camera(look_at((0, 0, 1), (0, 2, 0)), *SIZE, fov=0.9)
-    alike(card, [MeshInstance(wide, np.eye(4), axis_field(wide, 4, (1, 0.3, 0)))], camera)
+    assert_parity(card, [MeshInstance(wide, np.eye(4), axis_field(wide, 4, (1, 0.3, 0)))], camera)
 
 
 def test_triangles_without_area(card):
     points = np.concatenate([BALL.vertices, [(0, 0, 1.5), (0, 0, 1.6), (0, 0, 1.7)]])
     triangles = BALL.corner_vertex.reshape(-1, 3)
     count = len(BALL.vertices)
-    more = [(count, count + 1, count + 2), (count, count, count), (0, 0, 1)]
-    surface = from_triangles(points, np.concatenate([triangles, more]))
-    alike(card, [MeshInstance(surface, np.eye(4), axis_field(surface, 3, AXIS))], view())
+    degenerate = [(count, count + 1, count + 2), (count, count, count), (0, 0, 1)]
+    surface = from_triangles(points, np.concatenate([triangles, degenerate]))
+    assert_parity(card, [MeshInstance(surface, np.eye(4), axis_field(surface, 3, AXIS))], view())
 
 
-def test_what_is_out_of_view_does_not_hurt(card):
+def test_meshes_out_of_view_change_nothing(card):
     away = [ball(3, placed(shift=shift)) for shift in ((90, 0, 0), (0, -90, 40), (0, 90, 90))]
-    drawn = card.upload([*away, ball(4)], "smooth")
-    found = card.read(texture_of(card, drawn, view(), LOOK), *SIZE).copy()
-    alone = card.read(texture_of(card, card.upload([ball(4)], "smooth"), view(), LOOK), *SIZE)
-    np.testing.assert_array_equal(found, alone)
+    items = card.upload([*away, ball(4)], "smooth")
+    rgba = card.read(render_texture(card, items, view(), LOOK), *SIZE).copy()
+    alone = card.read(render_texture(card, card.upload([ball(4)], "smooth"), view(), LOOK), *SIZE)
+    np.testing.assert_array_equal(rgba, alone)
 
 
-@pytest.mark.parametrize("instances", ["out of view", "hiding", "none"])
-def test_where_there_is_nothing_to_draw_the_picture_is_empty(card, instances):
-    card.read(texture_of(card, card.upload([ball(4)], "smooth"), view(), LOOK), *SIZE)
-    chosen = {
+@pytest.mark.parametrize("instances", ["out of view", "occluder", "none"])
+def test_the_picture_is_empty_if_there_is_nothing_to_draw(card, instances):
+    card.read(render_texture(card, card.upload([ball(4)], "smooth"), view(), LOOK), *SIZE)
+    instance_lists = {
         "out of view": [ball(3, placed(shift=(90, 0, 0))), ball(4, placed(shift=(0, -90, -40)))],
-        "hiding": [MeshInstance(BALL, np.eye(4), None)],
+        "occluder": [MeshInstance(BALL, np.eye(4), None)],
         "none": [],
     }[instances]
-    found = card.read(texture_of(card, card.upload(chosen, "smooth"), view(), LOOK), *SIZE)
-    assert not found.any()
+    rgba = card.read(
+        render_texture(card, card.upload(instance_lists, "smooth"), view(), LOOK), *SIZE
+    )
+    assert not rgba.any()
 
 
-def test_nothing_is_left_of_the_picture_before(card):
-    """Of another place, degree and size of window; the walk in bands of any height."""
+def test_nothing_is_left_of_the_previous_picture(card):
+    """The previous one has another position, degree and size of the screen box."""
     camera, small = view(), ball(3, placed(0.37 * rotation(1, 1, 0), (0.31, 0, 0.23)))
     fresh = GpuRenderer(card.device)
-    expected = fresh.read(texture_of(fresh, fresh.upload([small], "smooth"), camera, LOOK), *SIZE)
-    texture_of(card, card.upload([ball(4)], "smooth"), camera, LOOK)
-    found = card.read(texture_of(card, card.upload([small], "smooth"), camera, LOOK), *SIZE)
-    np.testing.assert_array_equal(found, expected)
+    expected = fresh.read(
+        render_texture(fresh, fresh.upload([small], "smooth"), camera, LOOK), *SIZE
+    )
+    render_texture(card, card.upload([ball(4)], "smooth"), camera, LOOK)
+    rgba = card.read(render_texture(card, card.upload([small], "smooth"), camera, LOOK), *SIZE)
+    np.testing.assert_array_equal(rgba, expected)
 
 
-@pytest.mark.parametrize("most", [1, 200_000, 300_000, 450_000])
-def test_bands_leave_no_seam_and_nothing_from_before(card, monkeypatch, most):
+@pytest.mark.parametrize("max_steps", [1, 200_000, 300_000, 450_000])
+def test_bands_leave_no_seam(card, monkeypatch, max_steps):
     camera, small = view(), ball(3, placed(0.37 * rotation(1, 1, 0), (0.31, 0, 0.23)))
     fresh = GpuRenderer(card.device)
-    expected = fresh.read(texture_of(fresh, fresh.upload([small], "smooth"), camera, LOOK), *SIZE)
-    monkeypatch.setattr(lic_stage, "MAX_DISPATCH_STEPS", most)
-    texture_of(card, card.upload([ball(3)], "smooth"), camera, LOOK)
-    found = card.read(texture_of(card, card.upload([small], "smooth"), camera, LOOK), *SIZE)
-    np.testing.assert_array_equal(found, expected)
+    expected = fresh.read(
+        render_texture(fresh, fresh.upload([small], "smooth"), camera, LOOK), *SIZE
+    )
+    monkeypatch.setattr(lic_stage, "MAX_DISPATCH_STEPS", max_steps)
+    render_texture(card, card.upload([ball(3)], "smooth"), camera, LOOK)
+    rgba = card.read(render_texture(card, card.upload([small], "smooth"), camera, LOOK), *SIZE)
+    np.testing.assert_array_equal(rgba, expected)
 
 
-def test_planes_cut_away(card):
+def test_clip_planes(card):
     camera, planes = view(), uniforms.NO_CLIP_PLANES.copy()
     planes[3] = (1.0, 0.0, 0.0, 0.2)
-    drawn = card.upload([ball(4, placed(rotation(0, 0, 1)))], "smooth")
-    whole = card.read(texture_of(card, drawn, camera, LOOK), *SIZE).copy()
-    cut = card.read(texture_of(card, drawn, camera, LOOK, clip_planes=planes), *SIZE)
-    position = card.read_gbuffer(camera)
-    seen = position["field_values"][..., 3] > 0
-    assert 0.2 < seen.sum() / (whole[..., 3] > 0).sum() < 1.0
-    assert (cut[..., 3] > 0).sum() == seen.sum()
+    items = card.upload([ball(4, placed(rotation(0, 0, 1)))], "smooth")
+    unclipped = card.read(render_texture(card, items, camera, LOOK), *SIZE).copy()
+    clipped = card.read(render_texture(card, items, camera, LOOK, clip_planes=planes), *SIZE)
+    gbuffer = card.read_gbuffer(camera)
+    visible = gbuffer["field_values"][..., 3] > 0
+    assert 0.2 < visible.sum() / (unclipped[..., 3] > 0).sum() < 1.0
+    assert (clipped[..., 3] > 0).sum() == visible.sum()
 
 
 def test_the_same_input_gives_the_same_bytes(card):
-    found = [
-        card.read(texture_of(card, card.upload([ball(5)], "smooth"), view(), LOOK), *SIZE).tobytes()
+    pictures = [
+        card.read(
+            render_texture(card, card.upload([ball(5)], "smooth"), view(), LOOK), *SIZE
+        ).tobytes()
         for _ in range(2)
     ]
-    assert found[0] == found[1]
+    assert pictures[0] == pictures[1]
 
 
-def test_what_is_too_large_is_said(device, error_of, monkeypatch):
+def test_sizes_beyond_the_device_are_refused(device, error_of, monkeypatch):
     card = GpuRenderer(device)
     monkeypatch.setattr(device, "max_texture_size", 128)
-    drawn = card.upload([ball(4)], "smooth")
-    said = error_of(texture_of, card, drawn, view(), LOOK)
-    assert "160 x 144" in said and "128" in said
+    items = card.upload([ball(4)], "smooth")
+    message = error_of(render_texture, card, items, view(), LOOK)
+    assert "160 x 144" in message and "128" in message
     monkeypatch.setattr(device, "max_texture_size", 1)
     monkeypatch.setattr(mesh_buffers, "ROW_TEXELS", 64)
-    said = error_of(card.upload, [ball(4, surface=icosphere(4))], "smooth")
-    assert "sphere" in said and str(20 * 4**4) in said
+    message = error_of(card.upload, [ball(4, surface=icosphere(4))], "smooth")
+    assert "sphere" in message and str(20 * 4**4) in message
 
 
-def test_shapes_stay_on_the_card(device):
+def test_meshes_stay_on_the_card(device):
     card = GpuRenderer(device)
     instance = ball(4)
     (first,) = card.upload([instance], "smooth")
     moved = MeshInstance(instance.surface, placed(2 * rotation(1, 2, 3), (4, 5, 6)), instance.field)
     (second,) = card.upload([moved], "smooth")
     assert second.mesh is first.mesh
-    (bent,) = card.upload([MeshInstance(instance.surface, placed(SHEAR), instance.field)], "smooth")
-    assert bent.mesh is not first.mesh
+    (sheared,) = card.upload(
+        [MeshInstance(instance.surface, placed(SHEAR), instance.field)], "smooth"
+    )
+    assert sheared.mesh is not first.mesh
     for _ in range(resources.MESH_LIFETIME_UPLOADS + 1):
         card.upload([moved], "smooth")
     assert [mesh.buffers for mesh in card.resources.meshes] == [first.mesh.buffers]
@@ -1152,15 +1194,15 @@ def test_shapes_stay_on_the_card(device):
 def test_cameras_of_odd_sizes(card):
     for size in ((1, 1), (3, 200), (200, 3), (257, 129)):
         camera = view(size)
-        picture = texture_of(card, card.upload([ball(4)], "smooth"), camera, LOOK)
-        found = card.read(picture, *size)
+        picture = render_texture(card, card.upload([ball(4)], "smooth"), camera, LOOK)
+        rgba = card.read(picture, *size)
         expected = ROSY.compose(ROSY.project([ball(4)], camera), replace(LOOK, method="brute"))
-        assert found.shape == expected.rgba.shape
-        assert ((found[..., 3] > 0) != (expected.rgba[..., 3] > 0)).mean() < 0.01
+        assert rgba.shape == expected.rgba.shape
+        assert ((rgba[..., 3] > 0) != (expected.rgba[..., 3] > 0)).mean() < 0.01
 
 
-def test_a_projection_that_is_askew(card):
+def test_a_skewed_projection(card):
     camera = view()
     projection = camera.projection.copy()
     projection[0, 1], projection[1, 0] = 0.3, -0.2
-    alike(card, [ball(4)], Camera(camera.view, projection, *SIZE))
+    assert_parity(card, [ball(4)], Camera(camera.view, projection, *SIZE))

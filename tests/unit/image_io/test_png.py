@@ -1,4 +1,4 @@
-"""PNG files: written and read back, read from other programs, and what is wrong with one."""
+"""PNG files: writing, reading, and the errors of damaged files."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from rosy_addon.image_io.png import read_png, write_png
 
 
 def chunks_of(data: bytes) -> dict[bytes, bytes]:
-    """A reader of its own: checks signature and sums, and gives the chunks by name."""
+    """Return the chunks of a file by name, and check its signature and checksums."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    found, place = {}, 8
-    while place < len(data):
-        (size,) = struct.unpack(">I", data[place : place + 4])
-        name, instance = data[place + 4 : place + 8], data[place + 8 : place + 8 + size]
-        assert struct.unpack(">I", data[place + 8 + size : place + 12 + size])[0] == zlib.crc32(
-            name + instance
+    chunks, offset = {}, 8
+    while offset < len(data):
+        (size,) = struct.unpack(">I", data[offset : offset + 4])
+        name, body = data[offset + 4 : offset + 8], data[offset + 8 : offset + 8 + size]
+        assert struct.unpack(">I", data[offset + 8 + size : offset + 12 + size])[0] == zlib.crc32(
+            name + body
         )
-        found[name] = instance
-        place += 12 + size
-    first, *_, last = found
+        chunks[name] = body
+        offset += 12 + size
+    first, *_, last = chunks
     assert (first, last) == (b"IHDR", b"IEND")
-    return found
+    return chunks
 
 
-def test_png_holds_the_picture_as_srgb_from_the_top(tmp_path):
+def test_files_hold_srgb_values_from_the_top(tmp_path):
     generator = np.random.default_rng(0)
     rgba = generator.random((5, 7, 4), dtype=np.float32) * 1.2 - 0.1
     write_png(tmp_path / "a.png", rgba)
@@ -38,19 +38,19 @@ def test_png_holds_the_picture_as_srgb_from_the_top(tmp_path):
     assert chunks[b"sRGB"] == b"\0"
     rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(5, 1 + 7 * 4)
     assert not rows[:, 0].any()
-    found = rows[::-1, 1:].reshape(5, 7, 4).astype(float) / 255
-    assert np.abs(found[..., :3] - to_display(rgba[..., :3])).max() <= 0.5 / 255 + 1e-6
-    assert np.abs(found[..., 3] - np.clip(rgba[..., 3], 0, 1)).max() <= 0.5 / 255 + 1e-6
+    stored = rows[::-1, 1:].reshape(5, 7, 4).astype(float) / 255
+    assert np.abs(stored[..., :3] - to_display(rgba[..., :3])).max() <= 0.5 / 255 + 1e-6
+    assert np.abs(stored[..., 3] - np.clip(rgba[..., 3], 0, 1)).max() <= 0.5 / 255 + 1e-6
 
 
-def test_middle_grey_on_screen_is_128(tmp_path):
+def test_middle_gray_on_screen_is_128(tmp_path):
     linear = np.full((1, 1, 4), 0.21404114, dtype=np.float32)
     write_png(tmp_path / "a.png", linear)
     data = zlib.decompress(chunks_of((tmp_path / "a.png").read_bytes())[b"IDAT"])
     assert data[1:4] == bytes([128] * 3)
 
 
-def test_unwritable_picture(tmp_path, error_of):
+def test_unwritable_files(tmp_path, error_of):
     rgba = np.zeros((2, 2, 4), dtype=np.float32)
     assert "does not exist" in error_of(write_png, tmp_path / "no" / "a.png", rgba)
     assert "is a folder" in error_of(write_png, tmp_path, rgba)
@@ -59,32 +59,29 @@ def test_unwritable_picture(tmp_path, error_of):
 # --- reading --------------------------------------------------------------------------------------
 
 
-def chunk(name: bytes, instance: bytes) -> bytes:
-    return (
-        struct.pack(">I", len(instance))
-        + name
-        + instance
-        + struct.pack(">I", zlib.crc32(name + instance))
-    )
+def chunk(name: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
 
 
-def filtered(rows: np.ndarray, size: int, filters: list[int]) -> bytes:
-    """(H, bytes of a row) as the format's definition says, byte by byte."""
+def filtered(rows: np.ndarray, bytes_per_pixel: int, filters: list[int]) -> bytes:
+    """Return filtered rows, byte by byte as the specification defines the filters."""
     above, out = np.zeros(rows.shape[1], dtype=int), b""
     for kind, row in zip(filters, rows.astype(int), strict=True):
         line = []
-        for at, value in enumerate(row):
-            a = row[at - size] if at >= size else 0
-            b, c = above[at], above[at - size] if at >= size else 0
-            nearest = min((a, b, c), key=lambda near: abs(a + b - c - near))
+        for index, value in enumerate(row):
+            a = row[index - bytes_per_pixel] if index >= bytes_per_pixel else 0
+            b, c = above[index], above[index - bytes_per_pixel] if index >= bytes_per_pixel else 0
+            nearest = min((a, b, c), key=lambda neighbor: abs(a + b - c - neighbor))
             line.append((value - (0, a, b, (a + b) // 2, nearest)[kind]) % 256)
         out += bytes([kind, *line])
         above = row
     return out
 
 
-def write_filtered(path, values: np.ndarray, kind: int, *, filters=None, more=b"", interlaced=0):
-    """A .png file of (H, W, K) uint8 or uint16 values, from the top."""
+def write_filtered(
+    path, values: np.ndarray, kind: int, *, filters=None, extra_chunks=b"", interlaced=0
+):
+    """Write a .png file of (H, W, K) uint8 or uint16 values, rows from the top."""
     height, width, channels = values.shape
     depth = values.dtype.itemsize
     rows = values.astype(values.dtype.newbyteorder(">")).reshape(height, -1).view(np.uint8)
@@ -93,7 +90,10 @@ def write_filtered(path, values: np.ndarray, kind: int, *, filters=None, more=b"
     header = struct.pack(">IIBBBBB", width, height, 8 * depth, kind, 0, 0, interlaced)
     half = len(data) // 2
     parts = (
-        chunk(b"IHDR", header) + more + chunk(b"IDAT", data[:half]) + chunk(b"IDAT", data[half:])
+        chunk(b"IHDR", header)
+        + extra_chunks
+        + chunk(b"IDAT", data[:half])
+        + chunk(b"IDAT", data[half:])
     )
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + parts + chunk(b"IEND", b""))
     return path
@@ -102,38 +102,38 @@ def write_filtered(path, values: np.ndarray, kind: int, *, filters=None, more=b"
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize(("kind", "channels"), [(0, 1), (2, 3), (4, 2), (6, 4)])
 @pytest.mark.parametrize("shape", [(1, 1), (11, 7), (6, 17)])
-def test_png_of_all_kinds_are_read(tmp_path, kind, channels, dtype, shape):
-    """With every filter, on numbers that run over."""
+def test_files_of_all_kinds_are_read(tmp_path, kind, channels, dtype, shape):
+    """With every filter, on values whose sums overflow."""
     generator = np.random.default_rng(kind)
     values = generator.integers(0, np.iinfo(dtype).max, (*shape, channels), endpoint=True)
     values = values.astype(dtype)
-    found = read_png(write_filtered(tmp_path / "a.png", values, kind))
-    wanted = values[::-1] / np.iinfo(dtype).max
-    colours = wanted[..., :3] if channels > 2 else np.repeat(wanted[..., :1], 3, axis=2)
-    np.testing.assert_allclose(found[..., :3], to_linear(colours), atol=1e-6)
-    alpha = wanted[..., -1] if channels % 2 == 0 else 1
-    np.testing.assert_allclose(found[..., 3], np.broadcast_to(alpha, shape), atol=1e-6)
+    rgba = read_png(write_filtered(tmp_path / "a.png", values, kind))
+    expected = values[::-1] / np.iinfo(dtype).max
+    colors = expected[..., :3] if channels > 2 else np.repeat(expected[..., :1], 3, axis=2)
+    np.testing.assert_allclose(rgba[..., :3], to_linear(colors), atol=1e-6)
+    alpha = expected[..., -1] if channels % 2 == 0 else 1
+    np.testing.assert_allclose(rgba[..., 3], np.broadcast_to(alpha, shape), atol=1e-6)
 
 
-def test_png_with_a_palette(tmp_path):
-    colours = np.array([[255, 0, 0], [0, 128, 255], [9, 9, 9]], dtype=np.uint8)
-    more = chunk(b"PLTE", colours.tobytes()) + chunk(b"tRNS", bytes([255, 64]))
+def test_files_with_a_palette_are_read(tmp_path):
+    colors = np.array([[255, 0, 0], [0, 128, 255], [9, 9, 9]], dtype=np.uint8)
+    extra_chunks = chunk(b"PLTE", colors.tobytes()) + chunk(b"tRNS", bytes([255, 64]))
     values = np.array([[0, 1], [2, 1]], dtype=np.uint8)[..., None]
-    found = read_png(write_filtered(tmp_path / "a.png", values, 3, more=more))
-    np.testing.assert_allclose(
-        found[..., :3], to_linear(colours[[[2, 1], [0, 1]]] / 255), atol=1e-6
-    )
-    np.testing.assert_allclose(found[..., 3] * 255, [[255, 64], [255, 64]], atol=1e-4)
+    rgba = read_png(write_filtered(tmp_path / "a.png", values, 3, extra_chunks=extra_chunks))
+    np.testing.assert_allclose(rgba[..., :3], to_linear(colors[[[2, 1], [0, 1]]] / 255), atol=1e-6)
+    np.testing.assert_allclose(rgba[..., 3] * 255, [[255, 64], [255, 64]], atol=1e-4)
 
 
-def test_what_is_written_is_read(tmp_path):
+def test_written_files_are_read(tmp_path):
     rgba = np.random.default_rng(1).random((9, 13, 4), dtype=np.float32)
     write_png(tmp_path / "a.png", rgba)
-    found = read_png(tmp_path / "a.png")
-    assert np.abs(to_display(found[..., :3]) - to_display(rgba[..., :3])).max() <= 0.5 / 255 + 1e-6
+    read_back = read_png(tmp_path / "a.png")
+    assert (
+        np.abs(to_display(read_back[..., :3]) - to_display(rgba[..., :3])).max() <= 0.5 / 255 + 1e-6
+    )
 
 
-def test_what_is_wrong_with_a_picture_is_said(tmp_path, error_of):
+def test_errors_of_damaged_files(tmp_path, error_of):
     path = tmp_path / "a.png"
     values = np.zeros((4, 4, 3), dtype=np.uint8)
     assert "no such file" in error_of(read_png, path)
@@ -142,16 +142,16 @@ def test_what_is_wrong_with_a_picture_is_said(tmp_path, error_of):
     write_filtered(path, values, 2, interlaced=1)
     assert "interlaced" in error_of(read_png, path)
     whole = write_filtered(path, values, 2).read_bytes()
-    for wrong in (whole[:40], whole[:-30], whole.replace(b"IHDR", b"IHDX"), whole[:8]):
-        path.write_bytes(wrong)
+    for damaged in (whole[:40], whole[:-30], whole.replace(b"IHDR", b"IHDX"), whole[:8]):
+        path.write_bytes(damaged)
         assert "is damaged" in error_of(read_png, path)
-    # A filter that is not known.
+    # An unknown filter type.
     header = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
-    instance = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes([7, 0])))
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + instance)
+    chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes([7, 0])))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
     assert "is damaged" in error_of(read_png, path)
 
 
-def test_luminance_on_white():
+def test_luminance_over_white():
     rgba = np.array([[[1, 1, 1, 1], [0, 0, 0, 1], [0, 1, 0, 1], [0, 0, 0, 0.25]]], dtype=np.float32)
     np.testing.assert_allclose(luminance(rgba), [[1, 0, 0.7152, 0.75]], atol=1e-6)

@@ -1,4 +1,4 @@
-"""Presets as files: those that ship with RoSy, and what is wrong with one."""
+"""Shipped presets, and the errors of preset files."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.presets.store import SHIPPED_FOLDER, load_preset, preset_keys
 
 
-def test_presets_that_come_with_rosy_load():
+def test_shipped_presets_load():
     assert {"paper", "plaid", "pen-and-ink", "magnitude-map"} <= set(preset_keys())
     for name in preset_keys():
         preset = load_preset(name)
         assert preset.name and preset.description
-        wanted = json.loads((SHIPPED_FOLDER / f"{name}.json").read_text())["look"]
-        assert {key: getattr(preset.look, key) for key in wanted} == wanted
-        assert preset.look == Look(**wanted)
+        stored = json.loads((SHIPPED_FOLDER / f"{name}.json").read_text())["look"]
+        assert {key: getattr(preset.look, key) for key in stored} == stored
+        assert preset.look == Look(**stored)
 
 
 BAD = {
@@ -37,7 +37,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD)
-def test_what_is_wrong_with_a_preset_is_said(text, tmp_path, error_of):
+def test_errors_of_preset_files(text, tmp_path, error_of):
     path = tmp_path / "mine.json"
     path.write_text(text)
     message = error_of(load_preset, path)

@@ -1,4 +1,4 @@
-"""Presets of a user's own: kept, passed on, and read from strangers."""
+"""Presets of the user: saved, renamed, shared, and read from untrusted files."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ from rosy_addon.presets.store import (
 from rosy_addon.settings import Choice, Color, Switch
 
 
-def value_of(entry):
-    """Any value that a setting may have."""
+def values_of(entry):
+    """Return a strategy for all values that a setting may have."""
     setting = entry.metadata["setting"]
     if isinstance(setting, Color):
         return st.integers(0, 0xFFFFFF).map("#{:06x}".format) | st.just("#AbCdEf")
@@ -57,10 +57,10 @@ def value_of(entry):
 
 
 LOOKS = st.fixed_dictionaries(
-    {}, optional={entry.name: value_of(entry) for entry in fields(Look)}
+    {}, optional={entry.name: values_of(entry) for entry in fields(Look)}
 ).map(lambda values: Look(**values))
 LINES = st.text(st.characters().filter(str.isprintable))
-NAMES = LINES.filter(lambda name: any(sign.isalnum() for sign in name)).map(
+NAMES = LINES.filter(lambda name: any(character.isalnum() for character in name)).map(
     lambda name: name[:MAX_NAME_LENGTH] if key(name[:MAX_NAME_LENGTH]) else "a"
 )
 
@@ -73,13 +73,13 @@ def key(name):
 
 
 @pytest.fixture
-def own(tmp_path):
+def user_folder(tmp_path):
     return tmp_path / "own"
 
 
 @pytest.fixture
-def undrawn(monkeypatch):
-    """For tests of files alone: pictures of presets are small and black."""
+def blank_previews(monkeypatch):
+    """Replace previews by small black pictures, for tests of the files alone."""
     monkeypatch.setattr(store, "draw_preview", lambda look: np.zeros((4, 4, 4), dtype=np.float32))
 
 
@@ -118,7 +118,7 @@ def test_files_are_readable_by_people(tmp_path):
     ]
 
 
-def test_editors_that_begin_files_with_a_mark(tmp_path):
+def test_a_byte_order_mark_is_ignored(tmp_path):
     write_preset(tmp_path / "a.json", MINE)
     (tmp_path / "b.json").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "a.json").read_bytes())
     assert read_preset(tmp_path / "b.json") == MINE
@@ -129,7 +129,7 @@ def test_a_look_without_changes_has_no_settings():
     assert changed_settings(Look(gain=2.5, seed=3)) == {"seed": 3}
 
 
-#: Whether Python's reader of JSON gives up before the file ends; later ones may or may not.
+#: Whether Python's JSON reader refuses deep nesting. Later versions may reach the end of the file.
 SHALLOW = sys.version_info < (3, 14)
 
 HEAD = '{"name": "a", "description": "b", "look": {'
@@ -196,8 +196,11 @@ HOSTILE = {
     ),
     "name, escape": (b'{"name": "a\\u001b[31m", "description": "", "look": {}}', "'a\\x1b[31m'"),
     "name, backward": (b'{"name": "a\\u202eb", "description": "", "look": {}}', "'a\\u202eb'"),
-    "name, half a sign": (b'{"name": "a\\ud800", "description": "", "look": {}}', "'a\\ud800'"),
-    "sentence, long": (
+    "name, half a character": (
+        b'{"name": "a\\ud800", "description": "", "look": {}}',
+        "'a\\ud800'",
+    ),
+    "description, long": (
         b'{"name": "a", "description": "' + b"a" * 201 + b'", "look": {}}',
         "the description of the preset has 201 characters, more than 200",
     ),
@@ -209,12 +212,12 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("case", HOSTILE)
-def test_files_of_strangers(case, tmp_path, error_of):
-    data, wanted = HOSTILE[case]
+def test_hostile_files(case, tmp_path, error_of):
+    data, expected = HOSTILE[case]
     path = tmp_path / "a.json"
     path.write_bytes(data)
     message = error_of(read_preset, path)
-    assert message.startswith(str(path)) and wanted in message
+    assert message.startswith(str(path)) and expected in message
     assert len(message) < len(str(path)) + 200
     assert message.isprintable()
 
@@ -240,22 +243,22 @@ ANYTHING = st.recursive(
         }
     )
 )
-def test_whatever_is_in_a_file_it_is_a_preset_or_refused(tmp_path, data):
+def test_any_json_is_a_preset_or_refused(tmp_path, data):
     path = tmp_path / "a.json"
     path.write_text(json.dumps(data))
     try:
         preset = read_preset(path)
-    except RosyError as refused:
-        assert "\n" not in str(refused)
+    except RosyError as error:
+        assert "\n" not in str(error)
         return
     write_preset(path, preset)
     assert read_preset(path) == preset
 
 
-def test_no_more_is_read_than_a_preset_can_be(tmp_path, error_of):
-    """A file without end does not fill the memory."""
+def test_an_endless_file_is_refused(tmp_path, error_of):
+    """It does not fill the memory."""
     if not Path("/dev/zero").exists():
-        pytest.skip("there is no file without end")
+        pytest.skip("there is no /dev/zero")
     link = tmp_path / "a.json"
     link.symlink_to("/dev/zero")
     assert "binary" in error_of(read_preset, link)
@@ -265,7 +268,7 @@ def test_no_more_is_read_than_a_preset_can_be(tmp_path, error_of):
 
 
 @pytest.mark.parametrize(
-    ("name", "wanted"),
+    ("name", "expected"),
     [
         ("My Ink", "my-ink"),
         ("  Ink / pen:  2 ", "ink-pen-2"),
@@ -281,141 +284,145 @@ def test_no_more_is_read_than_a_preset_can_be(tmp_path, error_of):
         ("", None),
     ],
 )
-def test_what_presets_are_called_by(name, wanted):
-    assert key(name) == wanted
+def test_keys_of_names(name, expected):
+    assert key(name) == expected
 
 
 @given(NAMES)
-def test_what_a_preset_is_called_by_is_the_name_of_a_file_anywhere(name):
-    found = preset_key(name)
-    assert Path(found).name == found and not set(found) & set('<>:"/\\|?* .\0')
-    assert len(found.encode()) <= 240
-    assert preset_key(found) == found
+def test_keys_are_valid_file_names_everywhere(name):
+    stem = preset_key(name)
+    assert Path(stem).name == stem and not set(stem) & set('<>:"/\\|?* .\0')
+    assert len(stem.encode()) <= 240
+    assert preset_key(stem) == stem
 
 
-# --- one's own -------------------------------------------------------------------------------
+# --- presets of the user ---------------------------------------------------------------------
 
 
 @pytest.mark.slow
-def test_saved_and_found_again(own):
-    assert save_preset(MINE, own) == "my-ink"
-    assert load_preset("my-ink", own) == load_preset("My Ink", own) == MINE
-    assert preset_keys(own) == [*preset_keys(), "my-ink"]
-    assert sorted(path.name for path in own.iterdir()) == ["my-ink.json", "my-ink.png"]
-    with Image.open(own / "my-ink.png") as picture:
+def test_a_saved_preset_is_found(user_folder):
+    assert save_preset(MINE, user_folder) == "my-ink"
+    assert load_preset("my-ink", user_folder) == load_preset("My Ink", user_folder) == MINE
+    assert preset_keys(user_folder) == [*preset_keys(), "my-ink"]
+    assert sorted(path.name for path in user_folder.iterdir()) == ["my-ink.json", "my-ink.png"]
+    with Image.open(user_folder / "my-ink.png") as picture:
         assert picture.size == (PREVIEW_SIZE, PREVIEW_SIZE)
         np.testing.assert_array_equal(
             np.asarray(picture)[::-1], to_srgb_uint8(draw_preview(MINE.look)), strict=True
         )
 
 
-def test_nothing_is_replaced_unless_asked(own, undrawn, error_of):
-    save_preset(MINE, own)
+def test_presets_are_replaced_only_on_request(user_folder, blank_previews, error_of):
+    save_preset(MINE, user_folder)
     other = MINE._replace(name="my INK", look=Look(length=7))
-    assert "preset 'my-ink' already exists" in error_of(save_preset, other, own)
-    assert load_preset("my-ink", own) == MINE
-    assert save_preset(other, own, replace=True) == "my-ink"
-    assert load_preset("my-ink", own) == other
+    assert "preset 'my-ink' already exists" in error_of(save_preset, other, user_folder)
+    assert load_preset("my-ink", user_folder) == MINE
+    assert save_preset(other, user_folder, replace=True) == "my-ink"
+    assert load_preset("my-ink", user_folder) == other
 
 
 @pytest.mark.parametrize("replace", [False, True])
 @pytest.mark.parametrize("name", ["Plaid", "pLAID!", "Print at 300 dpi", "print 300 dpi"])
-def test_those_of_rosy_cannot_be_replaced(own, undrawn, error_of, replace, name):
-    message = error_of(save_preset, MINE._replace(name=name), own, replace=replace)
+def test_shipped_presets_cannot_be_replaced(user_folder, blank_previews, error_of, replace, name):
+    message = error_of(save_preset, MINE._replace(name=name), user_folder, replace=replace)
     assert f"'{name}' is the name of a preset of RoSy" in message
-    assert not own.exists()
+    assert not user_folder.exists()
 
 
 @pytest.mark.parametrize("key", preset_keys())
-def test_found_by_the_name_that_users_see(key, own):
+def test_presets_are_found_by_their_names(key, user_folder):
     preset = load_preset(key)
-    assert load_preset(preset.name, own) == load_preset(preset.name.upper(), own) == preset
+    assert (
+        load_preset(preset.name, user_folder)
+        == load_preset(preset.name.upper(), user_folder)
+        == preset
+    )
 
 
 @pytest.mark.parametrize("name", ["../../outside", "/outside", "..\\outside", "out\0side"])
-def test_nothing_is_written_outside_the_folder(own, undrawn, tmp_path, name):
+def test_nothing_is_written_outside_the_folder(user_folder, blank_previews, tmp_path, name):
     try:
-        save_preset(MINE._replace(name=name), own)
-    except RosyError as refused:
-        assert "must be one line of text" in str(refused)
-    inside = {path for path in tmp_path.rglob("*") if path.is_file()}
-    assert {path.parent for path in inside} <= {own}
+        save_preset(MINE._replace(name=name), user_folder)
+    except RosyError as error:
+        assert "must be one line of text" in str(error)
+    written = {path for path in tmp_path.rglob("*") if path.is_file()}
+    assert {path.parent for path in written} <= {user_folder}
 
 
-def test_renamed(own, undrawn, error_of):
-    save_preset(MINE, own)
-    save_preset(MINE._replace(name="Other"), own)
-    assert rename_preset("my-ink", "Your Ink", "Longer lines", own) == "your-ink"
-    assert load_preset("your-ink", own) == Preset("Your Ink", "Longer lines", MINE.look)
+def test_rename(user_folder, blank_previews, error_of):
+    save_preset(MINE, user_folder)
+    save_preset(MINE._replace(name="Other"), user_folder)
+    assert rename_preset("my-ink", "Your Ink", "Longer lines", user_folder) == "your-ink"
+    assert load_preset("your-ink", user_folder) == Preset("Your Ink", "Longer lines", MINE.look)
     names = {"other.json", "other.png", "your-ink.json", "your-ink.png"}
-    assert {path.name for path in own.iterdir()} == names
-    assert rename_preset("your-ink", "YOUR ink!", "", own) == "your-ink"
-    assert load_preset("your-ink", own).name == "YOUR ink!"
-    for refused in (("your-ink", "Other"), ("your-ink", "Plaid"), ("plaid", "My Plaid")):
-        error_of(rename_preset, *refused, "", own)
-    assert "must be one line" in error_of(rename_preset, "your-ink", "a\nb", "", own)
-    assert {path.name for path in own.iterdir()} == names
+    assert {path.name for path in user_folder.iterdir()} == names
+    assert rename_preset("your-ink", "YOUR ink!", "", user_folder) == "your-ink"
+    assert load_preset("your-ink", user_folder).name == "YOUR ink!"
+    for arguments in (("your-ink", "Other"), ("your-ink", "Plaid"), ("plaid", "My Plaid")):
+        error_of(rename_preset, *arguments, "", user_folder)
+    assert "must be one line" in error_of(rename_preset, "your-ink", "a\nb", "", user_folder)
+    assert {path.name for path in user_folder.iterdir()} == names
 
 
 @pytest.mark.parametrize("name", ["plaid", "../my-ink", "/etc/passwd", "nobody", "my-ink.json", ""])
-def test_only_ones_own_are_deleted(own, undrawn, error_of, name):
-    save_preset(MINE, own)
-    assert "not one of your presets" in error_of(remove_preset, name, own / "..")
-    assert "not one of your presets" in error_of(remove_preset, name, own)
-    assert (own / "my-ink.json").exists() and (SHIPPED_FOLDER / "plaid.json").exists()
+def test_only_user_presets_are_deleted(user_folder, blank_previews, error_of, name):
+    save_preset(MINE, user_folder)
+    assert "not one of your presets" in error_of(remove_preset, name, user_folder / "..")
+    assert "not one of your presets" in error_of(remove_preset, name, user_folder)
+    assert (user_folder / "my-ink.json").exists() and (SHIPPED_FOLDER / "plaid.json").exists()
 
 
-def test_deleted(own, undrawn):
-    save_preset(MINE, own)
-    remove_preset("my-ink", own)
-    assert list(own.iterdir()) == [] and preset_keys(own) == preset_keys()
+def test_delete(user_folder, blank_previews):
+    save_preset(MINE, user_folder)
+    remove_preset("my-ink", user_folder)
+    assert list(user_folder.iterdir()) == [] and preset_keys(user_folder) == preset_keys()
 
 
-def test_own_ones_go_first(own, tmp_path):
-    """A preset that a later RoSy brings along does not take the place of one's own."""
-    own.mkdir()
-    write_preset(own / "plaid.json", MINE)
-    assert load_preset("plaid", own) == MINE and load_preset("plaid") != MINE
-    assert preset_keys(own).count("plaid") == 1
+def test_user_presets_precede_shipped_ones(user_folder, tmp_path):
+    """A preset that a later version of RoSy ships does not replace the user's."""
+    user_folder.mkdir()
+    write_preset(user_folder / "plaid.json", MINE)
+    assert load_preset("plaid", user_folder) == MINE and load_preset("plaid") != MINE
+    assert preset_keys(user_folder).count("plaid") == 1
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written(own, undrawn, error_of):
-    own.mkdir(mode=0o500)
-    assert "permission denied" in error_of(save_preset, MINE, own)
+def test_a_folder_that_cannot_be_written(user_folder, blank_previews, error_of):
+    user_folder.mkdir(mode=0o500)
+    assert "permission denied" in error_of(save_preset, MINE, user_folder)
 
 
-def test_a_folder_that_cannot_be_made(tmp_path, undrawn, error_of):
+def test_a_folder_that_cannot_be_created(tmp_path, blank_previews, error_of):
     (tmp_path / "own").write_text("a file")
     assert str(tmp_path / "own") in error_of(save_preset, MINE, tmp_path / "own")
 
 
 @pytest.mark.parametrize("platform", ["linux", "darwin", "win32"])
-def test_where_ones_own_are_without_blender(platform, monkeypatch, tmp_path):
+def test_user_folder_outside_blender(platform, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "platform", platform)
     for name in ("ROSY_PRESETS", "XDG_DATA_HOME", "APPDATA"):
         monkeypatch.delenv(name, raising=False)
-    found = store.default_user_folder()
-    assert found.is_relative_to(Path.home()) and found.parts[-2:] == ("rosy", "presets")
+    folder = store.default_user_folder()
+    assert folder.is_relative_to(Path.home()) and folder.parts[-2:] == ("rosy", "presets")
     monkeypatch.setenv("ROSY_PRESETS", str(tmp_path))
     assert store.default_user_folder() == tmp_path
 
 
-# --- pictures --------------------------------------------------------------------------------
+# --- previews --------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", mainly(preset_keys()[::4], preset_keys()))
-def test_pictures_of_presets_are_of_their_looks(name):
-    """If a look or how it is drawn has changed: `python -m tools.gallery preset-pictures`."""
+def test_shipped_previews_show_their_looks(name):
+    """After a change of a look or of its drawing, run `python -m tools.gallery preset-pictures`."""
     path = preset_files()[name]
     with Image.open(preview_path(path)) as picture:
         assert picture.size == (PREVIEW_SIZE, PREVIEW_SIZE)
-        shown = np.asarray(picture.convert("RGB"), dtype=np.float64)[::-1]
+        stored = np.asarray(picture.convert("RGB"), dtype=np.float64)[::-1]
     assert preview_path(path).stat().st_size < 80_000
-    assert shown.std() > 15, "blank"
+    assert stored.std() > 15, "blank"
     drawn = to_srgb_uint8(draw_preview(read_preset(path).look))[..., :3]
-    assert np.corrcoef(shown.ravel(), drawn.ravel())[0, 1] > 0.85
+    assert np.corrcoef(stored.ravel(), drawn.ravel())[0, 1] > 0.85
 
 
 @pytest.mark.slow
@@ -430,19 +437,19 @@ def test_pictures_of_presets_are_of_their_looks(name):
     ],
     ids=["brute", "members", "large", "ink", "others"],
 )
-def test_every_look_has_a_picture(look):
+def test_every_look_has_a_preview(look):
     picture = draw_preview(look)
     assert picture.shape == (PREVIEW_SIZE, PREVIEW_SIZE, 4) and picture.dtype == np.float32
     assert np.isfinite(picture).all() and (picture[..., 3] == 1).all()
-    inside = picture[
+    center = picture[
         PREVIEW_SIZE // 4 : -PREVIEW_SIZE // 4, PREVIEW_SIZE // 4 : -PREVIEW_SIZE // 4, :3
     ]
-    assert inside.std() > 0.03
+    assert center.std() > 0.03
     np.testing.assert_array_equal(picture, draw_preview(look))
 
 
 @pytest.mark.slow
-def test_pictures_tell_looks_apart():
+def test_previews_of_looks_differ():
     plain, long = draw_preview(Look()), draw_preview(Look(length=120))
     assert np.abs(plain - long).mean() > 0.01
     ink = Look(ink="hatch", paper_colour="#ff0000")
@@ -455,17 +462,17 @@ def test_pictures_tell_looks_apart():
 
 
 @pytest.fixture
-def kept(own, undrawn, monkeypatch):
-    monkeypatch.setenv("ROSY_PRESETS", str(own))
-    save_preset(MINE, own)
-    return own
+def saved_folder(user_folder, blank_previews, monkeypatch):
+    monkeypatch.setenv("ROSY_PRESETS", str(user_folder))
+    save_preset(MINE, user_folder)
+    return user_folder
 
 
-def test_listed(kept, capsys):
-    (kept / "broken.json").write_text("{")
+def test_list_presets(saved_folder, capsys):
+    (saved_folder / "broken.json").write_text("{")
     assert main(["presets", "--json"]) == 0
-    said = capsys.readouterr()
-    listed = {each["preset"]: each for each in json.loads(said.out)}
+    output = capsys.readouterr()
+    listed = {each["preset"]: each for each in json.loads(output.out)}
     assert list(listed) == [*preset_keys(), "my-ink"]
     assert listed["my-ink"] == {
         "preset": "my-ink",
@@ -474,23 +481,23 @@ def test_listed(kept, capsys):
         "own": True,
     }
     assert not listed["plaid"]["own"]
-    (line,) = said.err.splitlines()
+    (line,) = output.err.splitlines()
     assert "broken.json:1: expecting" in line
     assert main(["presets"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("plaid ") and "Broad bands" in line for line in lines)
     assert any(line.startswith("my-ink ") and line.endswith("Long lines  (own)") for line in lines)
-    assert str(kept) in lines[-1]
+    assert str(saved_folder) in lines[-1]
 
 
-def test_drawn_with_by_name_and_by_path(kept, tmp_path):
+def test_render_with_a_preset_by_name_and_by_path(saved_folder, tmp_path):
     mesh = tmp_path / "a.off"
     mesh.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n")
-    made = {}
-    for preset in ("my-ink", "My Ink", kept / "my-ink.json", "default"):
+    pictures = {}
+    for preset in ("my-ink", "My Ink", saved_folder / "my-ink.json", "default"):
         out = tmp_path / "a.png"
-        words = ["--generate", "axis", "--size", "48x48", "--preset", str(preset)]
-        assert main(["render", str(mesh), "-o", str(out), *words]) == 0
-        made[str(preset)] = out.read_bytes()
-    default = made.pop("default")
-    assert len(set(made.values())) == 1 and default not in made.values()
+        options = ["--generate", "axis", "--size", "48x48", "--preset", str(preset)]
+        assert main(["render", str(mesh), "-o", str(out), *options]) == 0
+        pictures[str(preset)] = out.read_bytes()
+    default = pictures.pop("default")
+    assert len(set(pictures.values())) == 1 and default not in pictures.values()

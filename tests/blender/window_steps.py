@@ -1,7 +1,7 @@
-"""Steps in a window, one after the other, while Blender goes on with its own affairs.
+"""Running test steps in a window, one after the other, while Blender handles its events.
 
-Every step is a generator that yields while Blender is to go on; a timer resumes it. What each step
-found is written to the file ROSY_RESULTS names, as {step: "" or what went wrong}.
+Every step is a generator. Whenever it yields, Blender continues, and a timer resumes the step. The
+results are written to the file of ROSY_RESULTS, as {step: [error or "", seconds]}.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import numpy as np
 
 SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
-PATIENCE = 40.0
+TIMEOUT_SECONDS = 40.0
 
 
-def watch(*steps):
-    """Do steps as soon as there is a window, write what came of them and end Blender."""
+def run_steps(*steps):
+    """Run steps as soon as there is a window, write their results, and end Blender."""
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
-    bpy.app.timers.register(_resume(_all(steps)), first_interval=1.0, persistent=True)
+    bpy.app.timers.register(_resume(_run_all(steps)), first_interval=1.0, persistent=True)
 
 
 def _resume(work):
@@ -42,7 +42,7 @@ def _resume(work):
     return tick
 
 
-def _all(steps):
+def _run_all(steps):
     results = {}
     for step in steps:
         start, error = time.monotonic(), ""
@@ -57,12 +57,12 @@ def _all(steps):
 
 
 def rosy(name):
-    """A module of the extension."""
+    """Return a module of the extension."""
     return sys.modules[f"bl_ext.user_default.rosy.{name}"]
 
 
 def view():
-    """The window, the 3D view in it and its main region and sidebar."""
+    """Return the window, its 3D view, and the main region and the sidebar of the view."""
     window = bpy.context.window_manager.windows[0]
     area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
     regions = {region.type: region for region in area.regions}
@@ -70,33 +70,34 @@ def view():
 
 
 def in_view():
-    """A context in which operators find the 3D view."""
+    """Return a context in which operators find the 3D view."""
     window, area, region, _ = view()
     return bpy.context.temp_override(window=window, area=area, region=region)
 
 
-def until(condition):
-    late = time.monotonic() + PATIENCE
+def wait_until(condition):
+    """Yield until a condition holds."""
+    deadline = time.monotonic() + TIMEOUT_SECONDS
     while not condition():
-        if time.monotonic() > late:
-            raise AssertionError("waited in vain")
+        if time.monotonic() > deadline:
+            raise AssertionError("timed out")
         yield
 
 
-def captured(name, region):
-    """(h, w, 3) float32 display values of a region as it is on the screen, rows from the bottom.
+def capture(name, region):
+    """Return the (h, w, 3) float32 display values of a region on the screen, rows from the bottom.
 
-    The whole screen is kept as NAME.png. Blender's own screenshot is black on software OpenGL; the
-    X server knows better.
+    The whole screen is saved as NAME.png. It is read from the X server, because Blender's own
+    screenshot is black on software OpenGL.
     """
     path = SHOTS / f"{name}.png"
     subprocess.run(["import", "-window", "root", str(path)], check=True, timeout=20)
-    words = ["convert", str(path), "-depth", "8", "-format", "%w %h", "-write", "info:-", "rgb:-"]
-    said = subprocess.run(words, check=True, timeout=20, capture_output=True).stdout
-    size = said.split(b" ", 1)
+    command = ["convert", str(path), "-depth", "8", "-format", "%w %h", "-write", "info:-", "rgb:-"]
+    output = subprocess.run(command, check=True, timeout=20, capture_output=True).stdout
+    size = output.split(b" ", 1)
     width = int(size[0])
-    raw = np.frombuffer(said, dtype=np.uint8)
+    raw = np.frombuffer(output, dtype=np.uint8)
     height = len(raw) // (3 * width)
-    seen = raw[len(raw) - 3 * width * height :].reshape(height, width, 3)[::-1]
-    part = seen[region.y : region.y + region.height, region.x : region.x + region.width]
+    screen = raw[len(raw) - 3 * width * height :].reshape(height, width, 3)[::-1]
+    part = screen[region.y : region.y + region.height, region.x : region.x + region.width]
     return part.astype(np.float32) / 255

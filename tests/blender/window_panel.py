@@ -1,7 +1,7 @@
-"""RoSy in a window: the panel in its three states, a bake that is watched, and bakes that are broken off.
+"""RoSy in a window: the panel in its states, tasks with progress, and tasks that are interrupted.
 
-Run by run.py as ``blender --enable-event-simulate -P window.py``. Every step is a generator that
-yields while Blender is to go on with its own affairs (`watching`).
+Run by run.py as ``blender --enable-event-simulate -P window_panel.py``. Every step is a generator
+that yields to let Blender handle its events (`window_steps`).
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
-from watching import SHOTS, in_view, rosy, until, view, watch
+from window_steps import SHOTS, in_view, rosy, run_steps, view, wait_until
 
-# What the steps are made of
+# Helpers of the steps
 
 
 def fresh_scene(size=(320, 240)):
-    """Suzanne before a camera, the sidebar open at RoSy's tab."""
+    """Create a scene with Suzanne and a camera, and open RoSy's tab of the sidebar."""
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.5
     with in_view():
@@ -73,15 +73,15 @@ def pixels(image):
 
 
 def start_bake(**settings):
-    """Start a bake as its button does, and wait until it is on its way."""
+    """Start a bake as its button does, and wait until it has made progress."""
     with in_view():
         assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
-    yield from until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the bake was over before it could be broken off"
+    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
+    assert status().current is not None, "the bake ended before it could be interrupted"
 
 
-def all_is_quiet():
-    """No bake runs, and none of what one needs is left."""
+def check_idle():
+    """Check that no task runs, and that no handler is left."""
     assert status().current is None
     for name in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, name)
@@ -89,38 +89,38 @@ def all_is_quiet():
             assert "rosy" not in getattr(handler, "__module__", ""), name
 
 
-def broken_off(interrupt, *, unchanged=True, photographed=None):
-    """Start a long bake, do `interrupt`, and see that it ends and leaves the scene as it was."""
+def check_interruption(interrupt, *, unchanged=True, screenshot=None):
+    """Start a long bake, call `interrupt`, and check that it ends and changes nothing."""
     yield from fresh_scene(size=(1600, 1200))
     make_field()
     bpy.context.scene.rosy.look.method = "brute"
     before = contents()
     yield from start_bake()
-    if photographed is not None:
-        yield from photograph(photographed, 360)
-        assert status().current is not None, "the bake was over before its picture was taken"
+    if screenshot is not None:
+        yield from save_screenshot(screenshot, 360)
+        assert status().current is not None, "the bake ended before the screenshot"
     interrupt()
-    yield from until(lambda: status().current is None)
+    yield from wait_until(lambda: status().current is None)
     yield 0.5
-    all_is_quiet()
+    check_idle()
     if unchanged:
         assert contents() == before
 
 
-def photograph(name, height=10_000):
+def save_screenshot(name, height=10_000):
     """Save the upper part of the sidebar as NAME.png, and the window as window-NAME.png."""
     window, area, _, sidebar = view()
-    for _ in range(10):  # panels that were opened or have grown glide into place
+    for _ in range(10):  # panels that have opened or grown are animated
         area.tag_redraw()
         yield 0.1
-    # Blender's own screenshot is black on software OpenGL; the X server knows better.
-    whole = SHOTS / f"window-{name}.png"
-    subprocess.run(["import", "-window", "root", str(whole)], check=True, timeout=20)
+    # From the X server: Blender's own screenshot is black on software OpenGL.
+    window_path = SHOTS / f"window-{name}.png"
+    subprocess.run(["import", "-window", "root", str(window_path)], check=True, timeout=20)
     left, top = sidebar.x, window.height - sidebar.y - sidebar.height
-    part = f"{sidebar.width}x{min(height, sidebar.height)}+{left}+{top}"
+    crop = f"{sidebar.width}x{min(height, sidebar.height)}+{left}+{top}"
     path = SHOTS / f"{name}.png"
     subprocess.run(
-        ["convert", str(whole), "-crop", part, "+repage", str(path)], check=True, timeout=20
+        ["convert", str(window_path), "-crop", crop, "+repage", str(path)], check=True, timeout=20
     )
     assert path.stat().st_size > 1000
 
@@ -130,45 +130,45 @@ def photograph(name, height=10_000):
 
 def panel_without_field():
     yield from fresh_scene()
-    yield from photograph("panel-1-no-field", 390)
+    yield from save_screenshot("panel-1-no-field", 390)
 
 
 def panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
-    yield from photograph("panel-2-field", 450)
+    yield from save_screenshot("panel-2-field", 450)
 
 
 def singularities_as_dots():
-    """Dots of both signs while they are shown, and no handler when they are not."""
+    """Dots of both signs are drawn while they are shown; otherwise there is no handler."""
     overlay = rosy("rosy_addon.ui.overlay")
     yield from fresh_scene()
     with in_view():
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
         bpy.ops.view3d.view_selected()
     assert not overlay.has_handlers()
-    yield from photograph("panel-5-no-singularities")
-    without = dots_in("panel-5-no-singularities")
+    yield from save_screenshot("panel-5-no-singularities")
+    without = count_dots("panel-5-no-singularities")
     with in_view():
         assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
-    yield from photograph("panel-6-singularities", 450)
-    orange, blue = dots_in("panel-6-singularities") - without
+    yield from save_screenshot("panel-6-singularities", 450)
+    orange, blue = count_dots("panel-6-singularities") - without
     assert orange > 200 and blue > 200, (orange, blue)
     with in_view():
         bpy.ops.rosy.singularities(show="NONE")
     assert not overlay.has_handlers()
-    yield from photograph("panel-7-hidden")
-    assert np.abs(dots_in("panel-7-hidden") - without).max() < 100
+    yield from save_screenshot("panel-7-hidden")
+    assert np.abs(count_dots("panel-7-hidden") - without).max() < 100
 
 
-def dots_in(name):
-    """How many pixels of the 3D view, as it was photographed, are orange and blue as dots are."""
-    whole = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
-    seen = pixels(whole)
-    bpy.data.images.remove(whole)
+def count_dots(name):
+    """Return how many pixels of the 3D view in a screenshot are orange and blue like dots."""
+    image = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
+    screen = pixels(image)
+    bpy.data.images.remove(image)
     region = view()[2]
-    seen = seen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
-    red, green, blue = seen[..., 0], seen[..., 1], seen[..., 2]
+    screen = screen[region.y : region.y + region.height, region.x : region.x + region.width // 2]
+    red, green, blue = screen[..., 0], screen[..., 1], screen[..., 2]
     return np.array(
         [
             np.count_nonzero((red > 0.8) & (green < 0.5) & (blue < 0.25)),
@@ -180,27 +180,30 @@ def dots_in(name):
 def bake_with_progress():
     yield from fresh_scene(size=(800, 600))
     make_field()
-    bpy.context.scene.rosy.look.method = "brute"  # which takes long enough to be watched
+    bpy.context.scene.rosy.look.method = "brute"  # slow enough to observe the progress
     yield from start_bake()
-    seen, longest, start = [], 0.0, time.monotonic()
-    last = start
+    fractions, longest_pause, start = [], 0.0, time.monotonic()
+    last_time = start
     while status().current is not None:
-        seen.append(status().current.fraction)
+        fractions.append(status().current.fraction)
         yield
-        longest, last = max(longest, time.monotonic() - last), time.monotonic()
-    assert len(set(seen)) >= 3, seen
-    assert seen == sorted(seen), seen
-    # On a busy machine all of it takes longer.
-    allowed = max(2.0, 0.2 * (last - start))
-    assert longest < allowed, f"Blender did not respond for {longest:.1f} s"
-    all_is_quiet()
+        longest_pause, last_time = (
+            max(longest_pause, time.monotonic() - last_time),
+            time.monotonic(),
+        )
+    assert len(set(fractions)) >= 3, fractions
+    assert fractions == sorted(fractions), fractions
+    # On a busy machine everything takes longer.
+    limit = max(2.0, 0.2 * (last_time - start))
+    assert longest_pause < limit, f"Blender did not respond for {longest_pause:.1f} s"
+    check_idle()
     assert [image for image in bpy.data.images if image.name.lower().startswith("rosy")]
 
 
 def panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
-    yield from photograph("panel-3-baked", 580)
+    yield from save_screenshot("panel-3-baked", 580)
 
 
 def panel_out_of_date():
@@ -216,11 +219,11 @@ def panel_out_of_date():
         bpy.ops.rosy.bake("EXEC_DEFAULT", True)
     scene.view_settings.view_transform = "Standard"
     view()[1].spaces.active.shading.type = "SOLID"
-    yield from photograph("panel-4-out-of-date")
+    yield from save_screenshot("panel-4-out-of-date")
 
 
 def eevee_shows_the_picture():
-    """Rendered by EEVEE, which needs a window on most machines, the picture is what was drawn."""
+    """A render by EEVEE, which needs a window on most machines, shows the picture."""
     yield from fresh_scene(size=(200, 150))
     make_field()
     scene = bpy.context.scene
@@ -236,11 +239,11 @@ def eevee_shows_the_picture():
     scene.render.image_settings.color_mode = "RGBA"
     scene.render.filepath = str(SHOTS / "eevee.png")
     bpy.ops.render.render(write_still=True)
-    seen = pixels(bpy.data.images.load(scene.render.filepath))
+    rendered = pixels(bpy.data.images.load(scene.render.filepath))
     picture = pixels(scene.rosy.bakes[0].image)
-    inside = (seen[..., 3] > 0.99) & (picture[..., 3] > 0.99)
+    inside = (rendered[..., 3] > 0.99) & (picture[..., 3] > 0.99)
     assert inside.mean() > 0.05
-    difference = np.abs(seen - picture)[..., :3][inside].mean()
+    difference = np.abs(rendered - picture)[..., :3][inside].mean()
     assert difference < 0.02, difference
 
 
@@ -250,7 +253,7 @@ def undo_after_bake():
     before = contents()
     with in_view():
         bpy.ops.rosy.bake("INVOKE_DEFAULT", True)
-    yield from until(lambda: status().current is None)
+    yield from wait_until(lambda: status().current is None)
     yield 0.3
     after = contents()
     assert after != before
@@ -272,19 +275,19 @@ def press_escape():
 
 
 def stop_with_escape():
-    yield from broken_off(press_escape, photographed="baking")
+    yield from check_interruption(press_escape, screenshot="baking")
 
 
-def turntable(path, pictures):
-    """Start a turntable, as its file browser does once a file is chosen."""
+def start_turntable(path, pictures):
+    """Start a turntable, as its file browser does after the choice of a file."""
     with in_view():
         started = bpy.ops.rosy.turntable(
             "INVOKE_DEFAULT", True, skip_browser=True, filepath=str(path), film=".gif",
             pictures=pictures, width=160, height=120,
         )  # fmt: skip
     assert started == {"RUNNING_MODAL"}
-    yield from until(lambda: status().current is None or status().current.fraction > 0.01)
-    assert status().current is not None, "it was over before it could be watched"
+    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.01)
+    assert status().current is not None, "the turntable ended before its progress could be observed"
 
 
 def turntable_with_progress():
@@ -292,13 +295,13 @@ def turntable_with_progress():
     make_field()
     path = SHOTS / "turntable.gif"
     path.unlink(missing_ok=True)
-    yield from turntable(path, 8)
-    seen = []
+    yield from start_turntable(path, 8)
+    fractions = []
     while status().current is not None:
-        seen.append(status().current.fraction)
+        fractions.append(status().current.fraction)
         yield
-    assert len(set(seen)) >= 3 and seen == sorted(seen), seen
-    all_is_quiet()
+    assert len(set(fractions)) >= 3 and fractions == sorted(fractions), fractions
+    check_idle()
     assert path.stat().st_size > 500
 
 
@@ -306,16 +309,16 @@ def turntable_stopped_with_escape():
     yield from fresh_scene()
     make_field()
     path = SHOTS / "stopped.gif"
-    yield from turntable(path, 60)
+    yield from start_turntable(path, 60)
     press_escape()
-    yield from until(lambda: status().current is None)
+    yield from wait_until(lambda: status().current is None)
     yield 0.5
-    all_is_quiet()
+    check_idle()
     assert not path.exists()
 
 
 def turntable_from_its_file_browser():
-    """The file browser is opened, and once it is confirmed the work goes on as a modal job."""
+    """The file browser opens; after its confirmation the turntable runs as a modal task."""
     yield from fresh_scene()
     make_field()
     path = SHOTS / "browser.gif"
@@ -335,10 +338,10 @@ def turntable_from_its_file_browser():
     x, y = browser.width // 2, browser.height // 2
     browser.event_simulate(type="RET", value="PRESS", x=x, y=y)
     browser.event_simulate(type="RET", value="RELEASE", x=x, y=y)
-    yield from until(lambda: status().current is not None)
-    yield from until(lambda: status().current is None)
+    yield from wait_until(lambda: status().current is not None)
+    yield from wait_until(lambda: status().current is None)
     yield 0.5
-    all_is_quiet()
+    check_idle()
     assert path.stat().st_size > 500
 
 
@@ -347,8 +350,8 @@ def stop_when_an_object_is_deleted():
         with in_view():
             bpy.ops.object.delete()
 
-    yield from broken_off(delete, unchanged=False)
-    assert not [thing for thing in bpy.data.materials if "rosy" in thing.name.lower()]
+    yield from check_interruption(delete, unchanged=False)
+    assert not [material for material in bpy.data.materials if "rosy" in material.name.lower()]
 
 
 def stop_on_undo():
@@ -356,7 +359,7 @@ def stop_on_undo():
         with in_view():
             bpy.ops.ed.undo()
 
-    yield from broken_off(undo, unchanged=False)
+    yield from check_interruption(undo, unchanged=False)
     assert "rosy" not in bpy.data.objects["Suzanne"].data.attributes
 
 
@@ -365,8 +368,8 @@ def stop_on_a_change_of_scene():
         with in_view():
             bpy.ops.scene.new(type="EMPTY")
 
-    yield from broken_off(change, unchanged=False)
-    assert not [thing for thing in bpy.data.materials if "rosy" in thing.name.lower()]
+    yield from check_interruption(change, unchanged=False)
+    assert not [material for material in bpy.data.materials if "rosy" in material.name.lower()]
 
 
 def stop_when_switched_off():
@@ -375,14 +378,14 @@ def stop_when_switched_off():
         bpy.ops.preferences.addon_disable(module=module)
         bpy.ops.preferences.addon_enable(module=module)
 
-    yield from broken_off(switch_off)
+    yield from check_interruption(switch_off)
 
 
 def stop_when_a_file_is_opened():
     def open_file():
         bpy.ops.wm.read_homefile(use_empty=True)
 
-    yield from broken_off(open_file, unchanged=False)
+    yield from check_interruption(open_file, unchanged=False)
 
 
 def bake_the_current_view():
@@ -394,7 +397,7 @@ def bake_the_current_view():
     assert tuple(image.size) == (view()[2].width, view()[2].height)
 
 
-watch(
+run_steps(
     panel_without_field,
     panel_with_field,
     singularities_as_dots,

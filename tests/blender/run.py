@@ -26,8 +26,13 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 
-#: Scripts that test in a window, by what they test.
-WINDOWS = {"panel": "window_panel.py", "presets": "window_presets.py", "live": "window_live.py"}
+#: Scripts that test in a window, by what they test, and the size of the window in pixels: small,
+#: as views are drawn in software, but with room for the menu of all presets.
+WINDOWS = {
+    "panel": ("window_panel.py", 1000, 720),
+    "presets": ("window_presets.py", 1000, 900),
+    "live": ("window_live.py", 1000, 720),
+}
 
 
 def main() -> int:
@@ -120,12 +125,13 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         shots = folder / "shots"
         shots.mkdir()
         environment["ROSY_SHOTS"] = str(shots)
-        for script in windows:
+        for script, width, height in windows:
             results_file = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(results_file)
             time_limit = 900 if "ROSY_LIVE_MANY" in environment else 420
             process = blender(
                 "gui", "-s", str(time_limit), *backend,
+                "--window-geometry", "0", "0", str(width), str(height),
                 "--enable-event-simulate", "--python-exit-code", "1",
                 "-P", str(HERE / script),
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=time_limit + 60.0,

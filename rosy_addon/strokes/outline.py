@@ -8,6 +8,7 @@ from ..field.frames import dot, normalize
 from ..field.surface import Surface, build_edges
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
 
@@ -43,8 +44,7 @@ def outline(
     points = instance.world_points()
     corner = points[surface.triangle_vertex]
     linear = matrix[:3, :3]
-    cofactors = np.array([np.cross(linear[k - 2], linear[k - 1]) for k in range(3)])
-    normal = normalize(surface.corner_normal @ cofactors.T)[surface.triangles]
+    normal = normalize(surface.corner_normal @ cofactor_matrix(linear).T)[surface.triangles]
     creases, borders = _crease_and_border_corners(surface, corner, crease_angle)
     segments = [
         _silhouettes(surface, corner, normal, camera) if camera is not None else _no_segments(),

@@ -15,6 +15,7 @@ from ..field.generate import compute_magnitude
 from ..field.surface import Surface, sum_per_fan
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .visibility import pixel_size
 
@@ -200,10 +201,9 @@ def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
     """
     matrix = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     surface = instance.surface
-    cofactors = np.array([np.cross(matrix[k - 2], matrix[k - 1]) for k in range(3)])
     fan_normal = sum_per_fan(surface.corner_normal, surface.corner_vertex)
     normal = np.zeros_like(surface.vertices)
-    normal[: len(fan_normal)] = fan_normal @ cofactors.T
+    normal[: len(fan_normal)] = fan_normal @ cofactor_matrix(matrix).T
     return np.clip(
         dot(normalize(normal), normalize(np.broadcast_to(to_light, normal.shape) + 0.0)), 0, 1
     )

@@ -58,7 +58,7 @@ def test_shaders_have_no_literal_where_there_is_a_define(name):
 
 def test_shaders_read_records_by_named_texels():
     for name, code in SOURCES.items():
-        assert not re.search(r"\brecord\(\w+,\s*\d", code), name
+        assert not re.search(r"\brecord_texel\(\w+,\s*\d", code), name
     last = mesh_buffers.record_texels(0) - 1
     assert mesh_buffers.NORMAL_TEXEL == mesh_buffers.POSITION_TEXEL + 3
     assert mesh_buffers.VALUE_TEXEL == mesh_buffers.NORMAL_TEXEL + 3

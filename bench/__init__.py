@@ -1,1 +1,6 @@
-"""Benchmarks: one script for each claim about speed, which prints ratios."""
+"""Benchmarks, each a script: ``python -m bench.NAME``. `bench/run.py` runs all of them."""
+
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))  # for the package `harness`

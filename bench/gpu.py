@@ -59,7 +59,7 @@ AZIMUTH_STEP = 0.01
 def open_device() -> Any:
     """Return a device; None if none can be opened, after printing the reason."""
     try:
-        from .egl import EglDevice
+        from harness.egl_device import EglDevice
     except ImportError:
         print("shaders: skipped, because moderngl is not installed", file=sys.stderr)
         return None

@@ -1,21 +1,19 @@
-"""Compare the G-buffers and pictures of the graphics card with those of numpy.
+"""Print how well the graphics card agrees with numpy, for several shapes and degrees.
 
     blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
         [--data FOLDER]
 
 Draws a sphere, a torus and Suzanne for N = 1 to 6 with the graphics card that Blender uses, and
 prints a row for each. With `--data`, also the bunny and the vase, which are the files
-`meshes/stanford-bunny.obj` and `meshes/vase.off` in FOLDER. The tests use these functions too.
+`meshes/stanford-bunny.obj` and `meshes/vase.off` in FOLDER.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,227 +21,18 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-#: Largest distance between two points that count as equal, in pixels. OpenGL rounds the vertices of
-#: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
-MAX_DISTANCE_PX = 0.1
-
-#: Largest difference of unit normals, and of representations relative to the larger modulus.
-MAX_DIFFERENCE = 1e-3
-
-DEGREES = (1, 2, 3, 4, 5, 6)
-
-#: Mesh files in the data folder, by the name of the shape.
-FILES = {"bunny": "stanford-bunny.obj", "vase": "vase.off"}
-
-#: Azimuth and elevation in degrees, and whether the view is in perspective.
-VIEWS = {
-    "sphere": (30.0, 20.0, True),
-    "torus": (20.0, 40.0, False),
-    "Suzanne": (25.0, 10.0, True),
-    "bunny": (0.0, 85.0, True),
-    "vase": (10.0, 15.0, False),
-}
-
-
-def module_of(package: str, module: str) -> Any:
-    """Import a module of RoSy from the repository or from an installed extension."""
-    return importlib.import_module(f"{package}.{module}")
-
-
-def rooms(package: str = "rosy_addon") -> SimpleNamespace:
-    """Return the parts of RoSy that are used here."""
-
-    def of(module: str) -> Any:
-        return module_of(package, module)
-
-    return SimpleNamespace(
-        package=package,
-        MeshInstance=of("projection.gbuffer").MeshInstance,
-        Camera=of("projection.camera").Camera,
-        GpuRenderer=of("gpu.renderer").GpuRenderer,
-        Look=of("compositor.look").Look,
-        ViewInput=of("render.view_input").ViewInput,
-        compose=of("compositor.compose").compose,
-        generate=of("field.generate").generate,
-        orbit_camera=of("projection.camera").orbit_camera,
-        project=of("projection.project").project,
-        run_to_completion=of("progress").run_to_completion,
-        read_mesh=of("field.mesh_io").read_mesh,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """The same picture by the graphics card and by numpy.
-
-    Attributes
-    ----------
-    gbuffer : GBuffer
-        The G-buffer of numpy.
-    images : dict of str to (H, W, 4) float32 ndarray
-        The G-buffer of the card.
-    card, numpy : (H, W, 4) float32 ndarray
-        The pictures, linear.
-    """
-
-    gbuffer: Any
-    images: dict[str, np.ndarray]
-    card: np.ndarray
-    numpy: np.ndarray
-
-    @property
-    def agreement(self) -> float:
-        """See `agreement`."""
-        return agreement(self.gbuffer, self.images)
-
-    @property
-    def likeness(self) -> float:
-        """See `likeness`."""
-        return likeness(self.card, self.numpy)
-
-
-def draw_pair(
-    rosy: SimpleNamespace,
-    card: Any,
-    instances: Sequence[Any],
-    camera: Any,
-    look: Any,
-    lights: Sequence[Any] = (),
-    reference: Any = None,
-) -> Pair:
-    """Draw a picture on the card and with numpy.
-
-    Numpy uses brute force, which averages each streamline separately.
-
-    Parameters
-    ----------
-    rosy : SimpleNamespace
-        The result of `rooms`.
-    card : GpuRenderer
-    instances : sequence of MeshInstance
-    camera : Camera
-        With `look.supersampling` times the width and height of the picture.
-    look : Look
-    lights : sequence of Light
-    reference : ReferenceRender, optional
-    """
-    supersampling = look.supersampling
-    width, height = camera.width // supersampling, camera.height // supersampling
-    view = rosy.ViewInput(
-        tuple(instances), camera.resized(width, height), look, tuple(lights), reference
-    )
-    items = card.upload(instances, look.display)
-    texture = rosy.run_to_completion(card.render_texture_task(items, view))
-    card_picture = card.read(texture, width, height)
-    images = card.read_gbuffer(camera)
-    gbuffer = rosy.project(instances, camera, look.display)
-    numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
-    return Pair(
-        gbuffer,
-        {name: np.array(image) for name, image in images.items()},
-        card_picture,
-        numpy_picture,
-    )
-
-
-def draw_on_card(
-    rosy: SimpleNamespace, card: Any, instances: Sequence[Any], camera: Any, look: Any
-) -> np.ndarray:
-    """Draw a picture on the card: (H, W, 4), without supersampling."""
-    view = rosy.ViewInput(tuple(instances), camera, look)
-    items = card.upload(instances, look.display)
-    texture = rosy.run_to_completion(card.render_texture_task(items, view))
-    return card.read(texture, camera.width, camera.height)
-
-
-def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
-    """Return the fraction of pixels at which both G-buffers agree.
-
-    The pixels are those that at least one of the G-buffers covers with a field. They agree if
-
-    - both cover the pixel, with the same instance;
-    - the points are within `MAX_DISTANCE_PX`. Both are on the ray through the pixel, so their
-      distance is the difference in depth, in pixels at that depth. The triangles may be different
-      where two meet, because OpenGL rounds their corners, but the points may not;
-    - the normals differ by less than `MAX_DIFFERENCE`, and both G-buffers see the same side;
-    - the representations z differ by at most `MAX_DIFFERENCE` times the greater modulus; 0 agrees
-      only with 0.
-
-    Parameters
-    ----------
-    gbuffer : GBuffer
-        The G-buffer of numpy.
-    images : dict of str to (H, W, 4) ndarray
-        The G-buffer of the card; see `GpuRenderer.read_gbuffer`.
-    """
-    camera, pixel = gbuffer.camera, gbuffer.pixel
-    normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))
-    covered = np.zeros(camera.width * camera.height, dtype=bool)
-    covered[pixel] = True
-    either = np.count_nonzero(covered | (values[:, 3] > 0))
-    normals, values = normals[pixel].astype(np.float64), values[pixel].astype(np.float64)
-    same = values[:, 3] == gbuffer.instance_id + 1
-    depth = -gbuffer.position[:, 2].astype(np.float64)
-    distance = np.abs(np.abs(normals[:, 3]) - depth)
-    if camera.is_perspective:
-        # Along the ray, and in units of a pixel at that depth.
-        distance = distance / gbuffer.view_direction[:, 2] / depth
-    same &= distance * camera.pixels_per_unit < MAX_DISTANCE_PX
-    same &= np.linalg.norm(normals[:, :3] - gbuffer.normal, axis=1) < MAX_DIFFERENCE
-    same &= (normals[:, 3] > 0) == gbuffer.front_facing
-    z = values[:, 0] + 1j * values[:, 1]
-    expected = gbuffer.representation.astype(np.complex128)
-    same &= np.abs(z - expected) <= MAX_DIFFERENCE * np.maximum(np.abs(z), np.abs(expected))
-    return np.count_nonzero(same) / either
-
-
-def likeness(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the correlation of two (H, W, 4) linear pictures over pixels that both cover fully.
-
-    It is the smallest of the correlations of the three channels.
-    """
-    both = (one[..., 3] == 1) & (other[..., 3] == 1)
-    one, other = one[both].astype(np.float64), other[both].astype(np.float64)
-    return min(float(np.corrcoef(one[:, c], other[:, c])[0, 1]) for c in range(3))
-
-
-def blender_surface(rosy: SimpleNamespace, name: str) -> Any:
-    """Return a primitive of Blender as a surface: sphere, torus or Suzanne."""
-    import bpy
-
-    if name == "sphere":
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48)
-    elif name == "torus":
-        bpy.ops.mesh.primitive_torus_add(
-            major_segments=128, minor_segments=48, major_radius=1.0, minor_radius=0.4
-        )
-    else:
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = 2
-    bpy.ops.object.shade_smooth()
-    evaluated = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    meshes = module_of(rosy.package, "scene.meshes")
-    try:
-        return meshes.mesh_surface(evaluated.to_mesh(), name)
-    finally:
-        evaluated.to_mesh_clear()
-        bpy.ops.object.delete()
-
-
-def surface_of_shape(rosy: SimpleNamespace, name: str, data: Path | None = None) -> Any:
-    """Return the surface of a shape in `VIEWS`; None if its file is not in the data folder."""
-    if name not in FILES:
-        return blender_surface(rosy, name)
-    path = None if data is None else data / "meshes" / FILES[name]
-    return rosy.read_mesh(path) if path is not None and path.is_file() else None
-
-
-def camera_of_shape(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
-    """Return the camera for a shape in `VIEWS`, with a square frame."""
-    azimuth, elevation, perspective = VIEWS[name]
-    return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
+from harness.gpu_parity import (  # noqa: E402
+    DEGREES,
+    VIEWS,
+    camera_of_shape,
+    draw_on_card,
+    draw_pair,
+    module_of,
+    rooms,
+    surface_of_shape,
+)
 
 
 def table_lines(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) -> Iterator[str]:
@@ -291,5 +80,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
     main()

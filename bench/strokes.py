@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
+from harness.stroke_spacing import lateral_gaps
 
-from bench.stroke_spacing import lateral_gaps
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.strokes.separation_rules import SeparationRules

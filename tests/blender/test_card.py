@@ -1,6 +1,6 @@
 """The graphics card compared with numpy, in this Blender; software OpenGL is enough.
 
-`bench/parity.py` defines what is measured, and measures the same at 512 x 512 for a table.
+`tests/harness/gpu_parity.py` defines what is measured. `bench/parity.py` measures it at 512 x 512.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from conftest import EXTENSION
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from bench.parity import (
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from harness.gpu_parity import (
     DEGREES,
     VIEWS,
     camera_of_shape,

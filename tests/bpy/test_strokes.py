@@ -5,12 +5,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.bench.stroke_spacing import lateral_gaps
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.surface import build_surface
 from rosy.rosy_addon.projection.gbuffer import MeshInstance
 from rosy.rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy.rosy_addon.strokes.trace import trace_strokes
+from rosy.tests.harness.stroke_spacing import lateral_gaps
 
 pytestmark = pytest.mark.long
 

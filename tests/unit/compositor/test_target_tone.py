@@ -371,7 +371,7 @@ def test_the_shadow_of_a_ball_on_a_plane(name):
     assert ((visibility > 0.1) & (visibility < 0.9)).any()
 
 
-@pytest.mark.parametrize("name", mainly(["low sun", "lamp among them"], LIGHTS))
+@pytest.mark.parametrize("name", mainly(["low sun", "lamp outside"], LIGHTS))
 def test_surfaces_that_face_the_light_do_not_shadow_themselves(name):
     kind, where = LIGHTS[name]
     for surface in (icosphere(3), BALL, plane(3, 3, 2.0)):

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from awkward import moebius
 from conftest import long, mainly
+from harness.gpu_parity import draw_pair, rooms
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
-from bench.parity import draw_pair, rooms
 from rosy_addon.compositor.contrast import supersampling_gain
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import supersampled_look
@@ -434,7 +434,7 @@ def test_union_of_boxes():
 def device():
     """A plain OpenGL context."""
     pytest.importorskip("moderngl", reason="no moderngl")
-    from bench.egl import EglDevice
+    from harness.egl_device import EglDevice
 
     try:
         return EglDevice()

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from conftest import long, mainly
 from field_helpers import bumpy
+from harness.stroke_spacing import lateral_gaps
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
 
-from bench.stroke_spacing import lateral_gaps
 from rosy_addon.cli import main
 from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field, generate

@@ -1,0 +1,1 @@
+"""Measurements and devices that tests and benchmarks share."""

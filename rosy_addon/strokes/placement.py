@@ -250,12 +250,17 @@ class StreamlinePlacer:
     def seed_neighbors(self) -> int:
         """Start strokes beside existing ones, and return how many.
 
-        Each side of a stroke has at most one growing child at a time.
+        Each side of a stroke has at most one growing child at a time. Only strokes that have reached
+        the minimum length have children. They are never dropped under the same rules, and every call
+        closes at least one of their open sides. Strokes of this length keep their separation, so a
+        surface has room for finitely many, and seeding ends. Strokes that are dropped later could
+        take turns with their own children for ever.
         """
         samples, strokes = self.samples, self.strokes
         sample, side = samples.open_sides()
         stroke = samples.stroke[sample]
         ready = strokes.active_children[stroke, side] == 0
+        ready &= strokes.length(stroke) >= self.rules.min_length * strokes.spacing[stroke]
         ready &= strokes.is_clear_of_tips(
             stroke, samples.arc[sample], PARENT_LEAD * samples.spacing[sample]
         )

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import icosphere, moved, plane
+from shapes import from_triangles, icosphere, moved, plane
 
 from rosy_addon.compositor.shading import KEY_LIGHT, Light
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.field.surface import build_surface
+from rosy_addon.projection.camera import (
+    look_at,
+    orbit_camera,
+    orthographic_camera,
+    perspective_camera,
+)
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.strokes.pipeline import (
     draw_instances,
+    draw_instances_task,
     offset_toward_camera,
     simplify_strokes,
     stroke_geometry,
@@ -165,6 +172,21 @@ def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
     assert np.linalg.norm(offset_points, axis=1).min() > 1 and len(hidden.strokes) > len(
         drawing.strokes
     )
+
+
+def test_seeding_ends_where_all_strokes_are_short():
+    """Short strokes seeded each other in turn for ever on faces of a few spacings."""
+    surface = from_triangles(
+        [(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)],
+        [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)],
+    )
+    surface = build_surface(
+        surface.vertices, surface.corner_vertex, surface.face_start, sharp_angle=0.5
+    )
+    instance = MeshInstance(surface, IDENTITY, generate(surface, "smoothest", 6))
+    camera = orbit_camera(surface, 45, 20, 150, 100)
+    task = draw_instances_task([instance], camera, StrokeStyle(curvature=0.5, hidden=True))
+    assert sum(1 for _ in zip(range(400), task, strict=False)) < 300
 
 
 @pytest.mark.slow

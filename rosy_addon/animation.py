@@ -1,9 +1,10 @@
 """The main job over a range of frames: read, draw and write each frame that is not up to date.
 
-The picture of a frame is a file in a folder. A sidecar file next to it holds a hash of everything
-that the picture was drawn from: the look, the camera, the meshes and fields, and the lights. A
-frame is up to date if the picture exists and the hash is equal. So an interrupted job continues
-where it stopped, and after a change only the affected frames are drawn. Both files are written under
+The picture of a frame is a file in a folder. A sidecar file next to it holds two hashes: of
+everything that the picture was drawn from (the look, the camera, the meshes and fields, and the
+lights), and of the bytes of the picture. A frame is up to date if both are equal. So an interrupted
+job continues where it stopped, after a change only the affected frames are drawn, and damaged
+pictures are drawn again. Both files are written under
 a temporary name and renamed, and equal inputs give equal bytes. Two processes may therefore share
 one folder; at worst they draw a frame twice.
 """
@@ -14,13 +15,15 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
+import numpy as np
 
 from .cache import Cache, content_hash
 from .compositor.look import Look
 from .errors import RosyError
-from .file_io import read_bytes, write_bytes
+from .file_io import check_writable, read_bytes, write_bytes
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
@@ -28,6 +31,7 @@ from .render.renderer import Renderer
 from .render.view_input import ViewInput
 from .scene.blender_images import check_folder, frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
+from .scene.file_names import picture_stem
 from .scene.look_properties import read_look
 from .scene.pictures import (
     ImageSequence,
@@ -43,7 +47,7 @@ from .scene.scene_reader import SceneData, field_objects, temp_attributes
 SIDECAR_SUFFIX = ".rosy.txt"
 
 #: First line of a sidecar file. It changes when pictures are drawn differently.
-SIDECAR_HEADER = "rosy frame 1"
+SIDECAR_HEADER = "rosy frame 2"
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,8 @@ def bake_animation_task(
                 start_time = time.monotonic()
         sequence_results = []
         for name, camera in sequence_cameras.items():
-            path = frame_path(settings.folder, name, frames[0], settings.as_float)
+            stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
+            path = frame_path(stem, frames[0], settings.as_float)
             sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
             if show:
                 apply_sequence(scene, scene_data, sequence, camera, settings)
@@ -204,19 +209,30 @@ def _frame_task(
     for index, view in enumerate(scene_views.views):
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
-        path = frame_path(settings.folder, name, frame, settings.as_float)
+        stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
+        path = frame_path(stem, frame, settings.as_float)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
         input_hash = _input_hash(view, renderer, settings)
-        sidecar_bytes = f"{SIDECAR_HEADER}\n{input_hash.hex()}\n".encode()
-        up_to_date = path.is_file() and sidecar.is_file() and read_bytes(sidecar) == sidecar_bytes
+        up_to_date = (
+            path.is_file()
+            and sidecar.is_file()
+            and read_bytes(sidecar) == _sidecar_text(input_hash, path)
+        )
         if not up_to_date:
+            check_writable(sidecar)
             picture = yield from subtask(renderer.render_task(view), start, stop)
             sidecar.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
-            write_bytes(sidecar, sidecar_bytes)
+            write_bytes(sidecar, _sidecar_text(input_hash, path))
         results[name] = view.camera, up_to_date
     cache.evict_unused()
     return scene_views.scene_data, results
+
+
+def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
+    """Return the contents of the sidecar file of a picture that is in a file."""
+    picture_hash = content_hash(np.frombuffer(read_bytes(path), dtype=np.uint8))
+    return f"{SIDECAR_HEADER}\n{input_hash.hex()}\n{picture_hash.hex()}\n".encode()
 
 
 def _input_hash(view: ViewInput, renderer: Renderer, settings: OutputSettings) -> bytes:

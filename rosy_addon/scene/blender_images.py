@@ -23,19 +23,19 @@ NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
 
 
 def new_image(
-    name: str, picture: Picture, *, as_float: bool = False, folder: Path | None = None
+    name: str, picture: Picture, *, as_float: bool = False, stem: Path | None = None
 ) -> bpy.types.Image:
     """Create a Blender image from a picture.
 
     Parameters
     ----------
     name : str
-        Name of the datablock, and of the file if the image is saved.
+        Name of the datablock.
     picture : Picture
     as_float : bool
         Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
-    folder : Path, optional
-        Folder to save the image in. By default it is packed into the .blend file.
+    stem : Path, optional
+        Path to save the image at, without the suffix. By default it is packed into the .blend file.
 
     Raises
     ------
@@ -52,10 +52,10 @@ def new_image(
             rgba[..., :3] = to_display(rgba[..., :3])
         image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
         image.update()
-        if folder is None:
+        if stem is None:
             image.pack()
         else:
-            _save_image(image, picture, folder / bpy.path.clean_name(name))
+            _save_image(image, picture, stem)
     except BaseException:
         bpy.data.images.remove(image)
         raise
@@ -125,10 +125,9 @@ def check_folder(folder: Path) -> None:
     check_writable(folder / "picture.png")
 
 
-def frame_path(folder: Path, name: str, frame: int, as_float: bool) -> Path:
+def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
     """Return the path of one frame of an image sequence, numbered as Blender expects it."""
-    stem = bpy.path.clean_name(f"RoSy {name}")
-    return folder / f"{stem}_{frame:04d}{'.exr' if as_float else '.png'}"
+    return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
 
 
 def write_frame(path: Path, picture: Picture, as_float: bool) -> None:

@@ -24,6 +24,7 @@ from ..projection.camera import Camera
 from .bake_records import store_record
 from .blender_images import check_folder, load_sequence, new_image
 from .compat import is_editable
+from .file_names import picture_stem
 from .owned_data import OWNED_TAG, rollback_on_error
 from .picture_nodes import new_group, new_material, set_picture_modifier, set_sequence_frames
 from .scene_reader import SceneData
@@ -212,7 +213,7 @@ def apply_picture(
             f"RoSy {name}",
             rendered_view.picture,
             as_float=settings.as_float,
-            folder=settings.folder,
+            stem=None if settings.folder is None else settings.folder / picture_stem(name),
         )
         created.append(image)
         material = new_material(

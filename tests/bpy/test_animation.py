@@ -22,7 +22,7 @@ from rosy.rosy_addon.gpu.select import select_renderer
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.pictures import OutputSettings
-from scenes import contents, link, pixels, render
+from scenes import add_camera, contents, link, pixels, render
 
 ROOT = Path(__file__).parents[2]
 
@@ -90,6 +90,46 @@ def test_frames_that_are_up_to_date_are_skipped(moving, tmp_path):
     moving.rosy.look.gain = 2.5
     bake_animation(moving, range(1, 6), settings=settings)
     assert {**frames_of(tmp_path), **before} == frames_of(tmp_path)
+
+
+def test_damaged_frames_are_drawn_again(moving, tmp_path):
+    settings = OutputSettings(folder=tmp_path)
+    bake_animation(moving, range(1, 6), settings=settings)
+    whole = frames_of(tmp_path)
+    first, second, third, fourth, _ = (tmp_path / name for name in whole)
+    first.write_bytes(b"")
+    second.write_bytes(second.read_bytes()[:-1])
+    third.write_bytes(b"garbage")
+    fourth.write_bytes(first.with_name("RoSy_Scene_0005.png").read_bytes())
+    (again,) = bake_animation(moving, range(1, 6), settings=settings)
+    assert again.rendered == (1, 2, 3, 4) and again.skipped == (5,)
+    assert frames_of(tmp_path) == whole
+
+
+def test_a_folder_in_place_of_a_sidecar_file_is_named(moving, tmp_path):
+    (tmp_path / "RoSy_Scene_0001.png.rosy.txt").mkdir()
+    with pytest.raises(RosyError, match=r"frame 1: .*RoSy_Scene_0001.png.rosy.txt: .* folder"):
+        bake_animation(moving, [1], settings=OutputSettings(folder=tmp_path))
+
+
+def test_cameras_and_scenes_have_files_of_their_own(moving, tmp_path):
+    """Names that differ only in characters that file systems change, or in case."""
+    moving.name = "Cam A"
+    names = ["Cam.A", "Cam A", "Cam_A", "cam.a"]
+    cameras = [add_camera(name, (0.0, -5.0, 0.2 * i)) for i, name in enumerate(names)]
+    settings = OutputSettings(folder=tmp_path)
+    for sources in (cameras, None):
+        results = bake_animation(moving, [1], cameras=sources, settings=settings)
+        assert all(result.rendered == (1,) for result in results)
+    files = frames_of(tmp_path)
+    assert len({name.casefold() for name in files}) == 5 and "RoSy_Cam_A_0001.png" in files
+    # One camera alone has the same file as among others.
+    (again,) = bake_animation(moving, [1], cameras=cameras[:1], settings=settings)
+    assert again.skipped == (1,)
+    stills = tmp_path / "stills"
+    for camera in cameras:
+        bake(moving, cameras=[camera], settings=OutputSettings(folder=stills))
+    assert len({path.name.casefold() for path in stills.iterdir()}) == 4
 
 
 def test_only_affected_frames_are_drawn_again(moving, tmp_path):

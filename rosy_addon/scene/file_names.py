@@ -1,0 +1,32 @@
+"""Names of the files of pictures, a different one for each camera and scene."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Literal
+
+import bpy
+
+
+def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
+    """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
+
+    Characters that file systems do not allow become underscores. If cameras or scenes would then
+    have the same file, also where file systems ignore case, one of them has the plain name, and the
+    stems of the others end in a hash. Which one depends only on the names in the .blend file, so
+    several processes agree.
+    """
+    siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
+    siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
+    siblings.add((kind, name))
+    stem = _clean_stem(name)
+    rivals = [key for key in siblings if _clean_stem(key[1]).casefold() == stem.casefold()]
+    first = min(rivals, key=lambda key: (_clean_stem(key[1]) != f"RoSy_{key[1]}", key))
+    if (kind, name) == first:
+        return stem
+    return f"{stem}-{zlib.crc32(f'{kind} {name}'.encode()):08x}"
+
+
+def _clean_stem(name: str) -> str:
+    """Return the stem with underscores for characters that are not allowed."""
+    return bpy.path.clean_name(f"RoSy {name}")

@@ -68,7 +68,7 @@ def turntable_views(
     ------
     ViewInput
     """
-    hull = _swept_hull(instance.world_points())
+    hull = _swept_hull(instance.face_points())
     for index in range(count):
         azimuth = view_angles[0] + 360 * index / count
         camera = orbit_camera(hull, azimuth, view_angles[1], *size, perspective=perspective)

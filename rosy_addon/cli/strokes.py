@@ -75,7 +75,7 @@ def run_strokes(options: argparse.Namespace) -> None:
     instance = mesh_instance(surface, field, up_axis(options))
     size = requested_size(options)
     camera = orbit_camera(
-        instance.world_points(), *options.view, *size, perspective=not options.ortho
+        instance.face_points(), *options.view, *size, perspective=not options.ortho
     )
     drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
     write_svg(options.output, drawing.strokes, camera, pen)

@@ -16,7 +16,7 @@ def euler_characteristic(surface: Surface) -> int:
     Vertices without a face are not counted.
     """
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    used = len(np.unique(surface.corner_vertex))
+    used = len(surface.used_vertices)
     return used - len(edges.face_count) + surface.face_count
 
 

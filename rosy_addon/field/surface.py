@@ -66,15 +66,20 @@ class Surface:
 
     @cached_property
     def extent(self) -> float:
-        """The longest side of the bounding box, in Blender units."""
-        return float(np.ptp(self.vertices, axis=0).max())
+        """The longest side of the bounding box, in Blender units; see `box_corners`."""
+        return float(np.ptp(self.box_corners, axis=0).max())
+
+    @cached_property
+    def used_vertices(self) -> np.ndarray:
+        """(n,) intp: the vertices that have a face, in ascending order."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.corner_vertex] = True
+        return np.flatnonzero(used)
 
     @cached_property
     def box_corners(self) -> np.ndarray:
         """(8, 3) float64: corners of the bounding box; vertices without a face are ignored."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.corner_vertex] = True
-        points = self.vertices[used]
+        points = self.vertices[self.used_vertices]
         limits = np.stack([points.min(axis=0), points.max(axis=0)])
         selector = np.indices((2, 2, 2)).reshape(3, 8)
         return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)

@@ -455,7 +455,7 @@ def _framed_points(targets: Surface | np.ndarray | Sequence[Surface | np.ndarray
     if isinstance(targets, Surface) or (isinstance(targets, np.ndarray) and targets.ndim == 2):
         targets = [targets]
     points = [
-        target.vertices[np.unique(target.corner_vertex)]
+        target.vertices[target.used_vertices]
         if isinstance(target, Surface)
         else np.asarray(target, dtype=np.float64).reshape(-1, 3)
         for target in targets

@@ -40,6 +40,10 @@ class MeshInstance:
         matrix = np.asarray(self.matrix, dtype=np.float64)
         return self.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
 
+    def face_points(self) -> np.ndarray:
+        """Return the (n, 3) float64 vertices that have a face, in world space."""
+        return self.world_points()[self.surface.used_vertices]
+
 
 @dataclass(frozen=True, eq=False)
 class GBuffer:

@@ -72,7 +72,7 @@ def mesh_view(
         If the look uses the lights of a scene, or the size or the angles are impossible.
     """
     check_light(look.light, instance.surface.name)
-    camera = orbit_camera(instance.world_points(), *view_angles, *size, perspective=perspective)
+    camera = orbit_camera(instance.face_points(), *view_angles, *size, perspective=perspective)
     reference = None
     if reference_luminance is not None:
         reference = ReferenceRender(reference_luminance, camera, reference_name)

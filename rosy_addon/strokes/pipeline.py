@@ -224,13 +224,13 @@ def _vertex_spacing(instance: MeshInstance, camera: Camera, style: StrokeStyle) 
     spacing = spacing_by_foreshortening(
         instance, camera, pixel_spacing(instance, camera, style.spacing)
     )
-    points = instance.world_points()
-    pixels, _ = project_to_pixels(points, camera)
-    inside = in_frame(pixels, camera)
     if not camera.is_perspective:
         return spacing
+    points = instance.face_points()
+    pixels, _ = project_to_pixels(points, camera)
+    inside = in_frame(pixels, camera)
     if inside.any():
-        return np.maximum(spacing, spacing[inside].min())
+        return np.maximum(spacing, spacing[instance.surface.used_vertices[inside]].min())
     mean_pixel_size = (
         float(np.linalg.norm(points - camera.eye, axis=1).mean()) / camera.pixels_per_unit
     )
@@ -241,9 +241,10 @@ def _vertex_spacing(instance: MeshInstance, camera: Camera, style: StrokeStyle) 
 def _is_in_view(instance: MeshInstance, camera: Camera) -> bool:
     """Return whether an instance may be in view.
 
-    It is not if all its vertices are outside one plane of the view frustum. The far plane is not
-    tested."""
-    points = instance.world_points()
+    It is not if all vertices of its faces are outside one plane of the view frustum. The far plane
+    is not tested.
+    """
+    points = instance.face_points()
     matrix = camera.projection @ camera.view
     clip = points @ matrix[:, :3].T + matrix[:, 3]
     outside = np.abs(clip[:, :2]) > clip[:, 3:]

@@ -13,7 +13,7 @@ import zlib
 import numpy as np
 import pytest
 from conftest import ROOT, long
-from shapes import icosphere, torus
+from shapes import cube, icosphere, torus
 
 from rosy_addon.cli import main
 from rosy_addon.color import to_linear
@@ -486,3 +486,24 @@ def test_a_transferred_field_is_reported(sphere, tmp_path):
                 "--field-mesh", sphere)  # fmt: skip
     assert done.returncode == 0
     assert "transferred by position from sphere.off" in done.stderr
+
+
+def test_unused_vertices_change_nothing(tmp_path):
+    """Neither the frame nor what is relative to the size of the mesh."""
+    surface = cube()
+    quads = surface.corner_vertex.reshape(-1, 4)
+    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in surface.vertices)
+    obj += "".join(f"f {a + 1} {b + 1} {c + 1} {d + 1}\n" for a, b, c, d in quads)
+    (tmp_path / "cube.obj").write_text(obj)
+    (tmp_path / "stray").mkdir()
+    (tmp_path / "stray" / "cube.obj").write_text(obj + "v 1e6 0 0\n")
+    for verb, suffix, *words in (
+        ("render", "png", "--generate", "curvature", "--size", "48x48"),
+        ("strokes", "svg", "--generate", "smoothest", "--size", "200x200"),
+        ("turntable", "gif", "--generate", "axis", "--size", "32x32", "--pictures", "2"),
+    ):
+        outputs = [folder / f"out.{suffix}" for folder in (tmp_path, tmp_path / "stray")]
+        for out in outputs:
+            words = ["--degree", "4", *words]
+            assert main([verb, str(out.with_name("cube.obj")), "-o", str(out), *words]) == 0
+        assert outputs[0].read_bytes() == outputs[1].read_bytes(), verb

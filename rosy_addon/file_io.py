@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
+import stat
 from pathlib import Path
 
 from .errors import RosyError
@@ -29,6 +30,8 @@ def read_bytes(
         binary and `reject_binary` is set.
     """
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
+            raise RosyError(f"{path}: cannot be read: it is not a regular file")
         with open(path, "rb") as file:
             head = file.read(4096)
             if reject_binary and b"\0" in head:
@@ -46,29 +49,28 @@ def read_bytes(
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a file atomically: a reader finds either the old contents or all of the new.
 
-    The data is written to a temporary file in the same folder, which then replaces the target. The
-    permissions of an existing file are kept.
+    The data is written to a temporary file in the same folder, which then replaces the target. Links
+    are followed. The permissions of an existing file are kept.
 
     Raises
     ------
     RosyError
         If the folder is missing, or the file cannot be written. An existing file stays unchanged.
     """
-    target = Path(path)
-    temporary = None
+    check_writable(path)
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".rosy-{secrets.token_hex(8)}")
     try:
-        check_writable(target)
-        descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-        with os.fdopen(descriptor, "wb") as file:
+        with open(temporary, "xb") as file:
             file.write(data)
-        os.chmod(temporary, _file_permissions(target))
+        if target.exists():
+            os.chmod(temporary, target.stat().st_mode & 0o777)
         os.replace(temporary, target)
-    except (OSError, ValueError) as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, RosyError):
-            raise
-        raise RosyError(f"{path}: cannot be written: {_error_text(error)}") from error
+    except BaseException as error:  # an interrupt as well
+        temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise RosyError(f"{path}: cannot be written: {_error_text(error)}") from error
+        raise
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -77,26 +79,24 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     Raises
     ------
     RosyError
-        If the path is a folder, its folder is missing, or the folder or the file is not writable.
+        If the path is a folder, a device or anything else but a regular file, its name is too long,
+        its folder is missing, or the folder or the file is not writable.
     """
-    target = Path(path)
-    if target.is_dir():
-        raise RosyError(f"{path}: cannot be written: it is a folder")
-    if not target.parent.is_dir():
-        raise RosyError(f"{path}: cannot be written: the folder {target.parent} does not exist")
-    if not os.access(target.parent, os.W_OK) or (
-        target.exists() and not os.access(target, os.W_OK)
-    ):
-        raise RosyError(f"{path}: cannot be written: permission denied")
-
-
-def _file_permissions(target: Path) -> int:
-    """Return the permission bits of an existing file, or those of a new file by the umask."""
-    if target.exists():
-        return target.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
+    try:
+        target = Path(os.path.realpath(path))
+        folder = (target if Path(path).is_symlink() else Path(path)).parent
+        if target.is_dir():
+            raise RosyError(f"{path}: cannot be written: it is a folder")
+        if target.exists() and not target.is_file():
+            raise RosyError(f"{path}: cannot be written: it is not a regular file")
+        if not folder.is_dir():
+            raise RosyError(f"{path}: cannot be written: the folder {folder} does not exist")
+        if not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
+            raise RosyError(f"{path}: cannot be written: permission denied")
+    except RosyError:
+        raise
+    except (OSError, ValueError) as error:
+        raise RosyError(f"{path}: cannot be written: {_error_text(error)}") from error
 
 
 def _error_text(error: OSError | ValueError) -> str:

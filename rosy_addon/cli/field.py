@@ -18,9 +18,8 @@ from ..field.generate import MAGNITUDES
 from ..field.rosy_field import RosyField
 from ..field.singularities import euler_characteristic, find_singularities
 from ..field.surface import Surface
-from ..file_io import check_writable
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand, float_between
+from .options import add_subcommand, check_output, float_between
 
 
 def add_field_command(subparsers: Any) -> None:
@@ -57,7 +56,7 @@ def add_field_command(subparsers: Any) -> None:
 
 def run_field(options: argparse.Namespace) -> None:
     """Write a field file: generate a field, or convert the format, degree or vectors of one."""
-    check_writable(options.output)
+    check_output(options)
     surface, field = load_mesh_and_field(options)
     angle = np.radians(options.turn)
     conversion = Conversion(options.to_degree, angle, options.smooth, options.magnitude)

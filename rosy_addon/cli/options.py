@@ -3,12 +3,34 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from ..errors import RosyError
+from ..file_io import check_writable
+
+
+def check_output(options: argparse.Namespace) -> None:
+    """Check the option -o, before a long task computes its contents.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written, or another option names it as an input.
+    """
+    check_writable(options.output)
+    if not os.path.exists(options.output):
+        return
+    for name, value in vars(options).items():
+        for path in value if isinstance(value, list) else [value]:
+            is_path = name != "output" and isinstance(path, (str, os.PathLike))
+            if is_path and os.path.exists(path) and os.path.samefile(path, options.output):
+                raise RosyError(f"{options.output}: is also an input: choose another output file")
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -10,7 +10,6 @@ from typing import Any
 from ..cache import Cache
 from ..color import luminance
 from ..errors import RosyError
-from ..file_io import check_writable
 from ..image_io.png import read_png, write_png
 from ..progress import run_to_completion
 from ..render.cpu import CpuRenderer
@@ -24,7 +23,7 @@ from .look import (
     mesh_file_look,
 )
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand
+from .options import add_subcommand, check_output
 from .view import (
     DEFAULT_SIZE,
     DEFAULT_VIDEO_SIZE,
@@ -52,7 +51,7 @@ def add_render_command(subparsers: Any) -> None:
 
 def run_render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file as a picture."""
-    check_writable(options.output)
+    check_output(options)
     look = mesh_file_look(options)
     surface, field = load_mesh_and_field(options)
     size = requested_size(options)
@@ -95,7 +94,7 @@ def add_turntable_command(subparsers: Any) -> None:
 
 def run_turntable(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file from all sides, as a video."""
-    check_writable(options.output)
+    check_output(options)
     check_video_path(options.output)
     if options.pictures < 2 or not options.rate > 0:
         raise RosyError("a turntable needs 2 or more --pictures, and a --rate above 0")

@@ -10,7 +10,6 @@ from typing import Any
 
 from ..compositor.shading import lights_of
 from ..errors import RosyError
-from ..file_io import check_writable
 from ..frame_workers import parse_frames
 from ..projection.camera import orbit_camera
 from ..render.mesh_view import check_light, mesh_instance
@@ -18,7 +17,7 @@ from ..strokes.pipeline import draw_instances
 from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen, write_svg
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand
+from .options import add_subcommand, check_output
 from .scene import find_camera, open_scene
 from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
 from .view import DEFAULT_VIEW, add_view_options, requested_size, up_axis
@@ -61,7 +60,7 @@ def run_strokes(options: argparse.Namespace) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file."""
     if options.output.suffix.lower() != ".svg":
         raise RosyError(f"{options.output}: the name of the file must end in .svg")
-    check_writable(options.output)
+    check_output(options)
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":

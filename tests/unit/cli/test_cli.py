@@ -331,7 +331,8 @@ def test_field_converts(sphere, tmp_path):
     assert done.returncode == 0, done.stderr
     facts = facts_of(sphere, converted)
     assert facts["degree"] == 8 and np.allclose(facts["magnitude"], 1)
-    assert_refused(rosy("field", sphere, made, "-o", made, "--to-degree", 3), "neither a multiple")
+    done = rosy("field", sphere, made, "-o", converted, "--to-degree", 3)
+    assert_refused(done, "neither a multiple")
 
 
 @pytest.mark.slow
@@ -488,14 +489,19 @@ def test_a_transferred_field_is_reported(sphere, tmp_path):
     assert "transferred by position from sphere.off" in done.stderr
 
 
+def write_cube(path):
+    """Write a cube as an .obj file, and return its path."""
+    surface = cube()
+    quads = surface.corner_vertex.reshape(-1, 4) + 1
+    rows = [f"v {x} {y} {z}\n" for x, y, z in surface.vertices]
+    path.write_text("".join(rows + [f"f {a} {b} {c} {d}\n" for a, b, c, d in quads]))
+    return path
+
+
 def test_unused_vertices_change_nothing(tmp_path):
     """Neither the frame nor what is relative to the size of the mesh."""
-    surface = cube()
-    quads = surface.corner_vertex.reshape(-1, 4)
-    obj = "".join(f"v {x} {y} {z}\n" for x, y, z in surface.vertices)
-    obj += "".join(f"f {a + 1} {b + 1} {c + 1} {d + 1}\n" for a, b, c, d in quads)
-    (tmp_path / "cube.obj").write_text(obj)
     (tmp_path / "stray").mkdir()
+    obj = write_cube(tmp_path / "cube.obj").read_text()
     (tmp_path / "stray" / "cube.obj").write_text(obj + "v 1e6 0 0\n")
     for verb, suffix, *words in (
         ("render", "png", "--generate", "curvature", "--size", "48x48"),
@@ -507,3 +513,33 @@ def test_unused_vertices_change_nothing(tmp_path):
             words = ["--degree", "4", *words]
             assert main([verb, str(out.with_name("cube.obj")), "-o", str(out), *words]) == 0
         assert outputs[0].read_bytes() == outputs[1].read_bytes(), verb
+
+
+def test_outputs_replace_only_regular_files(tmp_path, capsys):
+    mesh, link, elsewhere = (
+        write_cube(tmp_path / "cube.obj"),
+        tmp_path / "link.png",
+        tmp_path / "to",
+    )
+    os.mkfifo(tmp_path / "pipe.png")
+    elsewhere.mkdir()
+    link.symlink_to(elsewhere / "real.png")
+    render = ["render", "--generate", "axis", "--size", "16x16"]
+    for words, message in (
+        ([*render, str(mesh), "-o", "/dev/null"], "/dev/null: cannot be written: it is not a reg"),
+        ([*render, str(mesh), "-o", str(tmp_path / "pipe.png")], "not a regular file"),
+        ([*render, str(tmp_path / "pipe.png"), "-o", str(tmp_path / "a.png")], "pipe.png"),
+        ([*render, str(mesh), "-o", str(mesh)], "cube.obj: is also an input"),
+        (["field", str(mesh), "-o", str(mesh)], "cube.obj: is also an input"),
+        ([*render, str(mesh), "-o", str(tmp_path / ("a" * 252 + ".png"))], "file name too long"),
+    ):
+        before = mesh.read_bytes()
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1
+        assert mesh.read_bytes() == before
+    longest = tmp_path / ("a" * 251 + ".png")
+    for output in (link, longest):
+        assert main([*render, str(mesh), "-o", str(output)]) == 0
+    assert link.is_symlink() and (elsewhere / "real.png").read_bytes() == longest.read_bytes()
+    assert not list(tmp_path.glob(".*")) and not list(elsewhere.glob(".*"))

@@ -2,6 +2,11 @@
 
 import sys
 
-from .cli import main
+try:
+    from .cli import main
 
-sys.exit(main(sys.argv[1:], prog="python -m rosy_addon"))
+    status = main(sys.argv[1:], prog="python -m rosy_addon")
+except KeyboardInterrupt:  # while modules are imported
+    print("rosy: stopped", file=sys.stderr)
+    status = 130
+sys.exit(status)

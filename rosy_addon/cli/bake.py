@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from .bake_workers import run_workers, uses_workers
 from .look import add_look_options, requested_look
 from .options import add_subcommand, parse_size
 from .scene import open_scene, requested_cameras
+from .streams import print_error, print_line
 
 
 def add_bake_command(subparsers: Any) -> None:
@@ -102,12 +102,12 @@ def run_bake(options: argparse.Namespace) -> None:
         settings=settings,
     )
     for note in dict.fromkeys(note for result in results for note in result.warnings):
-        print(f"rosy: {note}", file=sys.stderr)
+        print_error(note)
     for result in results:
         location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
-        print(f"{result.camera}: {location}")
+        print_line(f"{result.camera}: {location}")
     if options.save:
-        print(save_blend())
+        print_line(save_blend())
 
 
 def _check_bake_options(options: argparse.Namespace) -> None:
@@ -146,10 +146,10 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
     )
     for result in _run_with_log(task):
         if result.skipped:
-            print(f"{len(result.skipped)} frames of {result.camera} are up to date")
-        print(f"{result.camera}: {result.sequence.path}")
+            print_line(f"{len(result.skipped)} frames of {result.camera} are up to date")
+        print_line(f"{result.camera}: {result.sequence.path}")
     if options.save:
-        print(save_blend())
+        print_line(save_blend())
 
 
 def _run_with_log(task: Task[Any]) -> Any:
@@ -162,4 +162,4 @@ def _run_with_log(task: Task[Any]) -> Any:
             return done.value
         if progress.label != last_label and progress.label.startswith("frame "):
             last_label = progress.label
-            print(f"{progress.label} ({100 * progress.fraction:.0f} %)", flush=True)
+            print_line(f"{progress.label} ({100 * progress.fraction:.0f} %)")

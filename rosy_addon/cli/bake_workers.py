@@ -10,6 +10,7 @@ from ..errors import RosyError
 from ..frame_workers import parse_frames, run_dask, run_local, worker_command
 from ..presets.store import SHIPPED_FOLDER, find_preset_file
 from .presets import user_presets_folder
+from .streams import print_line
 
 
 def uses_workers(options: argparse.Namespace) -> bool:
@@ -38,7 +39,7 @@ def run_workers(options: argparse.Namespace) -> None:
         output_lines = run_local(command, frames, options.jobs)
     for line in output_lines:
         if line.startswith("frame "):
-            print(line, flush=True)
+            print_line(line)
 
 
 def _forwarded_args(options: argparse.Namespace) -> list[str]:

@@ -20,6 +20,7 @@ from ..field.singularities import euler_characteristic, find_singularities
 from ..field.surface import Surface
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_subcommand, check_output, float_between
+from .streams import print_line
 
 
 def add_field_command(subparsers: Any) -> None:
@@ -95,7 +96,7 @@ def run_info(options: argparse.Namespace) -> None:
     }
     if options.against is not None:
         facts["against"] = _compare(options, surface, field, vertex, index)
-    print(json.dumps(facts) if options.json else _format_info(facts))
+    print_line(json.dumps(facts) if options.json else _format_info(facts))
 
 
 def _compare(

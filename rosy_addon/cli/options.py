@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import re
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..file_io import check_writable
+from .streams import print_error
 
 
 def check_output(options: argparse.Namespace) -> None:
@@ -84,4 +84,4 @@ def add_subcommand(
 def print_note(text: str) -> None:
     """Print a note to the error stream, unless it is empty."""
     if text:
-        print(f"rosy: {text}", file=sys.stderr)
+        print_error(text)

@@ -6,19 +6,22 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 from ..errors import RosyError
 from .bake import add_bake_command
 from .field import add_field_command, add_info_command
 from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
+from .streams import discard_output, print_error, print_line
 from .strokes import add_strokes_command
 
 #: Options whose values may begin with a minus sign.
 NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")
 
-#: Exit statuses: success, an error in the user's input, interrupted by Ctrl-C.
-EXIT_OK, EXIT_USER_ERROR, EXIT_INTERRUPTED = 0, 2, 130
+#: Exit statuses: success, standard output failed, an error in the user's input, interrupted by
+#: Ctrl-C, and standard output was closed.
+EXIT_OK, EXIT_OUTPUT_ERROR, EXIT_USER_ERROR, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 0, 1, 2, 130, 141
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command rosy") -> int:
@@ -40,22 +43,39 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
     try:
         options = _build_parser(prog).parse_args(_join_negative_values(arguments))
         options.run(options)
+        sys.stdout.flush()
     except RosyError as error:
-        print(f"rosy: {error}", file=sys.stderr)
+        print_error(str(error))
+        return EXIT_USER_ERROR
+    except MemoryError:
+        print_error("there is not enough memory: choose a smaller size or a smaller mesh")
         return EXIT_USER_ERROR
     except KeyboardInterrupt:
-        print("rosy: stopped", file=sys.stderr)
+        print_error("stopped")
         return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of the output has ended
+        discard_output()
+        return EXIT_BROKEN_PIPE
+    except OSError as error:
+        where = error.filename or "standard output"
+        print_error(f"{where}: {(error.strerror or str(error)).lower()}")
+        discard_output()
+        return EXIT_OUTPUT_ERROR
     except SystemExit as exit_request:  # argparse: 0 after the help, 2 for a usage error
         return EXIT_OK if exit_request.code is None else int(exit_request.code)
     return EXIT_OK
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose messages are safe on any terminal."""
+
+    def _print_message(self, message: str, file: TextIO | None = None) -> None:
+        print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
+
+
 def _build_parser(prog: str) -> argparse.ArgumentParser:
     """Return the parser of all commands."""
-    parser = argparse.ArgumentParser(
-        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
-    )
+    parser = _Parser(prog=prog, description="Draw N-way rotational symmetry fields on meshes.")
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
     for add_command in (
         add_bake_command,

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import RosyError
 from ..presets.store import default_user_folder, preset_files, read_preset
 from .options import add_subcommand, print_note
+from .streams import print_line
 
 
 def add_presets_command(subparsers: Any) -> None:
@@ -31,12 +32,14 @@ def run_presets(options: argparse.Namespace) -> None:
         facts = {"preset": key, "name": preset.name, "description": preset.description}
         records.append(facts | {"own": path.parent == folder})
     if options.json:
-        print(json.dumps(records))
+        print_line(json.dumps(records))
         return
     width = max(len(record["preset"]) for record in records)
     for record in records:
-        print(f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}")
-    print(f"Your presets are in {folder}")
+        print_line(
+            f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}"
+        )
+    print_line(f"Your presets are in {folder}")
 
 
 def user_presets_folder() -> Path:

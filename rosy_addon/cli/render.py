@@ -24,6 +24,7 @@ from .look import (
 )
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_subcommand, check_output
+from .streams import print_line
 from .view import (
     DEFAULT_SIZE,
     DEFAULT_VIDEO_SIZE,
@@ -132,5 +133,5 @@ def _video_encoder(path: Path) -> Encoder | None:
 def _log_views(views: Iterator[ViewInput], count: int) -> Iterator[ViewInput]:
     """Yield the same views, and print a line before each is drawn."""
     for number, view in enumerate(views, 1):
-        print(f"picture {number} of {count}", flush=True)
+        print_line(f"picture {number} of {count}")
         yield view

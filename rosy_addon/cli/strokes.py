@@ -19,6 +19,7 @@ from ..strokes.svg import Pen, write_svg
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_subcommand, check_output
 from .scene import find_camera, open_scene
+from .streams import print_line
 from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
 from .view import DEFAULT_VIEW, add_view_options, requested_size, up_axis
 
@@ -132,7 +133,7 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
         pen=pen_of(options, read_pen(settings)),
         size=options.size,
     )
-    print(f"{result.camera}: {result.path}", flush=True)
+    print_line(f"{result.camera}: {result.path}")
 
 
 def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_kind: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -543,3 +544,41 @@ def test_outputs_replace_only_regular_files(tmp_path, capsys):
         assert main([*render, str(mesh), "-o", str(output)]) == 0
     assert link.is_symlink() and (elsewhere / "real.png").read_bytes() == longest.read_bytes()
     assert not list(tmp_path.glob(".*")) and not list(elsewhere.glob(".*"))
+
+
+@pytest.mark.slow
+def test_output_streams_that_fail(sphere):
+    command = [sys.executable, "-m", "rosy_addon", "info", str(sphere), "--generate", "axis"]
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    assert process.wait(60) == 141 and process.stderr.read() == b""
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, check=False)
+    assert (
+        done.returncode == 1 and done.stderr == b"rosy: standard output: no space left on device\n"
+    )
+    done = subprocess.run(
+        [*command[:3], "presets"],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "ROSY_PRESETS": "/caf\xe9"},
+        capture_output=True,
+        check=True,
+    )
+    assert b"/caf\\xe9" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("render", "a\x1b[31m.obj", "-o", "a.png"),
+        ("render", "a\nb\u202e.obj", "-o", "a.png"),
+        ("render", "a.obj", "-o", "a.png", "--set", "gain=\x07"),
+        ("render", "a.obj", "-o", "a.png", "--preset", "\x9b2J"),
+        ("\x1b]0;title\x07",),
+    ],
+)
+def test_control_characters_are_escaped(words, capsys):
+    assert main(words) == 2
+    error = capsys.readouterr().err.removesuffix("\n")
+    assert error and not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f\u202e]", error)
+    assert "\n" not in error or error.startswith("usage:")

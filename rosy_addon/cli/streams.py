@@ -1,0 +1,49 @@
+"""Output of the command line that is safe on any terminal."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from typing import TextIO
+
+#: Characters that terminals act on: control characters except tab and newline, and those that
+#: change the direction of text. Names in files may contain them.
+UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def printable(text: str, encoding: str | None = None) -> str:
+    """Return a text with escapes, such as ``\\x1b``, for what a terminal acts on or cannot encode.
+
+    Parameters
+    ----------
+    text : str
+    encoding : str, optional
+        Of the terminal.
+
+    Examples
+    --------
+    >>> printable("a\\x1b[31mb")
+    'a\\\\x1b[31mb'
+    """
+    text = UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+    encoding = encoding or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def print_line(text: str, file: TextIO | None = None) -> None:
+    """Print a text, escaped by `printable`, to standard output or another stream, at once."""
+    file = sys.stdout if file is None else file
+    print(printable(text, getattr(file, "encoding", None)), file=file, flush=True)
+
+
+def print_error(text: str) -> None:
+    """Print one line to the error stream: the name of the program and a message."""
+    print_line("rosy: " + text.replace("\n", "\\n"), sys.stderr)
+
+
+def discard_output() -> None:
+    """Send standard output to nowhere, as what is left in its buffer cannot be written."""
+    descriptor = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(descriptor, sys.stdout.fileno())
+    os.close(descriptor)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import heapq
+
 import numpy as np
 
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
+
+#: Corners that are compared with a triangle at once.
+CHUNK_SIZE = 512
 
 
 def triangulate(
@@ -138,19 +143,105 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
     -------
     (k - 2, 3) int ndarray
         Indices of points.
+
+    Notes
+    -----
+    Candidates are in a heap by quality. A candidate that turns out to contain a corner cannot be an
+    ear before that corner is cut off, so it waits until then. The time is nearly linear in k unless
+    many corners are near each other along both axes.
     """
-    remaining = np.arange(len(points))
+    count = len(points)
+    previous = [count - 1, *range(count - 1)]
+    following = [*range(1, count), 0]
+    remaining = _RemainingCorners(points)
+    quality = _smallest_sine(points[previous], points, points[following])
+    # Entries of a corner are valid if they have its current version.
+    version = [0] * count
+    candidates = [(-value, corner, 0) for corner, value in enumerate(quality.tolist())]
+    heapq.heapify(candidates)
+    blocked: list[tuple[float, int, int]] = []
+    waiting: dict[int, list[tuple[float, int, int]]] = {}
     triangles = []
-    while len(remaining) > 3:
-        previous, following = np.roll(remaining, 1), np.roll(remaining, -1)
-        a, b, c = points[previous], points[remaining], points[following]
-        quality = _smallest_sine(a, b, c)
-        blocked = _contains_vertex(a, b, c, points[remaining])
+    while len(triangles) < count - 3:
         # A self-intersecting polygon may have no ear; then take the triangle of best quality.
-        ear = int(np.argmax(np.where(blocked, quality - 2, quality)))
-        triangles.append((previous[ear], remaining[ear], following[ear]))
-        remaining = np.delete(remaining, ear)
-    return np.array([*triangles, remaining])
+        is_candidate = bool(candidates)
+        entry = heapq.heappop(candidates if is_candidate else blocked)
+        _, corner, entry_version = entry
+        if entry_version != version[corner]:
+            continue
+        before, after = previous[corner], following[corner]
+        if is_candidate:
+            contained = remaining.first_inside(before, corner, after)
+            if contained is not None:
+                waiting.setdefault(contained, []).append(entry)
+                heapq.heappush(blocked, entry)
+                continue
+        triangles.append((before, corner, after))
+        version[corner] = -1
+        remaining.remove(corner)
+        following[before], previous[after] = after, before
+        for released in waiting.pop(corner, ()):
+            heapq.heappush(candidates, released)
+        ends = np.array([before, after])
+        quality = _smallest_sine(
+            points[[previous[before], before]], points[ends], points[[after, following[after]]]
+        )
+        for end, value in zip((before, after), quality.tolist(), strict=True):
+            version[end] += 1
+            heapq.heappush(candidates, (-value, end, version[end]))
+    last = next(corner for corner in range(count) if version[corner] >= 0)
+    return np.array([*triangles, sorted((previous[last], last, following[last]))])
+
+
+class _RemainingCorners:
+    """The corners of a polygon that are not cut off yet, sorted along both axes."""
+
+    def __init__(self, points: np.ndarray) -> None:
+        self._points = points
+        self._alive = np.ones(len(points), dtype=bool)
+        self._alive_count = len(points)
+        self._sort()
+
+    def _sort(self) -> None:
+        """Sort the remaining corners."""
+        corners = np.flatnonzero(self._alive)
+        self._order = [corners[np.argsort(self._points[corners, axis])] for axis in (0, 1)]
+        self._coordinate = [self._points[self._order[axis], axis] for axis in (0, 1)]
+
+    def remove(self, corner: int) -> None:
+        """Remove a corner that is cut off."""
+        self._alive[corner] = False
+        self._alive_count -= 1
+        if 2 * self._alive_count < len(self._order[0]):
+            self._sort()
+
+    def first_inside(self, a: int, b: int, c: int) -> int | None:
+        """Return a corner in or on the triangle of three corners, or None.
+
+        Corners with the position of one of the three do not count.
+        """
+        triangle = self._points[[a, b, c]]
+        low, high = triangle.min(axis=0), triangle.max(axis=0)
+        slices = []
+        for axis in (0, 1):
+            start = np.searchsorted(self._coordinate[axis], low[axis], "left")
+            stop = np.searchsorted(self._coordinate[axis], high[axis], "right")
+            slices.append(self._order[axis][start:stop])
+        nearby = min(slices, key=len)
+        # Most triangles that contain a corner contain one among the first.
+        for first in range(0, len(nearby), CHUNK_SIZE):
+            corners = nearby[first : first + CHUNK_SIZE]
+            corners = corners[self._alive[corners]]
+            points = self._points[corners]
+            inside = np.ones(len(corners), dtype=bool)
+            for start, stop in ((0, 1), (1, 2), (2, 0)):
+                offset = points - triangle[start]
+                inside &= _cross(triangle[stop] - triangle[start], offset) >= 0
+                inside &= (offset != 0).any(axis=1)
+            found = np.flatnonzero(inside)
+            if len(found):
+                return int(corners[found[0]])
+        return None
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -164,12 +255,3 @@ def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)
     return np.divide(area, scale, out=np.zeros_like(area), where=scale > 0)
-
-
-def _contains_vertex(a: np.ndarray, b: np.ndarray, c: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(k,) whether a point lies in or on each triangle; points at its corners do not count."""
-    contained = np.ones((len(a), len(points)), dtype=bool)
-    for start, stop in ((a, b), (b, c), (c, a)):
-        contained &= _cross((stop - start)[:, None], points[None] - start[:, None]) >= 0
-        contained &= (points[None] != start[:, None]).any(axis=2)
-    return contained.any(axis=1)

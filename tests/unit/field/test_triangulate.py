@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -98,6 +100,18 @@ def test_a_comb_and_a_spiral(turn):
         (0, 5),
     ]
     assert_filled(np.roll(spiral, turn, axis=0))
+
+
+@pytest.mark.slow
+def test_polygons_of_thousands_of_corners():
+    """Neither the time nor the memory may grow with the square of the corners."""
+    assert_filled(star(np.random.default_rng(1), 1000))
+    x = np.arange(2500)
+    teeth = np.stack([x[::-1], np.where(x % 2, 1.0, 0.1)], axis=1)
+    tracemalloc.start()
+    assert_filled(np.concatenate([[[2500, -1.0]], teeth, [[-1, -1.0]]]))
+    assert tracemalloc.get_traced_memory()[1] < 2e7
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize("turn", range(8))

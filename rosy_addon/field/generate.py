@@ -46,6 +46,9 @@ MAGNITUDES = {
     "curvature": "The larger principal curvature, multiplied by the size of the mesh",
 }
 
+#: Shorter projections of a unit axis are rounding errors: the face is perpendicular to the axis.
+MIN_PROJECTION = 1e-12
+
 #: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
 CURVATURE_SMOOTHING_ROUNDS = 2
 
@@ -243,7 +246,7 @@ def axis_field(
     direction = direction / length
     normal = surface.face_normal
     vectors = direction - (normal @ direction)[:, None] * normal
-    vectors[~normal.any(axis=1)] = 0.0
+    vectors[~normal.any(axis=1) | (np.linalg.norm(vectors, axis=1) < MIN_PROJECTION)] = 0.0
     return RosyField(degree, vectors)
 
 

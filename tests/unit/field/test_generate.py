@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shapes import cylinder, from_quads, icosphere, plane, torus
+from shapes import cylinder, from_quads, from_triangles, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
@@ -221,6 +221,14 @@ def test_an_axis_is_projected():
     normal = surface.face_normal
     assert np.abs(dot(field.vectors, normal)).max() < 1e-12
     assert np.allclose(field.magnitude, np.sqrt(1 - normal[:, 2] ** 2))
+
+
+def test_faces_perpendicular_to_an_axis_are_undefined():
+    """Also where the normal is rounded."""
+    points = [(0, 0, 0), (1, 0, 0.3), (0, 1, 0.7), (5, 0, 0), (6, 0, 1), (5, 1, 0)]
+    surface = from_triangles(points, [(0, 1, 2), (3, 4, 5)])
+    field = axis_field(surface, 4, (-0.3, -0.7, 1))
+    assert not field.vectors[0].any() and field.vectors[1].any()
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 0), (np.nan, 0, 1), (1, 2)])

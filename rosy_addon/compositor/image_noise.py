@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,10 @@ LATTICE_ANGLE = 0.5
 
 #: Standard deviation of the blur that the high pass subtracts, as a fraction of `Look.high_pass`.
 BLUR_FACTOR = 0.5
+
+#: Largest margin in pixels around the picture whose noise is computed for the high pass. Wider ones
+#: would take longer than the picture, and their mean hardly differs from `NOISE_MEAN`.
+MAX_MARGIN = 512
 
 #: Noise is computed for whole tiles of the picture. Side of a tile in pixels.
 TILE_PIXELS = 256
@@ -142,11 +147,13 @@ def _noise_tiles(
     high_pass: float,
 ) -> np.ndarray:
     """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
-    margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
+    full_margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
+    margin = min(full_margin, MAX_MARGIN)
     padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
     cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
     if high_pass:
-        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass)
+        outside = "edge" if margin == full_margin else "mean"
+        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
@@ -186,15 +193,18 @@ def box_radius(sigma: float) -> int:
     return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
 
 
-def gaussian_blur(image: np.ndarray, sigma: float) -> np.ndarray:
+def gaussian_blur(
+    image: np.ndarray, sigma: float, outside: Literal["edge", "mean"] = "edge"
+) -> np.ndarray:
     """Approximate a Gaussian blur by three box filters.
 
     Parameters
     ----------
     image : (H, W) ndarray
-        Its border pixels are repeated outside.
     sigma : float
         Standard deviation in pixels.
+    outside : {"edge", "mean"}
+        Values outside the image: its border pixels, repeated, or `NOISE_MEAN`.
 
     Returns
     -------
@@ -202,15 +212,16 @@ def gaussian_blur(image: np.ndarray, sigma: float) -> np.ndarray:
     """
     radius = box_radius(sigma)
     for axis in (0, 1, 0, 1, 0, 1):
-        image = _box_filter(image, radius, axis)
+        image = _box_filter(image, radius, axis, outside)
     return image
 
 
-def _box_filter(image: np.ndarray, radius: int, axis: int) -> np.ndarray:
-    """Mean over 2 * radius + 1 pixels along an axis. Border pixels are repeated outside."""
+def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.ndarray:
+    """Mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
     pads = [(0, 0), (0, 0)]
     pads[axis] = (radius + 1, radius)
-    prefix_sum = np.cumsum(np.pad(image, pads, mode="edge"), axis=axis, dtype=np.float64)
+    fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
+    prefix_sum = np.cumsum(np.pad(image, pads, **fill), axis=axis, dtype=np.float64)
     size, window = image.shape[axis], 2 * radius + 1
     after = prefix_sum.take(range(window, window + size), axis=axis)
     before = prefix_sum.take(range(size), axis=axis)

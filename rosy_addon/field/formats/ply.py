@@ -73,9 +73,8 @@ def read_ply(path: Path) -> Polygons:
     if not isinstance(corner_list, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
     corner_vertex, face_start = corner_list
-    out_of_range = ~(
-        (corner_vertex >= 0) & (corner_vertex < len(vertices)) & (corner_vertex % 1 == 0)
-    )
+    in_range = (corner_vertex >= 0) & (corner_vertex < len(vertices))
+    out_of_range = ~in_range | (np.where(in_range, corner_vertex, 0) % 1 != 0)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
         face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
@@ -137,16 +136,21 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
                 case ["format", name, _]:
                     byte_order = _BYTE_ORDERS[name]
                 case ["element", name, count]:
+                    _check_unique(path, line_number, "element", name, elements)
                     elements.append(_Element(name, _parse_count(count)))
                 case ["property", "list", count_type, kind, name]:
+                    _check_unique(path, line_number, "property", name, elements[-1].properties)
                     list_property = _Property(name, _DTYPES[kind], _DTYPES[count_type])
                     elements[-1].properties.append(list_property)
                 case ["property", kind, name]:
+                    _check_unique(path, line_number, "property", name, elements[-1].properties)
                     elements[-1].properties.append(_Property(name, _DTYPES[kind]))
                 case [] | ["ply"] | ["comment", *_] | ["obj_info", *_]:
                     pass
                 case _:
                     raise ValueError
+        except RosyError:
+            raise
         except (KeyError, IndexError, ValueError):
             found = abbreviate(line.strip().encode())
             raise RosyError(
@@ -155,6 +159,14 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
     if byte_order is None:
         raise RosyError(f"{path}: the header has no line 'format'")
     return byte_order, elements, end.end()
+
+
+def _check_unique(
+    path: Path, line_number: int, kind: str, name: str, earlier: list[_Element] | list[_Property]
+) -> None:
+    """Raise an error if an earlier element or property has the same name."""
+    if any(item.name == name for item in earlier):
+        raise RosyError(f"{path}:{line_number}: {kind} '{name}' is declared twice")
 
 
 def _parse_count(word: str) -> int:
@@ -192,7 +204,13 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
         count = np.ones(len(rows), dtype=np.int64)
         if prop.count_type is not None:
             _check_row_lengths(rows, element, position + 1, starts)
-            count = np.maximum(values[position], 0).astype(np.int64)
+            count_value = values[position]
+            in_range = (count_value >= 0) & (count_value <= len(values))
+            invalid = ~in_range | (np.where(in_range, count_value, 0) % 1 != 0)
+            if invalid.any():
+                row = int(np.argmax(invalid))
+                raise rows.error(row, f"expected the length of a list, found {count_value[row]:g}")
+            count = count_value.astype(np.int64)
             position = position + 1
         _check_row_lengths(rows, element, position + count, starts)
         list_starts = offsets_from_sizes(count)
@@ -232,6 +250,8 @@ def _binary_columns(
 
     If all rows have the same list lengths, the element is read as one structured array.
     """
+    if not element.properties:
+        return {}, offset
     lengths = _first_row_list_lengths(path, data, offset, byte_order, element)
     layout = _row_dtype(element, byte_order, lengths)
     if layout.itemsize * element.count <= len(data) - offset:
@@ -265,7 +285,10 @@ def _first_row_list_lengths(
             if offset + layout.itemsize > len(data):
                 raise _truncated(path, element, 0)
             row = np.frombuffer(data, layout, 1, offset)[0]
-            lengths[prop.name] = _list_length(path, element, 0, row[f"{prop.name} count"])
+            length = _list_length(path, element, 0, row[f"{prop.name} count"])
+            if layout.itemsize + length * np.dtype(prop.type).itemsize > len(data) - offset:
+                raise _truncated(path, element, 0)
+            lengths[prop.name] = length
     return lengths
 
 
@@ -328,7 +351,7 @@ def _ragged_columns(
 
 def _list_length(path: Path, element: _Element, row: int, length) -> int:
     """The count of a list as an int; raises an error if it is negative or not a whole number."""
-    if not (length >= 0 and length == int(length)):
+    if not (0 <= length < np.inf and length == int(length)):
         raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
     return int(length)
 

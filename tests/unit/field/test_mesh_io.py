@@ -74,6 +74,13 @@ PLY_BODY = """\
 """
 
 
+def ply_with_float_count(count: float) -> bytes:
+    """A binary file whose first face claims a list length that is a float."""
+    data = binary_ply("<").replace(b"list uchar int", b"list float int")
+    start = data.index(b"end_header\n") + 11 + 5 * 13
+    return data[:start] + struct.pack("<f", count) + data[start + 1 :]
+
+
 def binary_ply(order: str, faces=FACES) -> bytes:
     name = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
     header = PLY_HEADER.format(format=name).replace("face 2", f"face {len(faces)}")
@@ -210,6 +217,16 @@ DAMAGED = {
     "far.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"3 2 1 7"), "face 1 refers to vertex 7"),
     "claims.ply": (binary_ply("<").replace(b"vertex 5", b"vertex 190000000"), "declares 190000000 rows"),
     "faces.ply": (binary_ply("<").replace(b"face 2", b"face 500000000"), "declares 500000000 rows"),
+    "nan.ply": (ply_with_float_count(np.nan), "face 0 has a list of length nan"),
+    "inf.ply": (ply_with_float_count(np.inf), "face 0 has a list of length inf"),
+    "huge.ply": (ply_with_float_count(1e30), "declares 2 rows of element 'face', but ends after 0"),
+    "twice.ply": (FILES["a.ply"].replace(b"float y", b"float x"), "twice.ply:6: property 'x' is declared twice"),
+    "again.ply": (FILES["a.ply"].replace(b"edge 1", b"face 1"), "again.ply:12: element 'face' is declared"),
+    "many.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"nan 2 1 4"), "the length of a list, found nan"),
+    "half.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"2.5 2 1 4"), "the length of a list, found 2.5"),
+    "most.ply": (FILES["a.ply"].replace(b"3 2 1 4", b"1e300 2 1 4"), "the length of a list, found 1e+300"),
+    "void.ply": (binary_ply("<").replace(b"element edge", b"element none 99999999999999\nelement edge")[:-1],
+                 "declares 1 rows of element 'edge', but ends after 0"),
     "nomesh.ply": (PLY_HEADER.format(format="ascii").split("element face")[0].encode()
                    + b"end_header\n" + PLY_BODY[:50].encode(), "no faces"),
     "signal.ply": (binary_ply(">").replace(struct.pack(">f", 0.001), b"\x7f\x81\0\0"), "vertex 4 has"),

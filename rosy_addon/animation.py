@@ -219,7 +219,8 @@ def _frame_task(
             and read_bytes(sidecar) == _sidecar_text(input_hash, path)
         )
         if not up_to_date:
-            check_writable(sidecar)
+            if sidecar.exists():
+                check_writable(sidecar)
             picture = yield from subtask(renderer.render_task(view), start, stop)
             sidecar.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)

@@ -16,6 +16,9 @@ import numpy as np
 
 from ..progress import Progress, Task
 
+#: Relative increase of the diagonal of a matrix that is singular.
+SINGULAR_SHIFT = 1e-10
+
 #: Largest number of unknowns of the coarsest level; it is solved with a dense inverse.
 DIRECT_SOLVE_SIZE = 400
 
@@ -260,10 +263,19 @@ def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
 
 
 def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
-    """The inverse of a sparse matrix as a dense array."""
+    """The inverse of a sparse matrix as a dense array.
+
+    If the matrix is singular, its diagonal is enlarged a little. The inverse is a preconditioner, so
+    that changes the rate of convergence, not the solution.
+    """
     dense = np.zeros((len(matrix), len(matrix)), dtype=np.complex128)
     np.add.at(dense, (matrix.row_indices, matrix.indices), matrix.data)
-    return np.linalg.inv(dense)
+    try:
+        return np.linalg.inv(dense)
+    except np.linalg.LinAlgError:
+        # A component of tiny area has an eigenvalue that is lost in rounding.
+        np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * matrix.diagonal)
+        return np.linalg.inv(dense)
 
 
 def _smoothed_prolongation(

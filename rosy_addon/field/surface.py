@@ -12,6 +12,10 @@ from ..errors import RosyError
 from .frames import dot, normalize
 from .triangulate import triangulate
 
+#: Largest coordinate and smallest extent of a mesh. Beyond them, squares and products of lengths
+#: leave the range of floating-point numbers.
+MAX_COORDINATE, MIN_EXTENT = 1e12, 1e-12
+
 #: Largest difference, in each component, at which a corner normal equals the mean of its fan.
 NORMAL_TOLERANCE = 1e-6
 
@@ -167,8 +171,8 @@ def build_surface(
     Raises
     ------
     RosyError
-        If there is no face, a face has fewer than three corners, an index is out of range, or a
-        coordinate is not finite.
+        If there is no face, a face has fewer than three corners, an index is out of range, a
+        coordinate is not finite or above `MAX_COORDINATE`, or the mesh is smaller than `MIN_EXTENT`.
     """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
@@ -373,6 +377,17 @@ def _check_polygons(
         raise RosyError(
             f"{name}: vertex {int(np.argmin(finite))} has a coordinate that is not finite"
         )
+    far = (np.abs(vertices) > MAX_COORDINATE).any(axis=1)
+    if far.any():
+        raise RosyError(
+            f"{name}: vertex {int(np.argmax(far))} has a coordinate above {MAX_COORDINATE:g}: scale or "
+            "move the mesh"
+        )
+    used = np.zeros(len(vertices), dtype=bool)
+    used[corner_vertex] = True
+    points = vertices if used.all() else vertices[used]
+    if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
+        raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
 
 
 def _smooth_corner_pairs(

@@ -207,6 +207,8 @@ DAMAGED = {
     "only.off": (b"OFF\n", "ends before the numbers"),
     "minus.off": (b"OFF -1 2 0\n", "minus.off:1: expected the numbers"),
     "inf.off": (OFF.replace("1e-3", "inf").encode(), "inf.off:8: vertex 4"),
+    "large.obj": (OBJ.replace("1e-3", "1e100").encode(), "vertex 4 has a coordinate above 1e+12"),
+    "small.off": (b"OFF 3 1 0\n0 0 0\n1e-40 0 0\n0 1e-40 0\n3 0 1 2\n", "is smaller than 1e-12"),
     "truncated.ply": (binary_ply("<")[:-20], "declares 2 rows of element 'face', but ends after 1"),
     "cut.ply": (binary_ply(">")[:-80], "declares 5 rows of element 'vertex', but ends after"),
     "text.ply": (FILES["a.ply"][:-9], "text.ply:22: face 1 has 4 values, expected 5"),

@@ -286,3 +286,16 @@ def test_progress_never_decreases():
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1
     assert len(fractions) > 20
+
+
+def test_a_component_far_smaller_than_the_others():
+    ball = bumpy(icosphere(2))
+    tiny = np.array([[5, 5, 5], [5 + 1e-8, 5, 5], [5, 5 + 1e-8, 5]])
+    surface = build_surface(
+        np.concatenate([ball.vertices, tiny]),
+        np.concatenate([ball.corner_vertex, len(ball.vertices) + np.arange(3)]),
+        np.concatenate([ball.face_start, [ball.face_start[-1] + 3]]),
+    )
+    field, alone = smoothest_field(surface, 4), smoothest_field(ball, 4)
+    assert np.isfinite(field.vectors).all()
+    assert np.degrees(angle_differences(ball, field.vectors[:-1], alone.vectors, 4)).max() < 0.1

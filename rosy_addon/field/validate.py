@@ -40,8 +40,12 @@ VERTEX_TOLERANCE_DEG = 20.0
 #: faces whose normals are inaccurate.
 MAX_OUTLIER_FRACTION = 0.01
 
-#: Numbers of this modulus or more count as infinite, because the length of a vector would overflow.
-MAX_COMPONENT = 5e153
+#: Numbers of this modulus or more count as infinite. Products of the lengths of vectors would
+#: overflow, and pictures are computed in single precision.
+MAX_COMPONENT = 1e30
+
+#: Vectors whose components are all smaller count as zero, because products would underflow.
+MIN_COMPONENT = 1e-30
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
 #: rounding error of float32, which Blender stores, so such vectors survive a round trip through
@@ -294,6 +298,9 @@ def project_to_tangent(
 def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
     """Raise an error if values are not finite, or set them to zero in place.
 
+    Values from `MAX_COMPONENT` on are treated as infinite. Vectors below `MIN_COMPONENT` are set to
+    zero.
+
     Parameters
     ----------
     values : (n,) or (n, 3) float ndarray
@@ -307,13 +314,17 @@ def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfini
     RosyError
         If `nonfinite` is "error" and a value is not finite.
     """
-    unusable = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    modulus = np.abs(values.reshape(len(values), -1))
+    if values.ndim > 1:
+        values[(modulus < MIN_COMPONENT).all(axis=1)] = 0.0
+    unusable = ~(modulus < MAX_COMPONENT).all(axis=1)
     if not unusable.any():
         return
     if nonfinite == "error":
         kind = "vectors" if values.ndim > 1 else "angles"
+        fault = f"{MAX_COMPONENT:g} or larger" if np.isfinite(modulus).all() else "not finite"
         raise RosyError(
-            f"{source}: {unusable.sum()} of {len(values)} {kind} are not finite, the first on "
+            f"{source}: {unusable.sum()} of {len(values)} {kind} are {fault}, the first on "
             f"{domain} {int(np.argmax(unusable))}: correct them, or choose to treat them as undefined"
         )
     values[unusable] = 0.0

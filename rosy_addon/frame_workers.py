@@ -20,6 +20,9 @@ from typing import Any
 
 from .errors import RosyError
 
+#: Largest number of a frame in Blender.
+MAX_FRAME = 1_048_574
+
 #: Frames of one task of the Dask cluster. Several, because starting Blender takes as long as
 #: several frames.
 FRAMES_PER_TASK = 8
@@ -54,11 +57,12 @@ def parse_frames(text: str) -> Sequence[int]:
 
 def _parse_range(part: str, text: str) -> range:
     """Parse one ``A``, ``A-B`` or ``A-B:STEP``; `text` is the whole option, for the message."""
-    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", part)
+    match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?(?::(\d{1,7}))?", part)
     first = int(match[1]) if match else 0
     last = int(match[2]) if match and match[2] else first
     step = int(match[3]) if match and match[3] else 1
-    if match is None or last < first or not step:
+    in_range = -MAX_FRAME <= first <= last <= MAX_FRAME
+    if match is None or not in_range or not step:
         raise RosyError(f"frames '{text}': expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10")
     return range(first, last + 1, step)
 

@@ -71,6 +71,17 @@ def float_between(low: float, high: float) -> Callable[[str], float]:
     return parse
 
 
+def int_between(low: int, high: int) -> Callable[[str], int]:
+    """Return a parser for a whole number in a closed interval."""
+
+    def parse(text: str) -> int:
+        if not re.fullmatch(r"[+-]?\d{1,18}", text) or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {low} to {high}")
+        return int(text)
+
+    return parse
+
+
 def add_subcommand(
     subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
 ) -> argparse.ArgumentParser:

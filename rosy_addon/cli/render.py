@@ -23,7 +23,7 @@ from .look import (
     mesh_file_look,
 )
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand, check_output
+from .options import add_subcommand, check_output, float_between, int_between
 from .streams import print_line
 from .view import (
     DEFAULT_SIZE,
@@ -80,13 +80,17 @@ def add_turntable_command(subparsers: Any) -> None:
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
     parser.add_argument(
         "--pictures",
-        type=int,
+        type=int_between(1, 10_000),
         default=72,
         metavar="N",
         help="pictures in a full turn (%(default)d)",
     )
     parser.add_argument(
-        "--rate", type=float, default=24.0, metavar="N", help="pictures per second (%(default)g)"
+        "--rate",
+        type=float_between(0.1, 1000.0),
+        default=24.0,
+        metavar="N",
+        help="pictures per second (%(default)g)",
     )
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_look_options(parser)

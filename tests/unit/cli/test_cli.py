@@ -263,6 +263,8 @@ def test_undefined_vectors_on_request(sphere, tmp_path):
         ["render"],
         ["render", "a.off"],
         ["render", "a.off", "-o", "b", "--size", "big"],
+        ["turntable", "a.off", "-o", "b.gif", "--rate", "1e300"],
+        ["turntable", "a.off", "-o", "b.gif", "--pictures", "99999999999"],
     ],
 )
 def test_wrong_usage_is_status_2(words):

@@ -109,19 +109,20 @@ def check_interruption(interrupt, *, unchanged=True, screenshot=None):
 
 def save_screenshot(name, height=10_000):
     """Save the upper part of the sidebar as NAME.png, and the window as window-NAME.png."""
-    window, area, _, sidebar = view()
+    _, area, _, sidebar = view()
     for _ in range(10):  # panels that have opened or grown are animated
         area.tag_redraw()
         yield 0.1
     # From the X server: Blender's own screenshot is black on software OpenGL.
     window_path = SHOTS / f"window-{name}.png"
     subprocess.run(["import", "-window", "root", str(window_path)], check=True, timeout=20)
-    left, top = sidebar.x, window.height - sidebar.y - sidebar.height
-    crop = f"{sidebar.width}x{min(height, sidebar.height)}+{left}+{top}"
+    # The window is in the lower left corner of the screen.
+    height = min(height, sidebar.height)
+    bottom = sidebar.y + sidebar.height - height
+    crop = f"{sidebar.width}x{height}+{sidebar.x}+{bottom}"
     path = SHOTS / f"{name}.png"
-    subprocess.run(
-        ["convert", str(window_path), "-crop", crop, "+repage", str(path)], check=True, timeout=20
-    )
+    command = ["convert", str(window_path), "-gravity", "SouthWest", "-crop", crop, "+repage"]
+    subprocess.run([*command, str(path)], check=True, timeout=20)
     assert path.stat().st_size > 1000
 
 

@@ -70,6 +70,7 @@ def parse_arguments() -> argparse.Namespace:
         help="which tests to run in a window, by default panel,presets,live; none for headless",
     )
     parser.add_argument("--only-window", action="store_true")
+    parser.add_argument("--steps", default="", help="names of the only steps to run in a window")
     parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
     if not options.zip.is_file():
@@ -91,6 +92,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         PYTHONDONTWRITEBYTECODE="1",
     )
 
+    environment["ROSY_STEPS"] = options.steps
     environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
     backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
 

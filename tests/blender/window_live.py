@@ -705,8 +705,6 @@ def disabled_with_the_extension():
     assert session_module()._session is None
 
 
-ONLY = os.environ.get("ROSY_LIVE_ONLY", "").split()
-
 STEPS = (
     every_view_is_a_bake,
     off_restores_the_view,
@@ -724,4 +722,4 @@ STEPS = (
     disabled_with_the_extension,
 )
 
-run_steps(*(step for step in STEPS if not ONLY or step.__name__ in ONLY))
+run_steps(*STEPS)

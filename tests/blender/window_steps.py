@@ -21,9 +21,17 @@ SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
 TIMEOUT_SECONDS = 40.0
 
+#: Names of the only steps to run; all if there is none.
+ONLY = os.environ.get("ROSY_STEPS", "").split(",")
+
 
 def run_steps(*steps):
-    """Run steps as soon as there is a window, write their results, and end Blender."""
+    """Run steps as soon as there is a window, write their results, and end Blender.
+
+    If `ONLY` has names, other steps are left out.
+    """
+    if any(ONLY):
+        steps = [step for step in steps if step.__name__ in ONLY]
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
     bpy.app.timers.register(_resume(_run_all(steps)), first_interval=1.0, persistent=True)

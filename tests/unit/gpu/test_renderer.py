@@ -893,7 +893,7 @@ FREE = {
 }
 
 
-@pytest.mark.parametrize("hue", ["one", "families"])
+@pytest.mark.parametrize("hue", ["families", *long("one")])
 @pytest.mark.parametrize("name", FREE)
 def test_free_directions(card, name, hue):
     field = FREE[name](BALL)

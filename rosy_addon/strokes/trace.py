@@ -138,6 +138,10 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     placer.rescan(fill_rules)
     yield from _grow_until(placer, label)
+    if not placer.strokes.alive[: placer.strokes.count].any():
+        # Where only short strokes fit, none has survived the minimum lengths of the first rounds.
+        placer.add_seeds(candidate_seeds(placer.mesh, placer.corner_spacing))
+        yield from _grow_until(placer, label)
 
 
 def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> Task[None]:

@@ -4,9 +4,8 @@ The picture of a frame is a file in a folder. A sidecar file next to it holds tw
 everything that the picture was drawn from (the look, the camera, the meshes and fields, and the
 lights), and of the bytes of the picture. A frame is up to date if both are equal. So an interrupted
 job continues where it stopped, after a change only the affected frames are drawn, and damaged
-pictures are drawn again. Both files are written under
-a temporary name and renamed, and equal inputs give equal bytes. Two processes may therefore share
-one folder; at worst they draw a frame twice.
+pictures are drawn again. Both files are written under a temporary name and renamed, and equal inputs
+give equal bytes. Two processes may therefore share one folder; at worst they draw a frame twice.
 """
 
 from __future__ import annotations
@@ -149,8 +148,7 @@ def bake_animation_task(
                 start_time = time.monotonic()
         sequence_results = []
         for name, camera in sequence_cameras.items():
-            stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
-            path = frame_path(stem, frames[0], settings.as_float)
+            path = _path_of_frame(settings, name, cameras, frames[0])
             sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
             if show:
                 apply_sequence(scene, scene_data, sequence, camera, settings)
@@ -209,8 +207,7 @@ def _frame_task(
     for index, view in enumerate(scene_views.views):
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
-        stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
-        path = frame_path(stem, frame, settings.as_float)
+        path = _path_of_frame(settings, name, cameras, frame)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
         input_hash = _input_hash(view, renderer, settings)
         up_to_date = (
@@ -228,6 +225,14 @@ def _frame_task(
         results[name] = view.camera, up_to_date
     cache.evict_unused()
     return scene_views.scene_data, results
+
+
+def _path_of_frame(
+    settings: OutputSettings, name: str, cameras: Sequence[CameraSource] | None, frame: int
+) -> Path:
+    """Return the path of a frame of the sequence of a camera, or of a scene if `cameras` is None."""
+    stem = settings.folder / picture_stem(name, "scene" if cameras is None else "camera")
+    return frame_path(stem, frame, settings.as_float)
 
 
 def _sidecar_text(input_hash: bytes, path: Path) -> bytes:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import secrets
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import RosyError
@@ -47,22 +49,39 @@ def read_bytes(
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file atomically: a reader finds either the old contents or all of the new.
-
-    The data is written to a temporary file in the same folder, which then replaces the target. Links
-    are followed. The permissions of an existing file are kept.
+    """Write a file atomically; see `replacing`.
 
     Raises
     ------
     RosyError
         If the folder is missing, or the file cannot be written. An existing file stays unchanged.
     """
+    with replacing(path) as temporary, open(temporary, "xb") as file:
+        file.write(data)
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Replace a file atomically: a reader finds either the old contents or all of the new.
+
+    Links are followed. The permissions of an existing file are kept.
+
+    Yields
+    ------
+    Path
+        A temporary path in the same folder, with the same suffix, to write the new contents to. The
+        file replaces the target at the end of the block. If there is an error, it is deleted.
+
+    Raises
+    ------
+    RosyError
+        As `check_writable`, or if an `OSError` is raised in the block.
+    """
     check_writable(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".rosy-{secrets.token_hex(8)}")
+    temporary = target.with_name(f".rosy-{secrets.token_hex(8)}{target.suffix}")
     try:
-        with open(temporary, "xb") as file:
-            file.write(data)
+        yield temporary
         if target.exists():
             os.chmod(temporary, target.stat().st_mode & 0o777)
         os.replace(temporary, target)

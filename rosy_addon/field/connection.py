@@ -77,6 +77,11 @@ class Connection:
         """(n,) int32: the index of the connected component of each node."""
         return connected_components(self.node_count, np.stack([self.tail, self.head], axis=1))
 
+    @property
+    def positive_mass(self) -> np.ndarray:
+        """(n,) float64: `mass`, with a small positive value at nodes without area."""
+        return np.maximum(self.mass, 1e-12 * max(float(self.mass.mean()), 1e-300))
+
 
 def build_connection(surface: Surface) -> Connection:
     """Build the connection of the triangles of a surface, at `Surface.vertices`."""

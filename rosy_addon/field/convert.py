@@ -219,7 +219,7 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
     matrix = laplacian(connection, degree)
-    mass = np.maximum(connection.mass, 1e-12 * max(float(connection.mass.mean()), 1e-300))
+    mass = connection.positive_mass
     nodes = np.arange(connection.node_count)
     matrix = from_coo(
         np.concatenate([matrix.row_indices, nodes]),

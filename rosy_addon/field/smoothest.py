@@ -88,7 +88,7 @@ def smallest_eigenvectors_task(
         The eigenvalues e.
     """
     component = connection.component
-    mass = np.maximum(connection.mass, 1e-12 * max(float(connection.mass.mean()), 1e-300))
+    mass = connection.positive_mass
     shift = SPECTRAL_SHIFT * 4 * np.pi / mass.sum()
     levels = yield from subtask(hierarchy_task(laplacian(connection, degree, shift)), 0.1, 0.4)
     masses, components = [mass], [component]

@@ -76,17 +76,12 @@ class Surface:
     @cached_property
     def used_vertices(self) -> np.ndarray:
         """(n,) intp: the vertices that have a face, in ascending order."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.corner_vertex] = True
-        return np.flatnonzero(used)
+        return _used_vertices(self.corner_vertex, len(self.vertices))
 
     @cached_property
     def box_corners(self) -> np.ndarray:
         """(8, 3) float64: corners of the bounding box; vertices without a face are ignored."""
-        points = self.vertices[self.used_vertices]
-        limits = np.stack([points.min(axis=0), points.max(axis=0)])
-        selector = np.indices((2, 2, 2)).reshape(3, 8)
-        return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)
+        return box_corners(self.vertices[self.used_vertices])
 
     @cached_property
     def corner_face(self) -> np.ndarray:
@@ -229,6 +224,20 @@ def next_corners(face_start: np.ndarray) -> np.ndarray:
     following = np.arange(1, face_start[-1] + 1, dtype=np.int32)
     following[face_start[1:] - 1] = face_start[:-1]
     return following
+
+
+def box_corners(points: np.ndarray) -> np.ndarray:
+    """(8, 3) corners of the bounding box of (n, 3) points."""
+    limits = np.stack([points.min(axis=0), points.max(axis=0)])
+    selector = np.indices((2, 2, 2)).reshape(3, 8)
+    return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)
+
+
+def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
+    """(n,) intp: the vertices that a corner refers to, in ascending order."""
+    used = np.zeros(vertex_count, dtype=bool)
+    used[corner_vertex] = True
+    return np.flatnonzero(used)
 
 
 def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
@@ -383,9 +392,8 @@ def _check_polygons(
             f"{name}: vertex {int(np.argmax(far))} has a coordinate above {MAX_COORDINATE:g}: scale or "
             "move the mesh"
         )
-    used = np.zeros(len(vertices), dtype=bool)
-    used[corner_vertex] = True
-    points = vertices if used.all() else vertices[used]
+    used = _used_vertices(corner_vertex, len(vertices))
+    points = vertices if len(used) == len(vertices) else vertices[used]
     if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
 

@@ -11,7 +11,7 @@ from ..errors import RosyError
 from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface
+from ..field.surface import Surface, box_corners
 from ..progress import run_to_completion
 from ..projection.corner_field import CornerField, corner_field_task
 from ..projection.face_values import SIMILARITY_EPS
@@ -140,9 +140,7 @@ def build_mesh_buffers(
             f"most {MAX_TRIANGLES}: choose the processor"
         )
     points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
-    used = np.zeros(points.shape[1], dtype=bool)
-    used[surface.triangle_vertex] = True
-    bounds = _box_corners(points[:, used])
+    bounds = box_corners(points[:, surface.used_vertices].T)
     center = bounds.mean(axis=0)
     points -= center[:, None]
     positions = points.astype(np.float32).take(surface.triangle_vertex, axis=1)
@@ -227,13 +225,6 @@ def _to_texture_rows(records: np.ndarray) -> np.ndarray:
     rows = np.zeros((max(-(-len(flat) // ROW_TEXELS), 1) * ROW_TEXELS, 4), dtype=np.float32)
     rows[: len(flat)] = flat
     return rows.reshape(-1, ROW_TEXELS, 4)
-
-
-def _box_corners(points: np.ndarray) -> np.ndarray:
-    """Return the (8, 3) corners of the bounding box of (3, V) points."""
-    ends = np.stack([points.min(axis=1), points.max(axis=1)])
-    corner_bits = np.indices((2, 2, 2)).reshape(3, 8)
-    return np.stack([ends[corner_bits[axis], axis] for axis in range(3)], axis=1)
 
 
 def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, int], int]:

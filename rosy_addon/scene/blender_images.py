@@ -11,7 +11,7 @@ import numpy as np
 from ..color import to_display, to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
-from ..file_io import check_writable
+from ..file_io import check_writable, replacing
 from ..image_io.png import write_png
 
 #: Pixels by which colors are extended past the border of the covered area. A render whose
@@ -150,7 +150,6 @@ def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
     image = bpy.data.images.new(path.stem, width, height, alpha=True, float_buffer=True)
     # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
     scene = bpy.data.scenes.new(path.stem)
-    temp_path = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         image.colorspace_settings.name = "Non-Color"
         image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
@@ -160,10 +159,9 @@ def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
             "RGBA",
             "16",
         )
-        image.save_render(str(temp_path), scene=scene)
-        os.replace(temp_path, path)
-    except (RuntimeError, OSError) as reason:
-        temp_path.unlink(missing_ok=True)
+        with replacing(path) as temporary:
+            image.save_render(str(temporary), scene=scene)
+    except RuntimeError as reason:
         raise RosyError(f"{path}: cannot be written: {reason}") from reason
     finally:
         bpy.data.images.remove(image)

@@ -136,9 +136,7 @@ def draw_instances_task(
         task = _trace_instance(instances[index], camera, style, lights, cache)
         strokes_of_instances.append((yield from subtask(task, start, stop)))
     if not strokes_of_instances:
-        raise RosyError(
-            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
-        )
+        raise _no_visible_stroke(camera)
     strokes = reduce(Strokes.concatenate, strokes_of_instances)
     if not len(strokes):
         raise RosyError("no stroke fits on the surface: reduce the spacing")
@@ -148,9 +146,7 @@ def draw_instances_task(
     if style.overshoot:
         strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
-        raise RosyError(
-            f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
-        )
+        raise _no_visible_stroke(camera)
     # Families of different instances are still separate. Each belongs to one instance.
     family_counts = [len(traced.names) for traced in strokes_of_instances]
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
@@ -252,6 +248,13 @@ def _is_in_view(instance: MeshInstance, camera: Camera) -> bool:
         [outside & (clip[:, :2] > 0), outside & (clip[:, :2] < 0)], axis=1
     )
     return not (outside_sides.all(axis=0).any() or (clip[:, 2] < -clip[:, 3]).all())
+
+
+def _no_visible_stroke(camera: Camera) -> RosyError:
+    """Return the error for a camera that sees no stroke."""
+    return RosyError(
+        f"camera '{camera.name}': no stroke is visible: check the view, or draw hidden strokes too"
+    )
 
 
 def _merge_families_by_name(strokes: Strokes) -> Strokes:

@@ -1,12 +1,20 @@
 """``python -m rosy_addon VERB ...``: the command line in plain Python."""
 
+import os
+import signal
 import sys
 
-try:
-    from .cli import main
 
-    status = main(sys.argv[1:], prog="python -m rosy_addon")
-except KeyboardInterrupt:  # while modules are imported
-    print("rosy: stopped", file=sys.stderr)
-    status = 130
-sys.exit(status)
+def _stop_at_once(*_: object) -> None:
+    """End the process: a Ctrl-C while modules are imported. No file is open yet."""
+    os.write(2, b"rosy: stopped\n")
+    os._exit(130)
+
+
+# A KeyboardInterrupt inside an import may become another exception.
+signal.signal(signal.SIGINT, _stop_at_once)
+
+from .cli import main  # noqa: E402
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main(sys.argv[1:], prog="python -m rosy_addon"))

@@ -104,6 +104,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     try:
         target = Path(os.path.realpath(path))
         folder = (target if Path(path).is_symlink() else Path(path)).parent
+        if target.is_symlink():  # still, so it leads to itself
+            raise RosyError(f"{path}: cannot be written: it is a link to itself")
         if target.is_dir():
             raise RosyError(f"{path}: cannot be written: it is a folder")
         if target.exists() and not target.is_file():

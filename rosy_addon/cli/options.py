@@ -15,15 +15,24 @@ from ..file_io import check_writable
 from .streams import print_error
 
 
-def check_output(options: argparse.Namespace) -> None:
+def check_output(options: argparse.Namespace, suffix: str = "") -> None:
     """Check the option -o, before a long task computes its contents.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    suffix : str
+        The extension that the name of the file must have; by default any.
 
     Raises
     ------
     RosyError
-        If the file cannot be written, or another option names it as an input.
+        If the name has another extension, the file cannot be written, or another option names it as
+        an input.
     """
     check_writable(options.output)
+    if suffix and options.output.suffix.lower() != suffix:
+        raise RosyError(f"{options.output}: the name of the file must end in {suffix}")
     if not os.path.exists(options.output):
         return
     for name, value in vars(options).items():

@@ -52,7 +52,7 @@ def add_render_command(subparsers: Any) -> None:
 
 def run_render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file as a picture."""
-    check_output(options)
+    check_output(options, ".png")
     look = mesh_file_look(options)
     surface, field = load_mesh_and_field(options)
     size = requested_size(options)

@@ -59,9 +59,7 @@ def add_strokes_command(subparsers: Any) -> None:
 
 def run_strokes(options: argparse.Namespace) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file."""
-    if options.output.suffix.lower() != ".svg":
-        raise RosyError(f"{options.output}: the name of the file must end in .svg")
-    check_output(options)
+    check_output(options, ".svg")
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":

@@ -95,8 +95,15 @@ def _check_columns(source: str, columns: int) -> None:
 def _raw_field(values: np.ndarray) -> RawField:
     """Classify (n, k) values as members, directions or, if all are symmetric, tensors."""
     matrices = values.reshape(len(values), -1, 3)
-    if values.shape[1] == 9:
-        asymmetry = np.abs(matrices - matrices.swapaxes(1, 2)).max(axis=(1, 2))
-        if (asymmetry <= SYMMETRY_TOLERANCE * np.abs(matrices).max(axis=(1, 2))).all():
-            return RawField(matrices, 4, tensors=True)
+    if values.shape[1] == 9 and _are_symmetric(matrices):
+        return RawField(matrices, 4, tensors=True)
     return RawField(matrices, None if values.shape[1] == 3 else values.shape[1] // 3)
+
+
+def _are_symmetric(matrices: np.ndarray) -> bool:
+    """Return whether all (n, 3, 3) matrices are symmetric, except those that are not finite."""
+    matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+    scale = np.abs(matrices).max(axis=(1, 2), keepdims=True, initial=0.0)
+    matrices = matrices / np.where(scale > 0, scale, 1.0)
+    asymmetry = np.abs(matrices - matrices.swapaxes(1, 2))
+    return len(matrices) > 0 and bool((asymmetry <= SYMMETRY_TOLERANCE).all())

@@ -527,12 +527,14 @@ def test_outputs_replace_only_regular_files(tmp_path, capsys):
     os.mkfifo(tmp_path / "pipe.png")
     elsewhere.mkdir()
     link.symlink_to(elsewhere / "real.png")
+    (tmp_path / "loop.png").symlink_to("loop.png")
     render = ["render", "--generate", "axis", "--size", "16x16"]
     for words, message in (
-        ([*render, str(mesh), "-o", "/dev/null"], "/dev/null: cannot be written: it is not a reg"),
+        (["field", str(mesh), "-o", "/dev/null"], "/dev/null: cannot be written: it is not a reg"),
         ([*render, str(mesh), "-o", str(tmp_path / "pipe.png")], "not a regular file"),
         ([*render, str(tmp_path / "pipe.png"), "-o", str(tmp_path / "a.png")], "pipe.png"),
-        ([*render, str(mesh), "-o", str(mesh)], "cube.obj: is also an input"),
+        ([*render, str(mesh), "-o", str(tmp_path / "loop.png")], "it is a link to itself"),
+        ([*render, str(mesh), "-o", str(tmp_path / "a.svg")], "the file must end in .png"),
         (["field", str(mesh), "-o", str(mesh)], "cube.obj: is also an input"),
         ([*render, str(mesh), "-o", str(tmp_path / ("a" * 252 + ".png"))], "file name too long"),
     ):

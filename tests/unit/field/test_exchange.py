@@ -141,6 +141,10 @@ def test_tensors_are_distinguished_from_three_directions(tmp_path):
     assert (field.degree, field.family_count) == (4, 2)
     np.savetxt(tmp_path / "a.txt", matrices.reshape(-1, 9), delimiter=",")
     assert np.allclose(read_field(tmp_path / "a.txt", BALL).vectors, field.vectors)
+    matrices[3] = np.inf
+    np.save(tmp_path / "a.npy", matrices)
+    holed = read_field(tmp_path / "a.npy", BALL, nonfinite="zero")
+    assert holed.family_count == 2 and np.flatnonzero(holed.magnitude == 0).tolist() == [3]
     np.save(tmp_path / "b.npy", free_directions(3))
     assert read_field(tmp_path / "b.npy", BALL).degree == 3
 

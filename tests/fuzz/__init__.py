@@ -1,0 +1,19 @@
+"""Random hostile input for the command line: files, options, streams and signals.
+
+A case is made from a category and a seed, so it can be repeated. Each case runs in a process of its
+own with limits of time and memory, and is judged by what it prints, its exit status and the files
+that it leaves. `python -m tests.fuzz --help` lists the options; `make fuzz` runs all categories.
+
+Modules in order of dependence:
+
+    shapes                          polygon meshes with faults of geometry and topology
+    damage                          faults of the bytes and words of a file
+    mesh_files, field_files,        writers of files of each format
+    picture_files, preset_files
+    options                         command lines, from the parser itself
+    cases                           the categories: files, a command line, and what it may write
+    scenes                          categories of Blender files and animations
+    execution                       the processes
+    verdicts                        what is wrong with a run
+    runner                          many cases, and a table of the outcomes
+"""

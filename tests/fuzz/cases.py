@@ -1,0 +1,280 @@
+"""The categories of cases: each makes files in a folder and returns a command line."""
+
+from __future__ import annotations
+
+import os
+import stat
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+
+from .damage import WORDS, damaged
+from .field_files import SUFFIXES as FIELD_SUFFIXES
+from .field_files import field_bytes, guide_bytes
+from .mesh_files import WRITERS, mesh_bytes
+from .options import random_options
+from .picture_files import png_bytes
+from .preset_files import preset_bytes
+from .shapes import Polygons, random_mesh
+
+
+@dataclass
+class Case:
+    """One run of the command line.
+
+    Attributes
+    ----------
+    arguments : list of str
+        Without the name of the program. Paths are relative to the folder of the case.
+    outputs : set of str
+        Names of files that the run may write, all others have to stay unchanged.
+    environment : dict of str to str
+        Changed variables of the environment.
+    stdout : str
+        What standard output is: "file", "closed" (a pipe without a reader) or "full" (/dev/full).
+    interrupt_after : float, optional
+        Seconds after which the run is interrupted as by Ctrl-C.
+    kill_after : float, optional
+        Seconds after which the run is killed.
+    own_process : bool
+        Whether to start Python anew instead of forking, which takes ten times as long.
+    """
+
+    arguments: list[str]
+    outputs: set[str] = field(default_factory=set)
+    environment: dict[str, str] = field(default_factory=dict)
+    stdout: str = "file"
+    interrupt_after: float | None = None
+    kill_after: float | None = None
+    own_process: bool = False
+
+
+def make_case(category: str, seed: int, folder: Path) -> Case:
+    """Write the files of a case to an empty folder, and return the case.
+
+    Parameters
+    ----------
+    category : str
+        A key of `CATEGORIES`.
+    seed : int
+    folder : Path
+    """
+    rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
+    return CATEGORIES[category](rng, folder)
+
+
+#: Commands for mesh files, with the extension of their output.
+_OUTPUTS = {"render": ".png", "strokes": ".svg", "field": "", "info": "", "turntable": ".gif"}
+_FIELD_OUTPUTS = (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings")
+
+
+def _write_mesh(rng: Generator, folder: Path, mesh: Polygons, name: str = "mesh") -> str:
+    suffix = list(WRITERS)[rng.integers(len(WRITERS))]
+    (folder / (name + suffix)).write_bytes(mesh_bytes(rng, suffix, mesh))
+    return name + suffix
+
+
+def _write_field(rng: Generator, folder: Path, mesh: Polygons, name: str = "field") -> str:
+    suffix = FIELD_SUFFIXES[rng.choice(5, p=[0.3, 0.3, 0.15, 0.2, 0.05])]
+    (folder / (name + suffix)).write_bytes(field_bytes(rng, suffix, mesh))
+    return name + suffix
+
+
+def _command(
+    rng: Generator, folder: Path, inputs: list[str], options: list[str] | None = None, **chosen
+) -> Case:
+    """Return a case of a random command with random options, small pictures, and an output."""
+    command = chosen.get("command") or str(
+        rng.choice(list(_OUTPUTS), p=[0.36, 0.26, 0.18, 0.17, 0.03])
+    )
+    # A field file rules out a generator.
+    leave_out = {"generate"} if len(inputs) > 1 else set()
+    words = random_options(rng, command, rate=chosen.get("rate", 0.12), leave_out=leave_out)
+    case = Case([command, *inputs, *words, *(options or [])])
+    if command in ("render", "strokes", "turntable") and not _has(words, "--size"):
+        case.arguments += ["--size", f"{rng.integers(8, 90)}x{rng.integers(8, 90)}"]
+    if command == "turntable" and not _has(words, "--pictures"):
+        case.arguments += ["--pictures", "2"]
+    if command == "info":
+        case.arguments += ["--json"] * int(rng.random() < 0.5)
+        return case
+    suffix = _OUTPUTS[command] or str(rng.choice(_FIELD_OUTPUTS))
+    output = "out" + suffix
+    case.arguments += ["-o", output]
+    case.outputs.add(output)
+    if rng.random() < 0.1:
+        (folder / output).write_bytes(b"the previous contents")
+    return case
+
+
+def _has(words: list[str], option: str) -> bool:
+    return any(word.split("=")[0] == option for word in words)
+
+
+def _shape_case(rng: Generator, folder: Path) -> Case:
+    """An odd shape in an undamaged file, with a generated field."""
+    mesh = random_mesh(rng)
+    return _command(rng, folder, [_write_mesh(rng, folder, mesh)])
+
+
+def _mesh_file_case(rng: Generator, folder: Path) -> Case:
+    """A damaged mesh file."""
+    mesh = random_mesh(rng, faults=0)
+    name = _write_mesh(rng, folder, mesh)
+    path = folder / name
+    path.write_bytes(damaged(rng, path.read_bytes()))
+    if rng.random() < 0.05:  # another format than the name says
+        name = "mesh" + list(WRITERS)[rng.integers(len(WRITERS))]
+        path.rename(folder / name)
+    command = "info" if rng.random() < 0.5 else None
+    return _command(rng, folder, [name], command=command, rate=0.03)
+
+
+def _field_file_case(rng: Generator, folder: Path) -> Case:
+    """A field file, damaged in half of all cases."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
+    name, field_name = _write_mesh(rng, folder, mesh), _write_field(rng, folder, mesh)
+    path = folder / field_name
+    if rng.random() < 0.5:
+        path.write_bytes(damaged(rng, path.read_bytes()))
+    options = ["--undefined"] * int(rng.random() < 0.3)
+    if rng.random() < 0.1:
+        other = random_mesh(rng, faults=0) if rng.random() < 0.3 else mesh
+        options += ["--field-mesh", _write_mesh(rng, folder, other, "field_mesh")]
+    case = _command(rng, folder, [name, field_name], options, rate=0.08)
+    if case.arguments[0] == "info" and rng.random() < 0.4:
+        case.arguments += ["--against", _write_field(rng, folder, mesh, "other")]
+    return case
+
+
+def _guide_case(rng: Generator, folder: Path) -> Case:
+    """A field guided by strokes, another field or a UV map."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
+    name, options = _write_mesh(rng, folder, mesh), ["--generate", "guided"]
+    if rng.random() < 0.7:
+        data = guide_bytes(rng, mesh)
+        (folder / "guides.txt").write_bytes(damaged(rng, data) if rng.random() < 0.4 else data)
+        options += ["--strokes", "guides.txt"]
+    if rng.random() < 0.3:
+        options += ["--guides", _write_field(rng, folder, mesh)]
+    if rng.random() < 0.3:
+        options += ["--uv"]
+    return _command(rng, folder, [name], options, rate=0.06)
+
+
+def _option_case(rng: Generator, folder: Path) -> Case:
+    """Many options, some of them without sense, on an undamaged mesh."""
+    mesh = random_mesh(rng, faults=0)
+    name = _write_mesh(rng, folder, mesh)
+    case = _command(rng, folder, [name], rate=0.3)
+    kind = rng.random()
+    if kind < 0.1:
+        position = rng.integers(len(case.arguments) + 1)
+        case.arguments.insert(position, WORDS[rng.integers(len(WORDS))].replace("\0", ""))
+    elif kind < 0.15:
+        del case.arguments[rng.integers(len(case.arguments))]
+    return case
+
+
+def _look_case(rng: Generator, folder: Path) -> Case:
+    """A preset file, and settings at the ends of their ranges."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.1))
+    inputs = [_write_mesh(rng, folder, mesh)]
+    if rng.random() < 0.4:
+        inputs.append(_write_field(rng, folder, mesh))
+    options = []
+    if rng.random() < 0.6:
+        data = preset_bytes(rng)
+        (folder / "mine.json").write_bytes(damaged(rng, data) if rng.random() < 0.2 else data)
+        options += ["--preset", "mine.json"]
+    if rng.random() < 0.05:
+        case = Case(["presets", *["--json"] * int(rng.random() < 0.5)])
+        if options:
+            case.environment["ROSY_PRESETS"] = "."
+        return case
+    return _command(rng, folder, inputs, options, command="render", rate=0.25)
+
+
+def _tone_case(rng: Generator, folder: Path) -> Case:
+    """A tone from an image, a picture or an attribute."""
+    mesh = random_mesh(rng, faults=0)
+    kind = ("image", "picture", "attribute")[rng.integers(3)]
+    suffix = {"image": ".obj", "picture": "", "attribute": ".ply"}[kind]
+    suffix = suffix if suffix and rng.random() < 0.9 else list(WRITERS)[rng.integers(4)]
+    name = "mesh" + suffix
+    (folder / name).write_bytes(mesh_bytes(rng, suffix, mesh))
+    if kind == "attribute":
+        value = ("Color", "red", "x", "", "\x1b[31m", "green")[rng.integers(6)]
+    else:
+        value = "tone.png"
+        data = png_bytes(rng)
+        (folder / value).write_bytes(damaged(rng, data) if rng.random() < 0.2 else data)
+    command = "turntable" if kind != "picture" and rng.random() < 0.1 else "render"
+    return _command(rng, folder, [name], [f"--tone-{kind}", value], command=command, rate=0.08)
+
+
+def _path_case(rng: Generator, folder: Path) -> Case:
+    """Paths that are not plain files, too long, linked, or the input itself."""
+    mesh = random_mesh(rng, faults=0)
+    name = _write_mesh(rng, folder, mesh)
+    case = _command(rng, folder, [name], rate=0.03)
+    (folder / "folder").mkdir()
+    os.mkfifo(folder / "pipe")
+    (folder / "link.png").symlink_to("target.png")
+    (folder / "loop.png").symlink_to("loop.png")
+    device = folder / "device"  # never a device of the machine if this process might replace it
+    if os.geteuid() == 0:
+        os.mknod(device, stat.S_IFCHR | 0o666, os.makedev(1, 3))
+    else:
+        device.symlink_to("/dev/null")
+    (folder / "null.obj").symlink_to("device")
+    paths = ["folder", "pipe", "link.png", "loop.png", "device", "null.obj", name, "", "."]
+    paths += ["a" * 300 + ".png", "missing/out.png", "folder/../new.png", "x" * 250 + ".png"]
+    paths += ["\x1b[31m.png", "é\u202e.svg", "mesh.obj/x", "-", "a/" * 3000]
+    path = paths[rng.integers(len(paths))]
+    position = int(rng.integers(1, len(case.arguments)))
+    output = case.arguments[-1]
+    if rng.random() < 0.6 and case.outputs:
+        position = len(case.arguments) - 1
+    case.arguments[position] = path
+    case.outputs |= {"target.png", "link.png", "new.png", output, path}
+    case.outputs -= {name, "folder", "pipe", "device", "null.obj", "loop.png", "", "."}
+    return case
+
+
+def _stream_case(rng: Generator, folder: Path) -> Case:
+    """Closed, full and ASCII streams, interrupts and kills, in processes of their own."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.2))
+    name = _write_mesh(rng, folder, mesh)
+    case = Case(["presets"]) if rng.random() < 0.2 else _command(rng, folder, [name], rate=0.02)
+    case.own_process = True
+    match rng.integers(6):
+        case 0:
+            case.stdout = "closed"
+        case 1:
+            case.stdout = "full"
+        case 2:
+            case.environment |= {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+        case 3 | 4:
+            case.interrupt_after = float(rng.uniform(0.0, 0.6))
+        case 5:
+            case.kill_after = float(rng.uniform(0.05, 0.6))
+    return case
+
+
+#: Functions that make the cases, by category.
+CATEGORIES: dict[str, Callable[[Generator, Path], Case]] = {
+    "shapes": _shape_case,
+    "mesh-files": _mesh_file_case,
+    "field-files": _field_file_case,
+    "guides": _guide_case,
+    "options": _option_case,
+    "looks": _look_case,
+    "tones": _tone_case,
+    "paths": _path_case,
+    "streams": _stream_case,
+}

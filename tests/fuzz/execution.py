@@ -1,0 +1,159 @@
+"""Run a case in a process of its own, with limits, and record all that it did."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import stat
+import subprocess
+import sys
+import time
+import traceback
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from .cases import Case
+
+#: Seconds after which a run counts as hanging, and bytes of address space that it may take beyond
+#: those of this process.
+TIME_LIMIT, MEMORY_LIMIT = 60.0, 3 << 30
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass
+class Run:
+    """What a case did.
+
+    Attributes
+    ----------
+    status : int or None
+        Exit status, negative if a signal ended it; None if it was killed after `TIME_LIMIT`.
+    stdout, stderr : bytes
+    before, after : dict of str to str
+        Contents of the folder of the case: see `listing`.
+    seconds : float
+    peak_bytes : int
+        Largest resident memory.
+    """
+
+    status: int | None
+    stdout: bytes
+    stderr: bytes
+    before: dict[str, str]
+    after: dict[str, str]
+    seconds: float
+    peak_bytes: int
+
+
+def execute(case: Case, folder: Path) -> Run:
+    """Run a case in its folder. Standard output and error stream go to files next to the folder."""
+    before = listing(folder)
+    streams = [folder.with_suffix(suffix) for suffix in (".stdout", ".stderr")]
+    start = time.perf_counter()
+    pid = (_start_process if case.own_process else _fork)(case, folder, streams)
+    status, usage = _wait(pid, case, start)
+    seconds = time.perf_counter() - start
+    stdout, stderr = (path.read_bytes() for path in streams)
+    for path in streams:
+        path.unlink()
+    peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return Run(status, stdout, stderr, before, listing(folder), seconds, peak)
+
+
+def listing(folder: Path) -> dict[str, str]:
+    """Return the contents of a folder: the hash of each file, the kind of what is not one."""
+    contents = {}
+    for path in sorted(folder.rglob("*")):
+        mode = path.lstat().st_mode
+        if stat.S_ISREG(mode):
+            text = sha256(path.read_bytes()).hexdigest()
+        elif stat.S_ISLNK(mode):
+            text = f"link to {os.readlink(path)}"
+        else:
+            text = f"kind {stat.S_IFMT(mode):o}"
+        contents[str(path.relative_to(folder))] = text
+    return contents
+
+
+def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
+    """Start a case in a copy of this process, which has imported all modules. Return its number."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid:
+        return pid
+    status = 1
+    try:
+        for number, path in zip((1, 2), streams, strict=True):
+            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            os.dup2(descriptor, number)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        os.chdir(folder)
+        os.environ.update(case.environment)
+        _limit_memory()
+        from rosy_addon.cli import main
+
+        status = main(case.arguments, prog="rosy")
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
+def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
+    """Start a case as ``python -m rosy_addon``. Return the number of the process."""
+    read_end = None
+    with streams[0].open("wb") as stdout, streams[1].open("wb") as stderr:
+        output = stdout
+        if case.stdout == "closed":
+            read_end, output = os.pipe()
+            os.close(read_end)
+        elif case.stdout == "full":
+            output = os.open("/dev/full", os.O_WRONLY)
+        environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rosy_addon", *case.arguments],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=stderr,
+            env=environment | case.environment,
+            preexec_fn=_limit_memory,
+        )
+        if isinstance(output, int):
+            os.close(output)
+    process.returncode = 0  # this module waits for it
+    return process.pid
+
+
+def _limit_memory() -> None:
+    with open("/proc/self/statm") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_LIMIT,) * 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _wait(pid: int, case: Case, start: float) -> tuple[int | None, resource.struct_rusage]:
+    """Wait for a process, and send it the signals of the case."""
+    signals = []
+    if case.interrupt_after is not None:
+        signals.append((start + case.interrupt_after, signal.SIGINT))
+    if case.kill_after is not None:
+        signals.append((start + case.kill_after, signal.SIGKILL))
+    signals.append((start + TIME_LIMIT, signal.SIGKILL))
+    pause, timed_out = 0.001, False
+    while True:
+        done, status, usage = os.wait4(pid, os.WNOHANG)
+        if done:
+            return None if timed_out else os.waitstatus_to_exitcode(status), usage
+        if time.perf_counter() >= signals[0][0]:
+            timed_out = len(signals) == 1
+            os.kill(pid, signals.pop(0)[1])
+            signals = signals or [(float("inf"), signal.SIGKILL)]
+        time.sleep(pause)
+        pause = min(pause * 1.2, 0.02)

@@ -1,0 +1,141 @@
+"""Make, run and judge many cases, several at once, and print what came of them."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import shlex
+import shutil
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, as_completed, wait
+from pathlib import Path
+from typing import NamedTuple
+
+from .cases import CATEGORIES, Case, make_case
+from .execution import Run, execute
+from .verdicts import Verdict, judge
+
+#: Share of the cases that run twice, to compare the files that they write.
+REPEATED_SHARE = 0.05
+
+
+class Outcome(NamedTuple):
+    """The result of one case."""
+
+    category: str
+    seed: int
+    verdict: Verdict
+    reason: str
+    seconds: float
+    peak_bytes: int
+
+
+def main() -> int:
+    """Run the cases that the options name. Return 1 if there is a fault, otherwise 0."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description="Run random hostile cases.")
+    parser.add_argument("--seed", type=int, default=1, help="of the first case (1)")
+    parser.add_argument("--cases", type=int, help="number of cases; by default no limit")
+    parser.add_argument("--seconds", type=float, help="stop after this time")
+    parser.add_argument("--jobs", type=int, default=multiprocessing.cpu_count())
+    parser.add_argument(
+        "--category", action="append", choices=list(CATEGORIES), help="by default all of them"
+    )
+    parser.add_argument(
+        "--keep", type=Path, default=Path("dist/fuzz"), help="folder for the cases with faults"
+    )
+    options = parser.parse_args()
+    if options.cases is None and options.seconds is None:
+        parser.error("give --cases, --seconds, or both")
+    counts: Counter[tuple[str, Verdict]] = Counter()
+    slowest, largest, start = None, None, time.monotonic()
+    for outcome in _outcomes(options, start):
+        counts[outcome.category, outcome.verdict] += 1
+        slowest = max(slowest or outcome, outcome, key=lambda o: o.seconds)
+        largest = max(largest or outcome, outcome, key=lambda o: o.peak_bytes)
+        if outcome.verdict.is_fault:
+            print(
+                f"{outcome.category} {outcome.seed}: {outcome.verdict.value}: {outcome.reason}",
+                flush=True,
+            )
+    _print_table(counts)
+    print(f"{sum(counts.values()):,} cases in {time.monotonic() - start:.0f} s, seed {options.seed}")
+    if slowest is not None:
+        print(f"slowest: {slowest.category} {slowest.seed}, {slowest.seconds:.1f} s")
+        print(f"largest: {largest.category} {largest.seed}, {largest.peak_bytes / 2**20:.0f} MiB")
+    faults = sum(count for (_, verdict), count in counts.items() if verdict.is_fault)
+    print(f"{faults} faults" + (f", kept in {options.keep}" if faults else ""))
+    return int(faults > 0)
+
+
+def _outcomes(options: argparse.Namespace, start: float) -> Iterator[Outcome]:
+    """Yield the outcomes of the cases, which run in several processes."""
+    categories = options.category or list(CATEGORIES)
+
+    def numbered() -> Iterator[tuple[str, int, Path]]:
+        number = 0
+        while options.cases is None or number < options.cases:
+            if options.seconds is not None and time.monotonic() - start > options.seconds:
+                return
+            seed = options.seed + number // len(categories)
+            yield categories[number % len(categories)], seed, options.keep
+            number += 1
+
+    if options.jobs == 1:
+        yield from map(_run_case, numbered())
+        return
+    # The processes are new, not forked, so that each case forks from the same state.
+    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
+        pending = set()
+        for case in numbered():
+            pending.add(pool.submit(_run_case, case))
+            if len(pending) >= 4 * options.jobs:
+                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                yield from (future.result() for future in done)
+        yield from (future.result() for future in as_completed(pending))
+
+
+def _run_case(arguments: tuple[str, int, Path]) -> Outcome:
+    """Make, run and judge one case. Keep its folder if there is a fault."""
+    category, seed, keep = arguments
+    with tempfile.TemporaryDirectory(prefix="rosy-fuzz-") as parent:
+        folder = Path(parent) / "case"
+        folder.mkdir()
+        case = make_case(category, seed, folder)
+        run = execute(case, folder)
+        verdict, reason = judge(case, run, folder)
+        if verdict is Verdict.DONE and seed % round(1 / REPEATED_SHARE) == 0:
+            again = Path(parent) / "again"
+            again.mkdir()
+            repeated = execute(make_case(category, seed, again), again)
+            if (repeated.after, repeated.stdout) != (run.after, run.stdout):
+                verdict, reason = Verdict.NOT_REPEATED, "files or standard output differ"
+        if verdict.is_fault:
+            _keep(keep / f"{category}-{seed}", folder, case, run, f"{verdict.value}: {reason}")
+        return Outcome(category, seed, verdict, reason, run.seconds, run.peak_bytes)
+
+
+def _keep(target: Path, folder: Path, case: Case, run: Run, text: str) -> None:
+    """Copy the files of a case, its streams, its command line and the verdict."""
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    for path in folder.iterdir():
+        if path.is_file() and not path.is_symlink():
+            shutil.copy2(path, target)
+    (target / "stdout.txt").write_bytes(run.stdout)
+    (target / "stderr.txt").write_bytes(run.stderr)
+    command = shlex.join(["python", "-m", "rosy_addon", *case.arguments])
+    (target / "command.txt").write_text(f"{command}\n{text}\n", errors="surrogateescape")
+
+
+def _print_table(counts: Counter[tuple[str, Verdict]]) -> None:
+    """Print a row for each category, and a column for each verdict that occurs."""
+    verdicts = [v for v in Verdict if any(verdict is v for _, verdict in counts)]
+    names = dict.fromkeys(category for category, _ in counts)
+    width = max(map(len, names), default=0)
+    print(" " * width, *(verdict.value for verdict in verdicts), sep="  ")
+    for name in names:
+        row = (f"{counts[name, verdict]:{len(verdict.value)}}" for verdict in verdicts)
+        print(f"{name:{width}}", *row, sep="  ")

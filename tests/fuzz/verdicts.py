@@ -1,0 +1,181 @@
+"""What is wrong with a run: its streams, its exit status, and the files that it leaves."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import signal
+from enum import Enum
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from PIL import Image
+
+from rosy_addon.cli.streams import UNSAFE
+from rosy_addon.errors import RosyError
+from rosy_addon.field.formats.text_rows import read_rows
+
+from .cases import Case
+from .execution import Run
+
+#: Most resident memory of a run. Pictures of cases are small.
+MEMORY_BYTES = 2 << 30
+
+
+class Verdict(Enum):
+    """The outcome of a run. All after `ENDED` are faults of the program."""
+
+    DONE = "done"
+    REFUSED = "refused in one line"
+    ENDED = "ended by its signal or stream"
+    TRACEBACK = "traceback"
+    WARNING = "warning"
+    STATUS = "wrong status"
+    MESSAGE = "not one clear line"
+    CONTROL = "control character"
+    CRASH = "crash"
+    HANG = "hang"
+    MEMORY = "memory"
+    HALF_WRITTEN = "file half written"
+    STRAY = "stray or changed file"
+    NOT_REPEATED = "other bytes when repeated"
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it is a fault of the program."""
+        return self not in (Verdict.DONE, Verdict.REFUSED, Verdict.ENDED)
+
+
+def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
+    """Return the verdict on a run, and what it is based on.
+
+    Parameters
+    ----------
+    case : Case
+    run : Run
+    folder : Path
+        Folder of the case, as the run left it.
+    """
+    stderr = run.stderr.decode("utf-8", "replace")
+    if run.status is None:
+        return Verdict.HANG, f"{run.seconds:.0f} s"
+    if case.interrupt_after is not None and "rosy_addon" not in stderr:
+        # Python ends like this, with or without a traceback, until RoSy's first line runs.
+        if run.status == -signal.SIGINT or stderr.rstrip().endswith("KeyboardInterrupt"):
+            return Verdict.ENDED, "interrupted before RoSy started"
+    if "Traceback" in stderr:
+        return Verdict.TRACEBACK, stderr.strip().splitlines()[-1]
+    killed = case.kill_after is not None and run.status == -signal.SIGKILL
+    if run.status < 0 and not killed:
+        return Verdict.CRASH, signal.Signals(-run.status).name
+    if re.search(r"\w+Warning\b", stderr):
+        return Verdict.WARNING, stderr.strip()[:300]
+    for text in (stderr, run.stdout.decode("utf-8", "replace")):
+        if unsafe := UNSAFE.search(text):
+            return Verdict.CONTROL, repr(text[max(unsafe.start() - 40, 0) :][:80])
+    if run.peak_bytes > MEMORY_BYTES:
+        return Verdict.MEMORY, f"{run.peak_bytes / 2**30:.1f} GiB"
+    if stray := _stray_files(case, run, killed):
+        return Verdict.STRAY, stray
+    for name in sorted(case.outputs & run.after.keys()):
+        if run.after[name] != run.before.get(name) and not run.after[name].startswith("link"):
+            if fault := _file_fault(folder / name):
+                return Verdict.HALF_WRITTEN, f"{name}: {fault}"
+            if run.status not in (0, 130, 141, -signal.SIGKILL, 1):
+                return Verdict.STATUS, f"status {run.status}, but {name} was written"
+    return _judge_status(case, run, stderr, killed)
+
+
+def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verdict, str]:
+    lines = stderr.splitlines()
+    if killed:
+        return Verdict.ENDED, "killed"
+    match run.status:
+        case 0:
+            if fault := _stdout_fault(case, run):
+                return Verdict.HALF_WRITTEN, fault
+            if not all(line.startswith("rosy: ") for line in lines):
+                return Verdict.MESSAGE, stderr.strip()[:300]
+            written = {name for name in case.outputs if run.after.get(name) != run.before.get(name)}
+            if "-o" in case.arguments and not written:
+                # The same bytes as before are right, but no case begins with these.
+                return Verdict.STATUS, "status 0, but nothing was written"
+            return Verdict.DONE, ""
+        case 2:
+            usage = bool(lines) and lines[0].startswith("usage:")
+            errors = [line for line in lines if re.match(r"(rosy|[\w. -]*): ", line)]
+            if not lines or run.stdout and case.arguments[0] != "turntable":
+                return Verdict.MESSAGE, f"stdout {run.stdout[:80]!r}, stderr {stderr[:80]!r}"
+            if not usage and (len(errors) != len(lines) or len(lines) > 3):
+                return Verdict.MESSAGE, stderr.strip()[:300]
+            return Verdict.REFUSED, lines[-1]
+        case 130 if case.interrupt_after is not None:
+            if lines[-1:] != ["rosy: stopped"]:
+                return Verdict.MESSAGE, stderr.strip()[:300]
+            return Verdict.ENDED, lines[-1]
+        case 141 if case.stdout == "closed":
+            return (Verdict.MESSAGE, stderr) if stderr else (Verdict.ENDED, "closed pipe")
+        case 1 if case.stdout == "full":
+            return Verdict.ENDED, stderr.strip()
+    return Verdict.STATUS, f"status {run.status}: {stderr.strip()[-200:]}"
+
+
+def _stray_files(case: Case, run: Run, killed: bool) -> str:
+    """Return what was changed that should not have been, or an empty text."""
+    for name in sorted(run.before.keys() | run.after.keys()):
+        if name in case.outputs or run.before.get(name) == run.after.get(name):
+            continue
+        if killed and Path(name).name.startswith(".rosy-"):
+            continue  # a kill leaves a temporary file, as nothing can remove it
+        change = "new" if name not in run.before else "changed" if name in run.after else "gone"
+        return f"{name}: {change}"
+    return ""
+
+
+def _stdout_fault(case: Case, run: Run) -> str:
+    """Return what is wrong with JSON on standard output."""
+    if "--json" not in case.arguments or case.stdout != "file" or "--help" in case.arguments:
+        return ""
+    return _json_fault(run.stdout.decode())
+
+
+def _json_fault(text: str) -> str:
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is not JSON")
+
+    try:
+        json.loads(text, parse_constant=refuse)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _file_fault(path: Path) -> str:
+    """Return what is wrong with a file that RoSy wrote, or an empty text."""
+    data = path.read_bytes()
+    try:
+        match path.suffix.lower():
+            case ".png" | ".gif":
+                with Image.open(io.BytesIO(data)) as picture:
+                    for frame in range(getattr(picture, "n_frames", 1)):
+                        picture.seek(frame)
+                        picture.load()
+            case ".svg":
+                ElementTree.fromstring(data)
+                if re.search(rb'[ ",](nan|inf|-inf)[ ",]', data):
+                    return "a coordinate is not finite"
+            case ".npy":
+                if not np.isfinite(np.load(io.BytesIO(data))).all():
+                    return "a vector is not finite"
+            case ".rosy" | ".rawfield" | ".txt" | ".sings":
+                if re.search(rb"nan|inf", data):
+                    return "a number is not finite"
+                read_rows(path)
+            case ".obj":
+                if not data.endswith(b"\n"):
+                    return "the last line is cut"
+    except (OSError, ValueError, SyntaxError, RosyError, ElementTree.ParseError) as error:
+        return f"{type(error).__name__}: {error}"
+    return ""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
+import pickle
 import stat
+import traceback
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -31,7 +36,10 @@ class Case:
     arguments : list of str
         Without the name of the program. Paths are relative to the folder of the case.
     outputs : set of str
-        Names of files that the run may write, all others have to stay unchanged.
+        Names of files that the run may write, and of folders, which end in a slash. All others have
+        to stay unchanged.
+    expected : dict of str to str
+        Hashes of all files that the outputs consist of after a run that was not killed.
     environment : dict of str to str
         Changed variables of the environment.
     stdout : str
@@ -39,18 +47,44 @@ class Case:
     interrupt_after : float, optional
         Seconds after which the run is interrupted as by Ctrl-C.
     kill_after : float, optional
-        Seconds after which the run is killed.
+        Seconds after which the run is killed. If files are expected, it is then started again.
     own_process : bool
         Whether to start Python anew instead of forking, which takes ten times as long.
     """
 
     arguments: list[str]
     outputs: set[str] = field(default_factory=set)
+    expected: dict[str, str] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)
     stdout: str = "file"
     interrupt_after: float | None = None
     kill_after: float | None = None
     own_process: bool = False
+
+    def may_write(self, name: str) -> bool:
+        """Whether the run may write a file."""
+        folders = (output for output in self.outputs if output.endswith("/"))
+        return name in self.outputs or f"{name}/" in self.outputs or name.startswith(tuple(folders))
+
+
+class Category(NamedTuple):
+    """A kind of cases.
+
+    Attributes
+    ----------
+    make : callable
+        Writes the files of a case to a folder, and returns the case.
+    share : int
+        How often it occurs, relative to the others.
+    """
+
+    make: Callable[[Generator, Path], Case]
+    share: int = 10
+
+
+def hash_file(path: Path) -> str:
+    """Return the hash of the contents of a file."""
+    return sha256(path.read_bytes()).hexdigest()
 
 
 def make_case(category: str, seed: int, folder: Path) -> Case:
@@ -64,7 +98,7 @@ def make_case(category: str, seed: int, folder: Path) -> Case:
     folder : Path
     """
     rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
-    return CATEGORIES[category](rng, folder)
+    return CATEGORIES[category].make(rng, folder)
 
 
 #: Commands for mesh files, with the extension of their output.
@@ -266,15 +300,46 @@ def _stream_case(rng: Generator, folder: Path) -> Case:
     return case
 
 
-#: Functions that make the cases, by category.
-CATEGORIES: dict[str, Callable[[Generator, Path], Case]] = {
-    "shapes": _shape_case,
-    "mesh-files": _mesh_file_case,
-    "field-files": _field_file_case,
-    "guides": _guide_case,
-    "options": _option_case,
-    "looks": _look_case,
-    "tones": _tone_case,
-    "paths": _path_case,
-    "streams": _stream_case,
+def _from_scenes(name: str) -> Callable[[Generator, Path], Case]:
+    """Return a function that makes a case with a function of the module `scenes`.
+
+    It does so in a fork of this process: Blender starts threads when it works, and later forks, in
+    which the cases run, must not come from a process with threads.
+    """
+
+    def make(rng: Generator, folder: Path) -> Case:
+        from . import scenes
+
+        result = folder.with_suffix(".case")
+        pid = os.fork()
+        if pid == 0:
+            try:
+                case = getattr(scenes, name)(rng, folder)
+                result.write_bytes(pickle.dumps(case))
+            except BaseException:
+                traceback.print_exc()
+            finally:
+                os._exit(0)
+        os.waitpid(pid, 0)
+        return pickle.loads(result.read_bytes())
+
+    return make
+
+
+#: All categories by name. Those of Blender files need Python with `bpy`.
+CATEGORIES = {
+    "shapes": Category(_shape_case),
+    "mesh-files": Category(_mesh_file_case),
+    "field-files": Category(_field_file_case),
+    "guides": Category(_guide_case),
+    "options": Category(_option_case),
+    "looks": Category(_look_case),
+    "tones": Category(_tone_case),
+    "paths": Category(_path_case, share=5),
+    "streams": Category(_stream_case, share=2),
 }
+if importlib.util.find_spec("bpy") is not None:
+    CATEGORIES |= {
+        "scenes": Category(_from_scenes("scene_case")),
+        "animations": Category(_from_scenes("animation_case"), share=2),
+    }

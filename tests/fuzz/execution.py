@@ -10,11 +10,10 @@ import subprocess
 import sys
 import time
 import traceback
-from dataclasses import dataclass
-from hashlib import sha256
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .cases import Case
+from .cases import Case, hash_file
 
 #: Seconds after which a run counts as hanging, and bytes of address space that it may take beyond
 #: those of this process.
@@ -55,6 +54,9 @@ def execute(case: Case, folder: Path) -> Run:
     start = time.perf_counter()
     pid = (_start_process if case.own_process else _fork)(case, folder, streams)
     status, usage = _wait(pid, case, start)
+    if case.kill_after is not None and case.expected and status == -signal.SIGKILL:
+        again = replace(case, kill_after=None)
+        status, usage = _wait(_start_process(again, folder, streams), again, time.perf_counter())
     seconds = time.perf_counter() - start
     stdout, stderr = (path.read_bytes() for path in streams)
     for path in streams:
@@ -69,7 +71,7 @@ def listing(folder: Path) -> dict[str, str]:
     for path in sorted(folder.rglob("*")):
         mode = path.lstat().st_mode
         if stat.S_ISREG(mode):
-            text = sha256(path.read_bytes()).hexdigest()
+            text = hash_file(path)
         elif stat.S_ISLNK(mode):
             text = f"link to {os.readlink(path)}"
         else:

@@ -22,13 +22,17 @@ def mesh_bytes(rng: Generator, suffix: str, mesh: Polygons) -> bytes:
 
 def _obj(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     lines = ["# a mesh", "mtllib scene.mtl", "o part"] if rng.random() < 0.5 else []
-    number = "%.9g %.9g %.9g" if rng.random() < 0.5 else "%r %r %r"
-    lines += ["v " + number % tuple(point) for point in points.tolist()]
+    number = "{:.9g} {:.9g} {:.9g}" if rng.random() < 0.5 else "{!r} {!r} {!r}"
+    lines += ["v " + number.format(*point) for point in points.tolist()]
     uv = rng.random() < 0.6
     if uv:
-        lines += ["vt %.6g %.6g" % tuple(pair) for pair in rng.uniform(-1, 2, (len(points), 2))]
+        lines += ["vt {:.6g} {:.6g}".format(*pair) for pair in rng.uniform(-1, 2, (len(points), 2))]
     relative = rng.random() < 0.15
-    form = ("{0}/{0}" if rng.random() < 0.7 else "{0}/{0}/1") if uv else ("{0}", "{0}//1")[rng.integers(2)]
+    form = (
+        ("{0}/{0}" if rng.random() < 0.7 else "{0}/{0}/1")
+        if uv
+        else ("{0}", "{0}//1")[rng.integers(2)]
+    )
     if "//1" in form or "/1" in form[3:]:
         lines.append("vn 0 0 1")
     for index, face in enumerate(faces):
@@ -40,7 +44,7 @@ def _obj(rng: Generator, points: np.ndarray, faces: list) -> bytes:
             line = line.replace(" ", " \\\n", 2)
         lines.append(line)
     if rng.random() < 0.2:
-        lines += ["# degree 4", *("# field %d 1 0 0" % i for i in range(len(points)))]
+        lines += ["# degree 4", *(f"# field {i} 1 0 0" for i in range(len(points)))]
     return "\n".join(lines).encode() + b"\n"
 
 
@@ -49,7 +53,7 @@ def _off(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     lines = [f"OFF {counts}"] if rng.random() < 0.2 else ["OFF", counts]
     if rng.random() < 0.2:
         lines.insert(1, "# a comment")
-    lines += ["%r %r %r" % tuple(point) for point in points.tolist()]
+    lines += ["{!r} {!r} {!r}".format(*point) for point in points.tolist()]
     color = " 255 0 0" if rng.random() < 0.2 else ""
     lines += [" ".join(map(str, (len(face), *face))) + color for face in faces]
     return "\n".join(lines).encode() + b"\n"
@@ -96,9 +100,7 @@ def _ply(rng: Generator, points: np.ndarray, faces: list) -> bytes:
 def _stl(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     with np.errstate(over="ignore"):
         points = points.astype(np.float32)
-    triangles = [
-        (face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)
-    ]
+    triangles = [(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)]
     if rng.random() < 0.5:
         data = b"made by a program".ljust(80) + struct.pack("<I", len(triangles))
         return data + b"".join(
@@ -108,7 +110,7 @@ def _stl(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     lines = ["solid part"]
     for triangle in triangles:
         lines += ["facet normal 0 0 1", " outer loop"]
-        lines += ["  vertex %r %r %r" % tuple(points[v].tolist()) for v in triangle]
+        lines += ["  vertex {!r} {!r} {!r}".format(*points[v].tolist()) for v in triangle]
         lines += [" endloop", "endfacet"]
     return "\n".join([*lines, "endsolid part", ""]).encode()
 

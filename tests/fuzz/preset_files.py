@@ -47,7 +47,7 @@ def setting_value(rng: Generator, setting: Setting) -> Any:
         case Choice(options=options):
             return list(options)[rng.integers(len(options))]
         case Color():
-            return "#%06x" % rng.integers(1 << 24)
+            return f"#{rng.integers(1 << 24):06x}"
         case Number(low=low, high=high, default=default):
             exact = int if isinstance(default, int) else float
             kind = rng.random()

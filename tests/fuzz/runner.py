@@ -35,7 +35,9 @@ class Outcome(NamedTuple):
 
 def main() -> int:
     """Run the cases that the options name. Return 1 if there is a fault, otherwise 0."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description="Run random hostile cases.")
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.fuzz", description="Run random hostile cases."
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the first case (1)")
     parser.add_argument("--cases", type=int, help="number of cases; by default no limit")
     parser.add_argument("--seconds", type=float, help="stop after this time")
@@ -46,6 +48,7 @@ def main() -> int:
     parser.add_argument(
         "--keep", type=Path, default=Path("dist/fuzz"), help="folder for the cases with faults"
     )
+    parser.add_argument("--verbose", action="store_true", help="print the outcome of every case")
     options = parser.parse_args()
     if options.cases is None and options.seconds is None:
         parser.error("give --cases, --seconds, or both")
@@ -55,13 +58,15 @@ def main() -> int:
         counts[outcome.category, outcome.verdict] += 1
         slowest = max(slowest or outcome, outcome, key=lambda o: o.seconds)
         largest = max(largest or outcome, outcome, key=lambda o: o.peak_bytes)
-        if outcome.verdict.is_fault:
+        if outcome.verdict.is_fault or options.verbose:
             print(
                 f"{outcome.category} {outcome.seed}: {outcome.verdict.value}: {outcome.reason}",
                 flush=True,
             )
     _print_table(counts)
-    print(f"{sum(counts.values()):,} cases in {time.monotonic() - start:.0f} s, seed {options.seed}")
+    print(
+        f"{sum(counts.values()):,} cases in {time.monotonic() - start:.0f} s, seed {options.seed}"
+    )
     if slowest is not None:
         print(f"slowest: {slowest.category} {slowest.seed}, {slowest.seconds:.1f} s")
         print(f"largest: {largest.category} {largest.seed}, {largest.peak_bytes / 2**20:.0f} MiB")
@@ -75,13 +80,17 @@ def _outcomes(options: argparse.Namespace, start: float) -> Iterator[Outcome]:
     categories = options.category or list(CATEGORIES)
 
     def numbered() -> Iterator[tuple[str, int, Path]]:
+        # Each category occurs as often as its share says, spread evenly.
+        total = sum(CATEGORIES[name].share for name in categories)
+        done = dict.fromkeys(categories, 0)
         number = 0
         while options.cases is None or number < options.cases:
             if options.seconds is not None and time.monotonic() - start > options.seconds:
                 return
-            seed = options.seed + number // len(categories)
-            yield categories[number % len(categories)], seed, options.keep
             number += 1
+            name = max(done, key=lambda key: number * CATEGORIES[key].share / total - done[key])
+            yield name, options.seed + done[name], options.keep
+            done[name] += 1
 
     if options.jobs == 1:
         yield from map(_run_case, numbered())
@@ -110,11 +119,17 @@ def _run_case(arguments: tuple[str, int, Path]) -> Outcome:
             again = Path(parent) / "again"
             again.mkdir()
             repeated = execute(make_case(category, seed, again), again)
-            if (repeated.after, repeated.stdout) != (run.after, run.stdout):
+            if _comparable(case, repeated) != _comparable(case, run):
                 verdict, reason = Verdict.NOT_REPEATED, "files or standard output differ"
         if verdict.is_fault:
             _keep(keep / f"{category}-{seed}", folder, case, run, f"{verdict.value}: {reason}")
         return Outcome(category, seed, verdict, reason, run.seconds, run.peak_bytes)
+
+
+def _comparable(case: Case, run: Run) -> tuple[dict[str, str], bytes]:
+    """Return the files and the output of a run, without what contains times."""
+    files = {name: text for name, text in run.after.items() if ".blend" not in name}
+    return files, run.stdout if case.arguments[0] == "info" else b""
 
 
 def _keep(target: Path, folder: Path, case: Case, run: Run, text: str) -> None:

@@ -63,9 +63,7 @@ def _ring_solid(rng: Generator) -> Polygons:
     faces = []
     for level in range(levels):
         a, b = level * count, (level + 1) * count
-        faces += [
-            (a + i, a + (i + 1) % count, b + (i + 1) % count, b + i) for i in range(count)
-        ]
+        faces += [(a + i, a + (i + 1) % count, b + (i + 1) % count, b + i) for i in range(count)]
     if rng.random() < 0.6:
         faces += [tuple(range(count))[::-1], tuple(range(levels * count, (levels + 1) * count))]
     return np.concatenate(points), faces

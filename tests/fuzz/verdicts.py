@@ -23,6 +23,9 @@ from .execution import Run
 #: Most resident memory of a run. Pictures of cases are small.
 MEMORY_BYTES = 2 << 30
 
+#: Lines that Blender prints to standard output.
+_BLENDER_LINE = re.compile("Info|Warning|Error|Read |Saved")
+
 
 class Verdict(Enum):
     """The outcome of a run. All after `ENDED` are faults of the program."""
@@ -61,10 +64,8 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
     stderr = run.stderr.decode("utf-8", "replace")
     if run.status is None:
         return Verdict.HANG, f"{run.seconds:.0f} s"
-    if case.interrupt_after is not None and "rosy_addon" not in stderr:
-        # Python ends like this, with or without a traceback, until RoSy's first line runs.
-        if run.status == -signal.SIGINT or stderr.rstrip().endswith("KeyboardInterrupt"):
-            return Verdict.ENDED, "interrupted before RoSy started"
+    if case.interrupt_after is not None and _stopped_early(run, stderr):
+        return Verdict.ENDED, "interrupted before RoSy started"
     if "Traceback" in stderr:
         return Verdict.TRACEBACK, stderr.strip().splitlines()[-1]
     killed = case.kill_after is not None and run.status == -signal.SIGKILL
@@ -72,19 +73,27 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
         return Verdict.CRASH, signal.Signals(-run.status).name
     if re.search(r"\w+Warning\b", stderr):
         return Verdict.WARNING, stderr.strip()[:300]
-    for text in (stderr, run.stdout.decode("utf-8", "replace")):
+    for text in (stderr, _own_output(run.stdout)):
         if unsafe := UNSAFE.search(text):
             return Verdict.CONTROL, repr(text[max(unsafe.start() - 40, 0) :][:80])
     if run.peak_bytes > MEMORY_BYTES:
         return Verdict.MEMORY, f"{run.peak_bytes / 2**30:.1f} GiB"
     if stray := _stray_files(case, run, killed):
         return Verdict.STRAY, stray
-    for name in sorted(case.outputs & run.after.keys()):
-        if run.after[name] != run.before.get(name) and not run.after[name].startswith("link"):
+    for name in sorted(filter(case.may_write, run.after)):
+        if run.after[name] != run.before.get(name) and (folder / name).is_file():
             if fault := _file_fault(folder / name):
                 return Verdict.HALF_WRITTEN, f"{name}: {fault}"
-            if run.status not in (0, 130, 141, -signal.SIGKILL, 1):
+            if (
+                run.status not in (0, 130, 141, -signal.SIGKILL, 1)
+                and "--frames" not in case.arguments
+            ):
                 return Verdict.STATUS, f"status {run.status}, but {name} was written"
+    if run.status == 0 and case.expected:
+        found = {name: text for name, text in run.after.items() if (folder / name).is_file()}
+        found = {name: text for name, text in found.items() if case.may_write(name)}
+        if wrong := sorted(case.expected.items() ^ found.items()):
+            return Verdict.NOT_REPEATED, f"{wrong[0][0]} is not as after the first run"
     return _judge_status(case, run, stderr, killed)
 
 
@@ -98,7 +107,11 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
                 return Verdict.HALF_WRITTEN, fault
             if not all(line.startswith("rosy: ") for line in lines):
                 return Verdict.MESSAGE, stderr.strip()[:300]
-            written = {name for name in case.outputs if run.after.get(name) != run.before.get(name)}
+            written = [
+                name
+                for name in filter(case.may_write, run.after)
+                if run.after[name] != run.before.get(name)
+            ]
             if "-o" in case.arguments and not written:
                 # The same bytes as before are right, but no case begins with these.
                 return Verdict.STATUS, "status 0, but nothing was written"
@@ -106,7 +119,8 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
         case 2:
             usage = bool(lines) and lines[0].startswith("usage:")
             errors = [line for line in lines if re.match(r"(rosy|[\w. -]*): ", line)]
-            if not lines or run.stdout and case.arguments[0] != "turntable":
+            # Blender and videos print what they do.
+            if not lines or (run.stdout and case.arguments[0] in ("render", "field", "info")):
                 return Verdict.MESSAGE, f"stdout {run.stdout[:80]!r}, stderr {stderr[:80]!r}"
             if not usage and (len(errors) != len(lines) or len(lines) > 3):
                 return Verdict.MESSAGE, stderr.strip()[:300]
@@ -122,10 +136,22 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
     return Verdict.STATUS, f"status {run.status}: {stderr.strip()[-200:]}"
 
 
+def _stopped_early(run: Run, stderr: str) -> bool:
+    """Return whether an interrupt ended Python before RoSy's first line, with a traceback or not."""
+    interrupted = run.status == -signal.SIGINT or stderr.rstrip().endswith("KeyboardInterrupt")
+    return interrupted and "rosy_addon" not in stderr
+
+
+def _own_output(stdout: bytes) -> str:
+    """Return standard output without the lines that Blender prints."""
+    lines = stdout.decode("utf-8", "replace").split("\n")
+    return "\n".join(line for line in lines if not _BLENDER_LINE.match(line))
+
+
 def _stray_files(case: Case, run: Run, killed: bool) -> str:
     """Return what was changed that should not have been, or an empty text."""
     for name in sorted(run.before.keys() | run.after.keys()):
-        if name in case.outputs or run.before.get(name) == run.after.get(name):
+        if case.may_write(name) or run.before.get(name) == run.after.get(name):
             continue
         if killed and Path(name).name.startswith(".rosy-"):
             continue  # a kill leaves a temporary file, as nothing can remove it

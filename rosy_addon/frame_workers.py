@@ -120,7 +120,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     workers = []
     for index in range(process_count):
         share = frames[index::process_count]
-        workers.append((share, _start_worker([*command, "--frames", format_frames(share)])))
+        workers.append((share, _start_worker([*command, f"--frames={format_frames(share)}"])))
     # Read the output of all processes at the same time: a process whose pipe is full would block.
     messages: queue.Queue[tuple[int, str | None]] = queue.Queue()
     for index, (_, process) in enumerate(workers):
@@ -198,7 +198,7 @@ def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Ite
             text = format_frames(chunk)
             future = client.submit(
                 subprocess.run,
-                [*command, "--frames", text],
+                [*command, f"--frames={text}"],
                 capture_output=True,
                 text=True,
                 key=f"rosy-{text}-{time.time_ns()}",

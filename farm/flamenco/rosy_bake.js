@@ -65,14 +65,15 @@ function compileJob(job) {
 }
 
 // Return a task that runs the command `bake` for some frames. Frames that exist and are up to date are
-// kept, so a task can run again, or twice at once.
+// kept, so a task can run again, or twice at once. The folder is a word of its own, because the manager
+// translates only paths at the start of a word. Names are not, because they may begin with a dash.
 function bakeTask(settings, camera, chunk) {
-    const args = ["--out", settings.folder, "--frames", chunk];
+    const args = ["--out", settings.folder, `--frames=${chunk}`];
     if (camera) {
-        args.push("--camera", camera);
+        args.push(`--camera=${camera}`);
     }
     if (settings.preset) {
-        args.push("--preset", settings.preset);
+        args.push(`--preset=${settings.preset}`);
     }
     const task = author.Task(camera ? `${camera} ${chunk}` : `frames ${chunk}`, "blender");
     task.addCommand(author.Command("exec", {

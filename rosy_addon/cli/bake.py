@@ -13,7 +13,7 @@ from ..gpu.select import RENDER_DEVICES
 from ..progress import Task
 from .bake_workers import run_workers, uses_workers
 from .look import add_look_options, requested_look
-from .options import add_subcommand, parse_size
+from .options import add_object_option, add_subcommand, parse_size
 from .scene import open_scene, requested_cameras
 from .streams import print_error, print_line
 
@@ -28,9 +28,7 @@ def add_bake_command(subparsers: Any) -> None:
         metavar="SCENE.blend",
         help="Blender file; by default the open one",
     )
-    parser.add_argument(
-        "--object", nargs="+", metavar="NAME", help="objects to draw; by default all with a field"
-    )
+    add_object_option(parser, "objects to draw; by default all with a field")
     cameras = parser.add_mutually_exclusive_group()
     cameras.add_argument(
         "--camera", metavar="NAME", help="camera to draw from; by default the scene's active one"

@@ -43,22 +43,23 @@ def run_workers(options: argparse.Namespace) -> None:
 
 
 def _forwarded_args(options: argparse.Namespace) -> list[str]:
-    """Return the options that are passed on to the other processes."""
-    arguments = ["--out", str(options.out.resolve())]
-    if options.object:
-        arguments += ["--object", *options.object]
+    """Return the options that are passed on to the other processes.
+
+    Each is one word, because names may begin with a dash.
+    """
+    arguments = [f"--out={options.out.resolve()}"]
+    arguments += [f"--object={name}" for name in options.object or ()]
     if options.camera is not None:
-        arguments += ["--camera", options.camera]
+        arguments.append(f"--camera={options.camera}")
     if options.all_cameras:
-        arguments += ["--all-cameras"]
+        arguments.append("--all-cameras")
     if options.size is not None:
-        arguments += ["--size", f"{options.size[0]}x{options.size[1]}"]
+        arguments.append(f"--size={options.size[0]}x{options.size[1]}")
     if options.preset is not None:
-        arguments += ["--preset", _forwarded_preset(options.preset)]
+        arguments.append(f"--preset={_forwarded_preset(options.preset)}")
     if options.device is not None:
-        arguments += ["--device", options.device]
-    for setting in options.set:
-        arguments += ["--set", setting]
+        arguments.append(f"--device={options.device}")
+    arguments += [f"--set={setting}" for setting in options.set]
     return arguments
 
 

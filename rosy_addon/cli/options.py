@@ -91,6 +91,11 @@ def int_between(low: int, high: int) -> Callable[[str], int]:
     return parse
 
 
+def add_object_option(parser: argparse.ArgumentParser, help_text: str) -> None:
+    """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
+    parser.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+
+
 def add_subcommand(
     subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
 ) -> argparse.ArgumentParser:

@@ -17,7 +17,7 @@ from ..strokes.pipeline import draw_instances
 from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen, write_svg
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand, check_output
+from .options import add_object_option, add_subcommand, check_output
 from .scene import find_camera, open_scene
 from .streams import print_line
 from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
@@ -39,12 +39,7 @@ def add_strokes_command(subparsers: Any) -> None:
     add_mesh_options(parser, allow_scene=True)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
     add_view_options(parser, None)
-    parser.add_argument(
-        "--object",
-        nargs="+",
-        metavar="NAME",
-        help="objects of a .blend file; by default all with a field",
-    )
+    add_object_option(parser, "objects of a .blend file; by default all with a field")
     parser.add_argument(
         "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
     )

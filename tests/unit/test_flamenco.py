@@ -58,19 +58,19 @@ def command_args(tasks):
 
 def test_each_chunk_is_one_command():
     args = list(command_args(compiled_tasks(frames="1-25", chunk_size=10)))
-    start = ["-b", "/a b/scene.blend", "--command", "rosy", "bake", "--out", "/out", "--frames"]
-    assert args == [[*start, "1-10"], [*start, "11-20"], [*start, "21-25"]]
+    start = ["-b", "/a b/scene.blend", "--command", "rosy", "bake", "--out", "/out"]
+    assert args == [[*start, f"--frames={chunk}"] for chunk in ("1-10", "11-20", "21-25")]
 
 
 def test_each_camera_has_its_own_sequence():
-    tasks = compiled_tasks(frames="3, 5-8", chunk_size=3, cameras="Close, Far ", preset="plaid")
+    tasks = compiled_tasks(frames="3, 5-8", chunk_size=3, cameras="Close, -Far ", preset="plaid")
     args = list(command_args(tasks))
-    assert [each[-4:] for each in args] == [
-        ["--camera", name, "--preset", "plaid"] for name in ("Close", "Close", "Far", "Far")
+    assert [each[-2:] for each in args] == [
+        [f"--camera={name}", "--preset=plaid"] for name in ("Close", "Close", "-Far", "-Far")
     ]
-    assert [each[8] for each in args] == ["3,5,6", "7-8"] * 2
+    assert [each[7] for each in args] == ["--frames=3,5,6", "--frames=7-8"] * 2
     assert [task["name"] for task in tasks] == [
-        "Close 3,5,6", "Close 7-8", "Far 3,5,6", "Far 7-8",
+        "Close 3,5,6", "Close 7-8", "-Far 3,5,6", "-Far 7-8",
     ]  # fmt: skip
     # The command line accepts the frames in the form that the manager writes.
     assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]

@@ -16,7 +16,7 @@ import pytest
 from conftest import ROOT, long
 from shapes import cube, icosphere, torus
 
-from rosy_addon.cli import main
+from rosy_addon.cli import bake_workers, main
 from rosy_addon.color import to_linear
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
@@ -314,6 +314,27 @@ def test_bake_without_blender_is_an_error(monkeypatch, capsys):
 def test_bake_without_an_output_is_refused(capsys):
     assert main(["bake"]) == 2
     assert "give --out DIR" in capsys.readouterr().err
+
+
+def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
+    """Names may begin with a dash."""
+    commands = []
+    monkeypatch.setattr(
+        bake_workers, "run_local", lambda command, *_: commands.append(command) or iter(())
+    )
+    scene = tmp_path / "scene.blend"
+    scene.touch()
+    words = [f"--out={tmp_path}", "--object=-a", "--object=b", "--object=--save", "--camera=-x"]
+    words += ["--size=8x8", "--preset=plaid", "--device=cpu", "--set=gain=2", "--set=-1=-1"]
+    for arguments in (
+        words,
+        ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]],
+    ):
+        assert main(["bake", str(scene), *arguments, "--frames", "1-2", "--jobs", "2"]) == 0
+    command = [sys.executable, "-m", "rosy_addon", "bake", str(scene), *words]
+    assert commands == [command, command]
+    assert main([*command[3:], "--frames=1-2", "--jobs=2"]) == 0
+    assert commands[2] == command
 
 
 # --- fields made, converted and compared -----------------------------------------------------

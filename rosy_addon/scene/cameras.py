@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..projection.camera import Camera, check_size
+from .libraries import check_object_type
 
 #: Camera name of pictures that are drawn from a 3D view.
 VIEW_NAME = "3D View"
@@ -109,8 +110,7 @@ def camera_of_object(
         size is out of range.
     """
     name = camera_object.name
-    if camera_object.type != "CAMERA":
-        raise RosyError(f"object '{name}' is a {camera_object.type.lower()}, not a camera")
+    check_object_type(camera_object, "CAMERA")
     kind = camera_object.data.type
     if kind not in ("PERSP", "ORTHO"):
         description = {"PANO": "panoramic", "CUSTOM": "custom"}.get(kind, kind.lower())

@@ -10,6 +10,7 @@ from mathutils.geometry import interpolate_bezier
 
 from ..errors import RosyError
 from .face_values import read_face_vectors
+from .libraries import check_not_missing
 from .meshes import read_attribute
 
 #: Object types that can guide a field: those with strokes, and all.
@@ -52,12 +53,13 @@ def guide_strokes_and_empties(
     Raises
     ------
     RosyError
-        If an object other than an empty has no stroke.
+        If an object other than an empty has no stroke, or an object is missing in its library.
     """
     world_to_owner = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
     strokes: list[np.ndarray] = []
     empties: list[EmptyGuide] = []
     for obj in objects:
+        check_not_missing(obj)
         matrix = world_to_owner @ np.array(obj.matrix_world, dtype=np.float64)
         if obj.type == "EMPTY":
             radius = obj.empty_display_size * np.linalg.norm(matrix[:3, :3], axis=0).max()

@@ -24,6 +24,7 @@ from .evaluated_field import (
     read_evaluated_field,
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
+from .libraries import check_object_type, remedy_for_absence
 from .meshes import evaluated_mesh, mesh_surface
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
@@ -124,7 +125,8 @@ def read_scene(
     view_layer = depsgraph.view_layer
     objects = field_objects(view_layer) if objects is None else list(objects)
     if not objects:
-        raise RosyError("no visible object has a RoSy field: make or import one first")
+        remedy = remedy_for_absence("make or import one first")
+        raise RosyError(f"no visible object has a RoSy field: {remedy}")
     visible_objects = set(_visible_objects(view_layer))
     cache = Cache() if cache is None else cache
     with temp_attributes(depsgraph, objects, nonfinite, cache) as layouts:
@@ -378,9 +380,8 @@ def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bp
         return candidates[name]
     obj = bpy.data.objects.get(name)
     if obj is None:
-        raise RosyError(f"there is no object '{name}'")
-    if obj.type != "MESH":
-        raise RosyError(f"object '{name}' is a {obj.type.lower()}, not a mesh")
+        raise RosyError(f"there is no object '{name}': {remedy_for_absence('check its name')}")
+    check_object_type(obj, "MESH")
     if not has_field(obj):
         field_name = attribute_name(obj.data)
         raise RosyError(

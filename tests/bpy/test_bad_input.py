@@ -11,6 +11,7 @@ from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.guides import guide_strokes_and_empties
 from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
@@ -48,7 +49,7 @@ def test_no_field(scene, camera):
         field_objects(bpy.context.view_layer, ["Plane"])
     with pytest.raises(RosyError, match="there is no object 'Plain'"):
         field_objects(bpy.context.view_layer, ["Plain"])
-    with pytest.raises(RosyError, match="'Camera' is a camera, not a mesh"):
+    with pytest.raises(RosyError, match="'Camera' is not a mesh, but of type Camera"):
         field_objects(bpy.context.view_layer, ["Camera"])
     add_field(plane, kind="axis").hide_render = True
     with pytest.raises(RosyError, match="'Plane' is hidden in renders"):
@@ -280,6 +281,30 @@ def test_linked_mesh_can_be_drawn_but_not_written(library):
     field = read_mesh_field(mesh)
     with pytest.raises(RosyError, match=r"mesh 'Suzanne' is linked from .*library\.blend"):
         write_mesh_field(mesh, field)
+
+
+def test_missing_libraries_are_named(library):
+    link(linked(library, "objects", "Suzanne"))
+    link(bpy.data.objects.new("Local", linked(library, "meshes", "Suzanne")))
+    path = library.with_name("scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    library.rename(library.with_name("moved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    suzanne = scene.objects["Suzanne"]
+    missing = "library .*library.blend is missing: relink it"
+    for name in ("Suzanne", "Local"):
+        with pytest.raises(RosyError, match=f"object '{name}': its {missing}"):
+            field_objects(layer, [name])
+    with pytest.raises(RosyError, match=f"object 'Suzanne': its {missing}"):
+        camera_of_object(scene, bpy.context.evaluated_depsgraph_get(), suzanne)
+    with pytest.raises(RosyError, match=f"object 'Suzanne': its {missing}"):
+        guide_strokes_and_empties([suzanne], scene.objects["Local"])
+    assert_refused(
+        "no visible object has a RoSy field: relink the missing library", "library.blend"
+    )
+    with pytest.raises(RosyError, match="there is no object 'Head': relink the missing library"):
+        field_objects(layer, ["Head"])
 
 
 def test_override_can_be_drawn(library):

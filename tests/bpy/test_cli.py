@@ -55,7 +55,7 @@ def test_bake_from_all_cameras_and_save(saved):
     ("options", "expected"),
     [
         (["--camera", "None"], "there is no camera 'None' in scene 'Scene', only 'Camera', 'Side'"),
-        (["--camera", "Suzanne"], "object 'Suzanne' is a mesh, not a camera"),
+        (["--camera", "Suzanne"], "object 'Suzanne' is not a camera, but of type Mesh"),
         (["--object", "Nobody"], "there is no object 'Nobody'"),
         (["--size", "0x64"], "size 0x64: a side must be"),
         (["--preset", "none"], "there is no preset 'none'"),

@@ -80,14 +80,18 @@ def run_bake(options: argparse.Namespace) -> None:
     from ..bake import bake as bake_scene
     from ..scene.blend_files import save_blend
     from ..scene.look_properties import read_look
-    from ..scene.pictures import read_output_settings
+    from ..scene.pictures import is_beside_blend, read_output_settings
     from ..scene.scene_reader import field_objects
 
-    settings = read_output_settings(scene)
+    out = None if options.out is None else options.out.resolve()
+    settings = read_output_settings(scene, out)
+    if out is None and settings.folder is not None and not is_beside_blend(settings.folder):
+        # The file may come from someone else.
+        raise RosyError(
+            f"the file stores its pictures in another place, {settings.folder.resolve()}: give --out DIR"
+        )
     if options.device is not None:
         settings = replace(settings, device=options.device)
-    if options.out is not None:
-        settings = replace(settings, folder=options.out.resolve())
     if options.frames is not None:
         _bake_animation(options, scene, settings)
         return

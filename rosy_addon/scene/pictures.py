@@ -125,8 +125,14 @@ class ImageSequence:
     height: int
 
 
-def read_output_settings(scene: bpy.types.Scene) -> OutputSettings:
+def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> OutputSettings:
     """Return the output settings that are stored in a scene.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    folder : Path, optional
+        Folder to save images in, instead of the scene's.
 
     Raises
     ------
@@ -134,7 +140,8 @@ def read_output_settings(scene: bpy.types.Scene) -> OutputSettings:
         See `output_folder`.
     """
     properties = scene.rosy
-    folder = output_folder(scene) if properties.store == "SAVED" else None
+    if folder is None and properties.store == "SAVED":
+        folder = output_folder(scene)
     return OutputSettings(
         window_coordinates=properties.placement == "WINDOW",
         emission=properties.emission,
@@ -157,6 +164,12 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     if directory.startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
     return Path(bpy.path.abspath(directory))
+
+
+def is_beside_blend(folder: Path) -> bool:
+    """Whether a folder is that of the .blend file, or below it. Links are followed."""
+    blend = bpy.data.filepath
+    return bool(blend) and folder.resolve().is_relative_to(Path(blend).parent.resolve())
 
 
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 import pytest
+from rosy.rosy_addon.cli import main
 from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.strokes.svg import Pen
 from scenes import add_camera
@@ -49,6 +50,29 @@ def test_bake_from_all_cameras_and_save(saved):
     assert sorted(record.name for record in bpy.context.scene.rosy.bakes) == ["Camera", "Side"]
     assert [modifier.type for modifier in bpy.data.objects["Suzanne"].modifiers] == ["NODES"]
     assert all(image.packed_file for image in bpy.data.images if image.name.startswith("RoSy"))
+
+
+@pytest.mark.parametrize("folder", ["//../elsewhere", "{}/elsewhere", "//link/elsewhere", ""])
+def test_files_of_others_write_nothing_elsewhere(folder, monkey, camera, tmp_path, capsys):
+    """The folder of pictures in a .blend file counts only below the folder of the file."""
+    (tmp_path / "blend").mkdir()
+    (tmp_path / "blend" / "link").symlink_to(tmp_path)
+    scene, path = bpy.context.scene, tmp_path / "blend" / "suzanne.blend"
+    scene.rosy.store, scene.rosy.directory = "SAVED", folder.format(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["bake", str(path), "--save"]) == 2
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("rosy: ")]
+    assert line.endswith("give --out DIR")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_pictures_below_the_folder_of_the_file(monkey, camera, tmp_path, capsys):
+    scene, path = bpy.context.scene, tmp_path / "suzanne.blend"
+    scene.rosy.store, scene.rosy.directory = "SAVED", "//pictures"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert main(["bake", str(path), "--save"]) == 0, capsys.readouterr().err
+    assert (tmp_path / "pictures" / "RoSy_Camera.png").is_file()
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from ..field.generate import MAGNITUDES
 from ..field.rosy_field import RosyField
 from ..field.singularities import euler_characteristic, find_singularities
 from ..field.surface import Surface
-from .mesh_field import add_mesh_options, load_mesh_and_field
+from .mesh_field import add_mesh_options, load_mesh_and_field, nonfinite_policy
 from .options import add_subcommand, check_output, float_between
 from .streams import print_line
 
@@ -108,7 +108,8 @@ def _compare(
 ) -> dict[str, Any]:
     """Return the angles to the field in a file, or the differences from a file of singularities."""
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
-        other_field = load_field(options.against, surface, field.degree).field
+        policy = nonfinite_policy(options)
+        other_field = load_field(options.against, surface, field.degree, policy).field
         return error_statistics(surface, angle_errors(surface, field, other_field))
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:

@@ -110,9 +110,12 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     surface = read_mesh(options.mesh)
     if options.field is not None:
-        undefined = "zero" if options.undefined else "error"
         loaded = load_field(
-            options.field, surface, options.degree, undefined, mesh=options.field_mesh
+            options.field,
+            surface,
+            options.degree,
+            nonfinite_policy(options),
+            mesh=options.field_mesh,
         )
         print_note(loaded.note)
         return surface, loaded.field
@@ -132,11 +135,16 @@ def _generator_settings(
     if options.strokes is not None:
         settings = replace(settings, strokes=read_guide_strokes(options.strokes))
     if options.guides is not None:
-        guides = load_field(options.guides, surface, degree).field
+        guides = load_field(options.guides, surface, degree, nonfinite_policy(options)).field
         settings = replace(settings, vectors=guides.vectors)
     if options.uv or kind == "uv":
         settings = replace(settings, uv=load_uv_map(options.mesh))
     return settings
+
+
+def nonfinite_policy(options: argparse.Namespace) -> str:
+    """Return what happens to vectors in field files that are not finite: ``error`` or ``zero``."""
+    return "zero" if options.undefined else "error"
 
 
 def load_uv_map(mesh: Path) -> np.ndarray:

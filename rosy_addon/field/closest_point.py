@@ -18,7 +18,9 @@ MAX_CELLS_PER_AXIS = 8
 MAX_PAIRS = 1 << 18
 
 
-def closest_triangles(surface: Surface, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def closest_triangles(
+    surface: Surface, points: np.ndarray, max_distance: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the triangle closest to each point.
 
     Parameters
@@ -26,30 +28,32 @@ def closest_triangles(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
     surface : Surface
     points : (n, 3) float64 ndarray
         Object space.
+    max_distance : float
+        The results of points farther away than this are of any triangle, or of none.
 
     Returns
     -------
     triangle : (n,) int32 ndarray
         Index into `surface.triangles`; the smallest one, if several are equally close.
     distance : (n,) float64 ndarray
-        Distance of the point from the triangle, Blender units.
+        Distance of the point from the triangle, Blender units; infinite if no triangle was found.
     """
     grid = _TriangleGrid(surface)
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     triangle = np.zeros(len(points), dtype=np.int32)
     distance = np.full(len(points), np.inf)
+    is_near = (points >= grid.origin - max_distance) & (points <= grid.top + max_distance)
+    unfinished = np.flatnonzero(is_near.all(axis=1))
     if len(grid.large_triangles):
-        point_index = np.arange(len(points))
         grid.update_closest(
             points,
-            np.repeat(point_index, len(grid.large_triangles)),
-            np.tile(grid.large_triangles, len(points)),
+            np.repeat(unfinished, len(grid.large_triangles)),
+            np.tile(grid.large_triangles, len(unfinished)),
             triangle,
             distance,
         )
     # Search rings of cells around the cell of each point, until the next ring cannot hold a closer
-    # triangle.
-    unfinished = np.arange(len(points))
+    # triangle, or only ones beyond the maximum distance.
     ring = 0
     while len(unfinished):
         grid.search_ring(points, unfinished, ring, triangle, distance)
@@ -58,7 +62,8 @@ def closest_triangles(surface: Surface, points: np.ndarray) -> tuple[np.ndarray,
             points[unfinished]
         )
         unfinished = unfinished[
-            (distance[unfinished] > searched_distance) & (ring <= grid.max_ring)
+            (np.minimum(distance[unfinished], max_distance) > searched_distance)
+            & (ring <= grid.max_ring)
         ]
     return triangle, distance
 
@@ -70,8 +75,8 @@ class _TriangleGrid:
         corners = surface.vertices[surface.triangle_vertex]
         self.corners = corners
         low, high = corners.min(axis=1), corners.max(axis=1)
-        self.origin = low.min(axis=0)
-        extent = high.max(axis=0) - self.origin
+        self.origin, self.top = low.min(axis=0), high.max(axis=0)
+        extent = self.top - self.origin
         longest = max(float(extent.max()), 1e-300)
         # The surface passes through about T cells if T cell faces have the area of its bounding box,
         # which has six sides.

@@ -238,12 +238,14 @@ def axis_field(
         If the axis is zero, not finite, or not a vector of 3 numbers.
     """
     direction = np.asarray(axis, dtype=np.float64).reshape(-1)
-    length = np.linalg.norm(direction)
-    if direction.shape != (3,) or not np.isfinite(length) or length == 0:
+    largest = np.abs(direction).max(initial=0.0)
+    if direction.shape != (3,) or not np.isfinite(largest) or largest == 0:
         raise RosyError(
             f"axis {tuple(axis)} is not a direction: give three finite numbers that are not all zero"
         )
-    direction = direction / length
+    # Scaled exactly to about 1, so that its square neither overflows nor vanishes.
+    direction = np.ldexp(direction, -np.frexp(largest)[1])
+    direction = direction / np.linalg.norm(direction)
     normal = surface.face_normal
     vectors = direction - (normal @ direction)[:, None] * normal
     vectors[~normal.any(axis=1) | (np.linalg.norm(vectors, axis=1) < MIN_PROJECTION)] = 0.0

@@ -78,7 +78,7 @@ def guided_task(
     target = to_representation(np.asarray(guides, dtype=np.float64), x, y, degree)
     hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
     if not target.any():
-        raise RosyError(f"{surface.name}: no guide lies on a face with area")
+        raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
     connection = build_connection(surface)
     yield Progress(0.04, "averaging the guides at the vertices")

@@ -6,6 +6,7 @@ A guide is a member vector that a generated field should follow; it is zero on f
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from .surface import Surface, build_edges, mean_per_face, sum_per_face
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
 #: away are ignored.
 MAX_STROKE_DISTANCE = 0.05
+
+#: Largest number of samples of all strokes.
+MAX_STROKE_SAMPLES = 5_000_000
 
 
 def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
@@ -97,25 +101,33 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
     Raises
     ------
     RosyError
-        If no stroke is within `MAX_STROKE_DISTANCE` of the surface.
+        If no stroke is within `MAX_STROKE_DISTANCE` of the surface, no stroke has a length, or they
+        need more than `MAX_STROKE_SAMPLES` samples.
     """
     corners = surface.vertices[surface.corner_vertex]
     edge = corners[surface.next_corner] - corners
     spacing = 0.5 * float(np.sqrt(dot(edge, edge)).mean())
-    points, directions = [np.zeros((0, 3))], [np.zeros((0, 3))]
-    for stroke in strokes:
-        positions, direction = _resample(
-            np.asarray(stroke, dtype=np.float64).reshape(-1, 3), spacing
+    polylines = [
+        polyline
+        for stroke in strokes
+        if (polyline := _Polyline.of(np.asarray(stroke, dtype=np.float64).reshape(-1, 3)))
+    ]
+    if not polylines:
+        raise RosyError(f"{surface.name}: no stroke has two different points")
+    length = sum(polyline.arc_length[-1] for polyline in polylines)
+    if length > MAX_STROKE_SAMPLES * spacing:
+        raise RosyError(
+            f"{surface.name}: the strokes are {length:.3g} long, too long for a mesh of size "
+            f"{surface.extent:.3g}: scale them, or move their points to the surface"
         )
-        points.append(positions)
-        directions.append(direction)
-    sample, direction = np.concatenate(points), np.concatenate(directions)
-    if len(sample):
-        triangle, distance = closest_triangles(surface, sample)
-        is_close = distance <= MAX_STROKE_DISTANCE * surface.extent
-        face, direction = surface.triangle_face[triangle[is_close]], direction[is_close]
-    if not len(sample) or not len(face):
-        raise RosyError(f"{surface.name}: no stroke is near the surface")
+    samples = [polyline.resample(spacing) for polyline in polylines]
+    sample, direction = (np.concatenate(arrays) for arrays in zip(*samples, strict=True))
+    max_distance = MAX_STROKE_DISTANCE * surface.extent
+    triangle, distance = closest_triangles(surface, sample, max_distance)
+    is_close = distance <= max_distance
+    face, direction = surface.triangle_face[triangle[is_close]], direction[is_close]
+    if not len(face):
+        raise RosyError(f"{surface.name}: no stroke is near the surface: draw strokes on it")
     return average_guides(surface, face, direction, degree)
 
 
@@ -225,28 +237,47 @@ def average_guides(
     return from_representation(total, x, y, degree)
 
 
-def _resample(stroke: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Resample a polyline at about equal distances along it.
+@dataclass(frozen=True, eq=False)
+class _Polyline:
+    """A polyline without segments of length zero.
 
-    Returns
-    -------
+    Attributes
+    ----------
     points : (n, 3) float64 ndarray
-        About `spacing` apart along the polyline.
-    directions : (n, 3) float64 ndarray
-        Unit directions of the polyline at these points, by central differences.
+    arc_length : (n,) float64 ndarray
+        Of each point, from the first.
     """
-    segment_length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
-    stroke = stroke[np.concatenate([[True], segment_length > 0])] if len(stroke) else stroke
-    segment_length = segment_length[segment_length > 0]
-    if not len(segment_length):
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    arc_length = np.concatenate([[0], np.cumsum(segment_length)])
-    count = max(int(arc_length[-1] / spacing), 1)
-    midpoint = (np.arange(count) + 0.5) * (arc_length[-1] / count)
 
-    def point_at(distance: np.ndarray) -> np.ndarray:
-        return np.stack([np.interp(distance, arc_length, column) for column in stroke.T], axis=1)
+    points: np.ndarray
+    arc_length: np.ndarray
 
-    return point_at(midpoint), normalize(
-        point_at(midpoint + spacing) - point_at(midpoint - spacing)
-    )
+    @classmethod
+    def of(cls, stroke: np.ndarray) -> _Polyline | None:
+        """Return the polyline of (n, 3) points; None if no two of them are different."""
+        with np.errstate(over="ignore"):  # a length may be infinite
+            length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
+        if not length.any():
+            return None
+        points = stroke[np.concatenate([[True], length > 0])]
+        return cls(points, np.concatenate([[0], np.cumsum(length[length > 0])]))
+
+    def resample(self, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+        """Resample at about equal distances along the polyline.
+
+        Returns
+        -------
+        points : (n, 3) float64 ndarray
+            About `spacing` apart along the polyline.
+        directions : (n, 3) float64 ndarray
+            Unit directions of the polyline at these points, by central differences.
+        """
+        length = self.arc_length[-1]
+        count = max(int(length / spacing), 1)
+        midpoint = (np.arange(count) + 0.5) * (length / count)
+        ahead, behind = self._points_at(midpoint + spacing), self._points_at(midpoint - spacing)
+        return self._points_at(midpoint), normalize(ahead - behind)
+
+    def _points_at(self, arc_length: np.ndarray) -> np.ndarray:
+        """Return the (n, 3) points at (n,) arc lengths, which are clamped to the polyline."""
+        columns = [np.interp(arc_length, self.arc_length, column) for column in self.points.T]
+        return np.stack(columns, axis=1)

@@ -253,6 +253,8 @@ def test_undefined_vectors_on_request(sphere, tmp_path):
     assert_refused(rosy("info", sphere, path), "1 of 1280 vectors are not finite", "face 7")
     facts = json.loads(rosy("info", sphere, path, "--undefined", "--json").stdout)
     assert facts["undefined_faces"] >= 1
+    for option in ("--guides", "--against"):  # in every field file
+        assert rosy("info", sphere, option, path, "--undefined").returncode == 0
 
 
 @pytest.mark.parametrize(

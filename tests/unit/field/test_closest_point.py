@@ -30,6 +30,20 @@ def test_the_result_matches_an_exhaustive_search(surface, far):
     )
 
 
+def test_a_maximum_distance_changes_only_the_points_beyond_it():
+    ball = icosphere(3)
+    points = np.random.default_rng(1).standard_normal((400, 3))
+    triangle, distance = closest_triangles(ball, points)
+    near_triangle, near_distance = closest_triangles(ball, points, 0.1)
+    near = distance <= 0.1
+    assert 20 < near.sum() < 200 and (near_distance[~near] > 0.1).all()
+    np.testing.assert_array_equal(near_triangle[near], triangle[near])
+    np.testing.assert_array_equal(near_distance[near], distance[near])
+    # What is far away takes no time: neither outside of the surface nor inside.
+    _, distance = closest_triangles(ball, np.tile([[0.0, 0, 0], [1e9, 0, 0]], (100_000, 1)), 0.1)
+    assert (distance > 0.1).all()
+
+
 def test_large_triangles_among_small_ones():
     ball = icosphere(3, 0.1)
     floor = np.array([(-9.0, -9.0, -1.0), (9.0, -9.0, -1.0), (0.0, 9.0, -1.0)])

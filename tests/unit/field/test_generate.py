@@ -223,6 +223,13 @@ def test_an_axis_is_projected():
     assert np.allclose(field.magnitude, np.sqrt(1 - normal[:, 2] ** 2))
 
 
+@pytest.mark.parametrize("length", [1e300, 2.0**-1070])
+def test_the_length_of_an_axis_does_not_count(length):
+    surface = icosphere(1)
+    vectors = axis_field(surface, 4, (length, 0, -length)).vectors
+    np.testing.assert_array_equal(vectors, axis_field(surface, 4, (1, 0, -1)).vectors)
+
+
 def test_faces_perpendicular_to_an_axis_are_undefined():
     """Also where the normal is rounded."""
     points = [(0, 0, 0), (1, 0, 0.3), (0, 1, 0.7), (5, 0, 0), (6, 0, 1), (5, 1, 0)]

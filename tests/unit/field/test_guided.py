@@ -163,7 +163,7 @@ def test_a_component_without_guides_has_no_field():
 
 
 def test_no_guide_at_all_is_an_error():
-    with pytest.raises(RosyError, match="no guide"):
+    with pytest.raises(RosyError, match="guides are zero"):
         guided_field(plane(), 4, np.zeros((16, 3)), 1.0)
 
 

@@ -97,12 +97,19 @@ def test_components_without_a_guide_get_the_smoothest_field():
 
 
 def test_strokes_far_from_the_surface_are_refused(error_of):
-    assert "no stroke is near the surface" in error_of(
-        guides_from_strokes, BALL, [np.ones((4, 3)) * 9], 4
-    )
-    assert "no stroke is near the surface" in error_of(
-        guides_from_strokes, BALL, [np.ones((4, 3))], 4
-    )
+    for stroke, expected in (
+        (((9, 9, 9), (9, 9, 8)), "no stroke is near the surface"),
+        (((1, 1, 1), (1, 1, 1)), "no stroke has two different points"),
+        (((0, 0, 1), (1e10, 0, 0)), "the strokes are 1e+10 long, too long for a mesh of size 2"),
+        (((1e300, 0, 0), (-1e300, 0, 0)), "too long"),
+    ):
+        assert expected in error_of(guides_from_strokes, BALL, [np.array(stroke, float)], 4)
+
+
+def test_only_the_parts_of_strokes_near_the_surface_count():
+    near, far = np.array([(0.0, 0, 1), (0.2, 0, 1)]), np.array([(0.2, 0, 9), (9e3, 0, 9)])
+    guides = guides_from_strokes(BALL, [near, np.zeros((5, 3)), far], 4)
+    np.testing.assert_array_equal(guides, guides_from_strokes(BALL, [near], 4))
 
 
 def test_axes_guide_the_faces_around_them():

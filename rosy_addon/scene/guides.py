@@ -53,9 +53,13 @@ def guide_strokes_and_empties(
     Raises
     ------
     RosyError
-        If an object other than an empty has no stroke, or an object is missing in its library.
+        If an object other than an empty has no stroke or a point that is not finite, if an object is
+        missing in its library, or if the owner is scaled to zero.
     """
-    world_to_owner = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
+    try:
+        world_to_owner = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
+    except np.linalg.LinAlgError:
+        raise RosyError(f"object '{owner.name}' has a scale of zero: scale it up") from None
     strokes: list[np.ndarray] = []
     empties: list[EmptyGuide] = []
     for obj in objects:
@@ -70,6 +74,8 @@ def guide_strokes_and_empties(
             raise RosyError(
                 f"object '{obj.name}' has no stroke to follow: draw one, or choose another object"
             )
+        if not all(np.isfinite(stroke).all() for stroke in polylines):
+            raise RosyError(f"object '{obj.name}' has a point that is not finite: remove it")
         strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in polylines]
     return strokes, empties
 

@@ -227,6 +227,19 @@ def test_writing(scene, monkey):
     assert contents() == before
 
 
+def test_guide_objects(scene, monkey):
+    spline = bpy.data.curves.new("Line", "CURVE").splines.new("POLY")
+    line = link(bpy.data.objects.new("Line", bpy.data.curves["Line"]))
+    spline.points.add(1)
+    spline.points[0].co.x = np.nan
+    with pytest.raises(RosyError, match="object 'Line' has a point that is not finite"):
+        guide_strokes_and_empties([line], monkey)
+    monkey.scale.x = 0.0
+    bpy.context.view_layer.update()
+    with pytest.raises(RosyError, match="object 'Suzanne' has a scale of zero"):
+        guide_strokes_and_empties([line], monkey)
+
+
 def test_bake_in_edit_mode(scene, camera, monkey):
     bpy.context.view_layer.objects.active = monkey
     bpy.ops.object.mode_set(mode="EDIT")

@@ -22,13 +22,13 @@ import numpy as np
 from .cache import Cache, content_hash
 from .compositor.look import Look
 from .errors import RosyError
-from .file_io import check_writable, read_bytes, write_bytes
+from .file_io import check_folder, check_writable, read_bytes, write_bytes
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
 from .render.renderer import Renderer
 from .render.view_input import ViewInput
-from .scene.blender_images import check_folder, frame_path, write_frame
+from .scene.blender_images import frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.look_properties import read_look

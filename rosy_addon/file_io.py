@@ -8,6 +8,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 from .errors import RosyError
 
@@ -31,21 +32,34 @@ def read_bytes(
         If the file is missing, is a folder, cannot be read, is larger than `max_bytes`, or is
         binary and `reject_binary` is set.
     """
+    with open_file(path) as file:
+        head = file.read(4096)
+        if reject_binary and b"\0" in head:
+            raise RosyError(f"{path}: expected text, found binary data")
+        data = head + file.read(-1 if max_bytes is None else max(max_bytes + 1 - len(head), 0))
+    if max_bytes is not None and len(data) > max_bytes:
+        raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
+    return data
+
+
+@contextmanager
+def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """Open a file for reading. A pipe or a device, which may never end, is not opened.
+
+    Raises
+    ------
+    RosyError
+        If the file is missing, is not a regular file, or cannot be read.
+    """
     try:
         if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
             raise RosyError(f"{path}: cannot be read: it is not a regular file")
         with open(path, "rb") as file:
-            head = file.read(4096)
-            if reject_binary and b"\0" in head:
-                raise RosyError(f"{path}: expected text, found binary data")
-            data = head + file.read(-1 if max_bytes is None else max(max_bytes + 1 - len(head), 0))
-        if max_bytes is not None and len(data) > max_bytes:
-            raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
-        return data
+            yield file
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be read: {_error_text(error)}") from error
+        raise RosyError(f"{path}: cannot be read: {error_text(error)}") from error
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
@@ -88,7 +102,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     except BaseException as error:  # an interrupt as well
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise RosyError(f"{path}: cannot be written: {_error_text(error)}") from error
+            raise RosyError(f"{path}: cannot be written: {error_text(error)}") from error
         raise
 
 
@@ -117,9 +131,52 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be written: {_error_text(error)}") from error
+        raise RosyError(f"{path}: cannot be written: {error_text(error)}") from error
 
 
-def _error_text(error: OSError | ValueError) -> str:
+def check_folder(folder: str | os.PathLike[str]) -> None:
+    """Check that files can be written to a folder. It may be missing if it can be created.
+
+    Call this before a long task.
+
+    Raises
+    ------
+    RosyError
+        If the folder cannot be created or written.
+    """
+    try:
+        if not stat.S_ISDIR(os.stat(folder).st_mode):
+            raise RosyError(f"{folder}: is not a folder")
+    except FileNotFoundError:
+        parent = next(
+            parent for parent in Path(folder).absolute().parents if os.path.exists(parent)
+        )
+        if not os.access(parent, os.W_OK):
+            raise RosyError(
+                f"{folder}: cannot be created: no permission to write to {parent}"
+            ) from None
+        return
+    except RosyError:
+        raise
+    except (OSError, ValueError) as error:
+        raise RosyError(f"{folder}: cannot be written: {error_text(error)}") from error
+    check_writable(Path(folder) / "picture.png")
+
+
+def make_folder(folder: str | os.PathLike[str]) -> None:
+    """Create a folder and its parents if they are missing.
+
+    Raises
+    ------
+    RosyError
+        If that fails.
+    """
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise RosyError(f"{folder}: cannot be created: {error_text(error)}") from error
+
+
+def error_text(error: OSError | ValueError) -> str:
     """Return the reason of an error in lower case, without number and path."""
     return (getattr(error, "strerror", None) or str(error)).lower()

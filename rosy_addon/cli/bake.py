@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
+from ..file_io import check_folder
 from ..frame_workers import parse_frames
 from ..gpu.select import RENDER_DEVICES
 from ..progress import Task
@@ -83,12 +85,12 @@ def run_bake(options: argparse.Namespace) -> None:
     from ..scene.pictures import is_beside_blend, read_output_settings
     from ..scene.scene_reader import field_objects
 
-    out = None if options.out is None else options.out.resolve()
+    out = None if options.out is None else Path(os.path.realpath(options.out))
     settings = read_output_settings(scene, out)
     if out is None and settings.folder is not None and not is_beside_blend(settings.folder):
         # The file may come from someone else.
         raise RosyError(
-            f"the file stores its pictures in another place, {settings.folder.resolve()}: give --out DIR"
+            f"the file stores its pictures in another place, {os.path.realpath(settings.folder)}: give --out DIR"
         )
     if options.device is not None:
         settings = replace(settings, device=options.device)
@@ -113,13 +115,15 @@ def run_bake(options: argparse.Namespace) -> None:
 
 
 def _check_bake_options(options: argparse.Namespace) -> None:
-    """Raise an error if options contradict each other, before any file is opened."""
+    """Raise an error if options contradict each other, or --out cannot be written."""
     if options.frames is None and uses_workers(options):
         raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
     if options.frames is not None and options.out is None:
         raise RosyError("--frames writes files: give --out DIR")
     if options.jobs < 1:
         raise RosyError(f"--jobs {options.jobs}: expected 1 or more")
+    if options.out is not None:
+        check_folder(options.out)
 
 
 def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> None:

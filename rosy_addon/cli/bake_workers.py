@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from ..errors import RosyError
+from ..file_io import open_file
 from ..frame_workers import parse_frames, run_dask, run_local, worker_command
 from ..presets.store import SHIPPED_FOLDER, find_preset_file
 from .presets import user_presets_folder
@@ -29,9 +31,9 @@ def run_workers(options: argparse.Namespace) -> None:
                 "--jobs and --scheduler need a saved file: save it, or give SCENE.blend"
             )
         scene = Path(blend_data.filepath)
-    if not scene.is_file():
-        raise RosyError(f"{scene}: cannot be read: no such file")
-    command = worker_command(blender_path, scene.resolve()) + _forwarded_args(options)
+    with open_file(scene):
+        pass
+    command = worker_command(blender_path, Path(os.path.realpath(scene))) + _forwarded_args(options)
     frames = parse_frames(options.frames)
     if options.scheduler is not None:
         output_lines = run_dask(command, frames, options.scheduler)
@@ -47,7 +49,7 @@ def _forwarded_args(options: argparse.Namespace) -> list[str]:
 
     Each is one word, because names may begin with a dash.
     """
-    arguments = [f"--out={options.out.resolve()}"]
+    arguments = [f"--out={os.path.realpath(options.out)}"]
     arguments += [f"--object={name}" for name in options.object or ()]
     if options.camera is not None:
         arguments.append(f"--camera={options.camera}")
@@ -69,4 +71,4 @@ def _forwarded_preset(preset: str) -> str:
     RoSy may be installed in another folder where the worker runs.
     """
     path = find_preset_file(preset, user_presets_folder())
-    return path.stem if path.parent == SHIPPED_FOLDER else str(path.resolve())
+    return path.stem if path.parent == SHIPPED_FOLDER else os.path.realpath(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from pathlib import Path
@@ -119,7 +120,7 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     result = draw_strokes(
         scene,
         kind="SVG",
-        path=path.resolve(),
+        path=Path(os.path.realpath(path)),
         objects=field_objects(layer, options.object) if has_names else target_objects(scene, layer),
         camera=camera,
         style=stroke_style_of(options, read_stroke_style(settings)),

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..file_io import read_bytes, write_bytes
+from ..file_io import error_text, make_folder, read_bytes, write_bytes
 from ..image_io.png import write_png
 from ..settings import settings_of
 from .preview import draw_preview
@@ -62,15 +62,15 @@ def default_user_folder() -> Path:
     It is the environment variable ROSY_PRESETS or, by default, ``rosy/presets`` in the folder of
     user data of the operating system.
     """
-    if "ROSY_PRESETS" in os.environ:
+    if os.environ.get("ROSY_PRESETS"):
         return Path(os.environ["ROSY_PRESETS"])
     home = Path.home()
     if sys.platform == "win32":
-        data = Path(os.environ.get("APPDATA", home / "AppData" / "Roaming"))
+        data = Path(os.environ.get("APPDATA") or home / "AppData" / "Roaming")
     elif sys.platform == "darwin":
         data = home / "Library" / "Application Support"
     else:
-        data = Path(os.environ.get("XDG_DATA_HOME", home / ".local" / "share"))
+        data = Path(os.environ.get("XDG_DATA_HOME") or home / ".local" / "share")
     return data / "rosy" / "presets"
 
 
@@ -80,7 +80,8 @@ def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
     Parameters
     ----------
     user_folder : Path, optional
-        Folder of the user's own presets. They replace shipped presets with the same key.
+        Folder of the user's own presets. They replace shipped presets with the same key. A folder
+        that cannot be read has none; see `user_preset_files`.
 
     Returns
     -------
@@ -90,12 +91,28 @@ def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
     """
     shipped = {path.stem: path for path in sorted(SHIPPED_FOLDER.glob("*.json"))}
     files = {DEFAULT_KEY: shipped.pop(DEFAULT_KEY), **shipped}
-    if user_folder is not None and user_folder.is_dir():
-        user_files = {
-            path.stem: path for path in sorted(user_folder.glob("*.json")) if path.is_file()
-        }
+    with suppress(RosyError):
+        user_files = user_preset_files(user_folder)
         files = {key: path for key, path in files.items() if key not in user_files} | user_files
     return files
+
+
+def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
+    """List the files of the user's own presets by their keys, in alphabetical order.
+
+    Raises
+    ------
+    RosyError
+        If the folder exists and cannot be read.
+    """
+    try:
+        names = [] if user_folder is None else sorted(os.listdir(user_folder))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise RosyError(f"{user_folder}: presets cannot be read: {error_text(error)}") from error
+    paths = [user_folder / name for name in names if name.endswith(".json")]
+    return {path.stem: path for path in paths if os.path.isfile(path)}
 
 
 def preset_keys(user_folder: Path | None = None) -> list[str]:
@@ -116,7 +133,7 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
     Raises
     ------
     RosyError
-        If no preset has that key or name.
+        If no preset has that key or name, or the user's presets cannot be read.
     """
     path = Path(preset)
     if path.suffix.lower() == ".json":
@@ -128,6 +145,7 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
         with suppress(RosyError):
             if preset_key(read_preset(path).name) == preset_key(str(preset)):
                 return path
+    user_preset_files(user_folder)  # If it cannot be read, this is the reason.
     raise RosyError(f"there is no preset '{preset}': choose {', '.join(files)}")
 
 
@@ -238,7 +256,7 @@ def save_preset(preset: Preset, user_folder: Path, *, replace: bool = False) -> 
         unless `replace` is set, of another preset of the user, or if a file cannot be written.
     """
     path = _target_path(_validated(preset), user_folder, replace)
-    _create_folder(user_folder)
+    make_folder(user_folder)
     write_png(preview_path(path), draw_preview(preset.look))
     write_preset(path, preset)
     return path.stem
@@ -331,20 +349,12 @@ def _user_file(key: str, user_folder: Path) -> Path:
     return path
 
 
-def _create_folder(folder: Path) -> None:
-    """Create a folder and its parents if they are missing. Raise RosyError if that fails."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise RosyError(f"{folder}: cannot be created: {str(reason.strerror).lower()}") from None
-
-
 def _delete_file(path: Path) -> None:
     """Delete a file if it exists. Raise RosyError if that fails."""
     try:
         path.unlink(missing_ok=True)
     except OSError as reason:
-        raise RosyError(f"{path}: cannot be deleted: {str(reason.strerror).lower()}") from None
+        raise RosyError(f"{path}: cannot be deleted: {error_text(reason)}") from None
 
 
 def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
 
 from ..errors import RosyError
+from ..file_io import open_file
 
 
 def open_blend(path: Path) -> None:
@@ -17,10 +19,10 @@ def open_blend(path: Path) -> None:
     RosyError
         If the file is missing or cannot be read.
     """
-    if not path.is_file():
-        raise RosyError(f"{path}: cannot be read: no such file")
+    with open_file(path):
+        pass
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
+        bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
     except RuntimeError as reason:
         raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
 

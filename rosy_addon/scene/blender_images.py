@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import bpy
@@ -11,7 +10,7 @@ import numpy as np
 from ..color import to_display, to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
-from ..file_io import check_writable, replacing
+from ..file_io import check_writable, make_folder, replacing
 from ..image_io.png import write_png
 
 #: Pixels by which colors are extended past the border of the covered area. A render whose
@@ -105,26 +104,6 @@ def with_bleed(rgba: np.ndarray) -> np.ndarray:
     return padded[1:-1, 1:-1].copy()
 
 
-def check_folder(folder: Path) -> None:
-    """Check that pictures can be saved to a folder. It may be missing if it can be created.
-
-    Call this before a long task.
-
-    Raises
-    ------
-    RosyError
-        If the folder cannot be created or written.
-    """
-    if not folder.exists():
-        parent = next((ancestor for ancestor in folder.parents if ancestor.exists()), folder)
-        if not parent.is_dir() or not os.access(parent, os.W_OK):
-            raise RosyError(f"{folder}: cannot be created: no permission to write to {parent}")
-        return
-    if not folder.is_dir():
-        raise RosyError(f"{folder}: is not a folder")
-    check_writable(folder / "picture.png")
-
-
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
     """Return the path of one frame of an image sequence, numbered as Blender expects it."""
     return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
@@ -140,7 +119,7 @@ def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
     RosyError
         If the file cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     check_writable(path)
     rgba = with_bleed(picture.rgba)
     if not as_float:
@@ -181,10 +160,7 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
 def _save_image(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
     """Save an image to a file, and make the image use this file. An older file is replaced."""
     path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as reason:
-        raise RosyError(f"{path.parent}: cannot be created: {reason.strerror.lower()}") from reason
+    make_folder(path.parent)
     check_writable(path)
     if image.is_float:
         image.file_format = "OPEN_EXR"

@@ -19,7 +19,7 @@ def user_presets_folder() -> Path:
     It is in the folder that Blender provides for the files of an extension. If RoSy does not run as
     an extension, or the environment variable ROSY_PRESETS is set, it is `default_user_folder`.
     """
-    if "ROSY_PRESETS" not in os.environ:
+    if not os.environ.get("ROSY_PRESETS"):
         try:
             return Path(bpy.utils.extension_path_user(EXTENSION_ID, path="presets"))
         except ValueError:  # not installed as an extension

@@ -11,6 +11,7 @@ transformed, and slides over one that deforms.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +21,10 @@ import numpy as np
 
 from ..compositor.picture import Picture
 from ..errors import RosyError
+from ..file_io import check_folder
 from ..projection.camera import Camera
 from .bake_records import store_record
-from .blender_images import check_folder, load_sequence, new_image
+from .blender_images import load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
 from .owned_data import OWNED_TAG, rollback_on_error
@@ -169,7 +171,9 @@ def output_folder(scene: bpy.types.Scene) -> Path:
 def is_beside_blend(folder: Path) -> bool:
     """Whether a folder is that of the .blend file, or below it. Links are followed."""
     blend = bpy.data.filepath
-    return bool(blend) and folder.resolve().is_relative_to(Path(blend).parent.resolve())
+    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
+        os.path.realpath(Path(blend).parent)
+    )
 
 
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:

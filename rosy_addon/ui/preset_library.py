@@ -17,6 +17,7 @@ from ..presets.store import (
     preset_files,
     preview_path,
     read_preset,
+    user_preset_files,
 )
 from ..scene.look_properties import apply_look, matches_look
 from ..scene.paths import user_presets_folder
@@ -74,6 +75,10 @@ class _PresetLibrary:
                 self.entries[key] = PresetEntry(path, read_preset(path), path.parent == user_folder)
             except RosyError as error:
                 self.load_errors.append(str(error))
+        try:
+            user_preset_files(user_folder)
+        except RosyError as error:
+            self.load_errors.append(str(error))
         self._load_previews()
 
     def _load_previews(self) -> None:

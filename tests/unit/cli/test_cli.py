@@ -20,6 +20,7 @@ from rosy_addon.cli import bake_workers, main
 from rosy_addon.color import to_linear
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
+from rosy_addon.presets.store import preset_files
 
 
 def rosy(*arguments, **options) -> subprocess.CompletedProcess:
@@ -571,6 +572,32 @@ def test_outputs_replace_only_regular_files(tmp_path, capsys):
         assert main([*render, str(mesh), "-o", str(output)]) == 0
     assert link.is_symlink() and (elsewhere / "real.png").read_bytes() == longest.read_bytes()
     assert not list(tmp_path.glob(".*")) and not list(elsewhere.glob(".*"))
+
+
+def test_paths_that_cannot_be_opened(tmp_path, capsys, monkeypatch):
+    name, path = tmp_path / ("a" * 252 + ".blend"), tmp_path / "/".join(["b" * 200] * 30)
+    pipe, file = tmp_path / "pipe.blend", tmp_path / "file"
+    os.mkfifo(pipe)
+    file.touch()
+    jobs = ["--out", str(tmp_path), "--frames", "1-2", "--jobs", "2"]
+    for words, expected in (
+        (["bake", str(name), *jobs], "cannot be read: file name too long"),
+        (["bake", str(path), *jobs], "cannot be read: file name too long"),
+        (["bake", str(pipe), *jobs], "cannot be read: it is not a regular file"),
+        (["bake", str(tmp_path), *jobs], "cannot be read: is a directory"),
+        (["bake", "--out", str(name)], "cannot be written: file name too long"),
+        (["bake", "--out", str(file)], "file: is not a folder"),
+        (["bake", "--out", str(file / "below")], "cannot be written: not a directory"),
+    ):
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert expected in error and error.count("\n") == 1
+    for folder, expected in ((file, "not a directory"), (name, "file name too long")):
+        monkeypatch.setenv("ROSY_PRESETS", str(folder))
+        for words in (["presets"], ["render", "a.off", "-o", "a.png", "--preset", "mine"]):
+            assert main(words) == 2
+            assert f"presets cannot be read: {expected}" in capsys.readouterr().err
+        assert "plaid" in preset_files(folder)
 
 
 @pytest.mark.slow

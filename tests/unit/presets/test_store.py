@@ -400,10 +400,14 @@ def test_a_folder_that_cannot_be_created(tmp_path, blank_previews, error_of):
 @pytest.mark.parametrize("platform", ["linux", "darwin", "win32"])
 def test_user_folder_outside_blender(platform, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "platform", platform)
-    for name in ("ROSY_PRESETS", "XDG_DATA_HOME", "APPDATA"):
+    variables = "ROSY_PRESETS", "XDG_DATA_HOME", "APPDATA"
+    for name in variables:
         monkeypatch.delenv(name, raising=False)
     folder = store.default_user_folder()
     assert folder.is_relative_to(Path.home()) and folder.parts[-2:] == ("rosy", "presets")
+    for name in variables:
+        monkeypatch.setenv(name, "")
+    assert store.default_user_folder() == folder
     monkeypatch.setenv("ROSY_PRESETS", str(tmp_path))
     assert store.default_user_folder() == tmp_path
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..field.validate import MIN_COMPONENT
 from ..progress import Progress, Task
 from .contrast import normalize_variance
 from .filter_kernel import kernel_weights
@@ -115,4 +116,5 @@ def relative_magnitude(field: PixelField, look: Look) -> np.ndarray:
     """(P,) float32: rho relative to `Look.magnitude_range`, at most 1."""
     rho = np.abs(field.representation)
     max_magnitude = look.magnitude_range or float(rho.max(initial=0.0)) or 1.0
-    return np.minimum(rho / np.float32(max_magnitude), 1)
+    limit = np.float32(max(max_magnitude, MIN_COMPONENT))
+    return np.minimum(rho, limit) / limit

@@ -68,9 +68,8 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
     if conversion.smoothing_length:
-        field = yield from diffuse_task(
-            surface, field, (conversion.smoothing_length * surface.extent) ** 2
-        )
+        time = (conversion.smoothing_length * surface.extent) ** 2
+        field = yield from diffuse_task(surface, field, max(time, np.finfo(np.float64).tiny))
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
         magnitude = compute_magnitude(surface, magnitude)

@@ -234,6 +234,16 @@ def test_magnitude_is_colored():
     assert np.abs(actual - expected)[inner].max() < 0.03
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("magnitude_range", [0.0, 1e-30, 5e-324, 1e9])
+def test_magnitudes_of_any_scale(magnitude_range):
+    surface = plane(4, 4)
+    rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]
+    gbuffer = project_surface(surface, RosyField(4, rho * [1.0, 0, 0]), 16)
+    look = plain(magnitude="both", magnitude_range=magnitude_range, supersampling=1)
+    assert np.isfinite(compose(gbuffer, look).rgba).all()
+
+
 def test_display_curve_is_its_own_inverse():
     values = np.linspace(0, 1, 1001, dtype=np.float32)
     assert np.allclose(to_display(to_linear(values)), values, atol=1e-5)

@@ -11,7 +11,14 @@ from scipy.sparse.linalg import spsolve
 from shapes import icosphere, plane, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
-from rosy_addon.field.convert import change_degree, diffuse_field, rotate_field, with_magnitude
+from rosy_addon.field.convert import (
+    Conversion,
+    change_degree,
+    convert,
+    diffuse_field,
+    rotate_field,
+    with_magnitude,
+)
 from rosy_addon.field.directional_field import field_from_directions, field_matching
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field, generate
@@ -139,6 +146,10 @@ def test_diffusion_removes_noise_and_keeps_constant_fields():
 
 
 def test_the_diffusion_time_must_be_positive(error_of):
+    # A length whose square is too small for a number is as good as one that is a little larger.
+    field = axis_field(BALL, 4)
+    tiny, small = (convert(BALL, field, Conversion(smoothing_length=h)) for h in (1e-300, 1e-30))
+    np.testing.assert_allclose(tiny.vectors, small.vectors, atol=1e-9)
     assert "the diffusion time must be above 0" in error_of(
         diffuse_field, BALL, axis_field(BALL, 4), 0.0
     )

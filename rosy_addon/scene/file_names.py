@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import unicodedata
 import zlib
 from typing import Literal
 
 import bpy
 
+#: Largest number of bytes of a stem. File systems allow 255 for a whole name, which also has a hash, a
+#: number and suffixes.
+MAX_STEM_BYTES = 180
+
 
 def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
 
-    Characters that file systems do not allow become underscores. If cameras or scenes would then
-    have the same file, also where file systems ignore case, one of them has the plain name, and the
+    Characters that file systems do not allow become underscores, and long names are cut. If cameras
+    or scenes would then have the same file, also where file systems ignore case, one of them has the plain name, and the
     stems of the others end in a hash. Which one depends only on the names in the .blend file, so
     several processes agree.
     """
@@ -20,7 +25,7 @@ def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
     siblings.add((kind, name))
     stem = _clean_stem(name)
-    rivals = [key for key in siblings if _clean_stem(key[1]).casefold() == stem.casefold()]
+    rivals = [key for key in siblings if _file_key(_clean_stem(key[1])) == _file_key(stem)]
     first = min(rivals, key=lambda key: (_clean_stem(key[1]) != f"RoSy_{key[1]}", key))
     if (kind, name) == first:
         return stem
@@ -28,5 +33,11 @@ def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
 
 
 def _clean_stem(name: str) -> str:
-    """Return the stem with underscores for characters that are not allowed."""
-    return bpy.path.clean_name(f"RoSy {name}")
+    """Return the stem with underscores for characters that are not allowed, cut to its length."""
+    stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
+    return stem.decode(errors="ignore")
+
+
+def _file_key(stem: str) -> str:
+    """Return a text that is the same for stems which some file system takes for the same name."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", stem).casefold())

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import unicodedata
 from pathlib import Path
 
 import bpy
@@ -21,6 +22,7 @@ from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local
 from rosy.rosy_addon.gpu.select import select_renderer
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
+from rosy.rosy_addon.scene.file_names import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from scenes import add_camera, contents, link, pixels, render
 
@@ -57,9 +59,10 @@ def test_ranges():
     assert parse_frames("7") == range(7, 8)
     assert parse_frames("1-5") == range(1, 6)
     assert list(parse_frames("-2-4:3")) == [-2, 1, 4]
-    for text in ("5-1", "a", "1-5:0", "", "1-", "1-1048575", "9" * 5000):
-        with pytest.raises(RosyError, match="expected"):
+    for text in ("5-1", "a", "1-5:0", "", "1-", "1-1048575", "9" * 5000, "1_0", "\u0663"):
+        with pytest.raises(RosyError, match="expected") as caught:
             parse_frames(text)
+        assert len(str(caught.value)) < 200
     for frames in (range(3, 4), range(1, 9), range(-4, 9, 3)):
         assert parse_frames(format_frames(frames)) == range(frames[0], frames[-1] + 1, frames.step)
 
@@ -130,6 +133,17 @@ def test_cameras_and_scenes_have_files_of_their_own(moving, tmp_path):
     for camera in cameras:
         bake(moving, cameras=[camera], settings=OutputSettings(folder=stills))
     assert len({path.name.casefold() for path in stills.iterdir()}) == 4
+
+
+def test_names_of_files_are_short_and_differ_on_every_file_system(scene):
+    names = ["\u1ebf", "e\u0302\u0301", "x" * 254 + "a", "x" * 254 + "b", "\u65e5" * 85]
+    cameras = [add_camera(name) for name in names]  # Blender 4.2 cuts names to 63 bytes
+    stems = [picture_stem(name) for name in names] + [
+        picture_stem(camera.name) for camera in cameras
+    ]
+    assert all(len(stem.encode()) <= 200 for stem in stems)
+    keys = {unicodedata.normalize("NFC", picture_stem(camera.name)) for camera in cameras}
+    assert len(keys) == len(names)
 
 
 def test_only_affected_frames_are_drawn_again(moving, tmp_path):

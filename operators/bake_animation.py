@@ -8,7 +8,7 @@ from dataclasses import replace
 import bpy
 
 from ..rosy_addon.animation import SequenceResult, bake_animation_task
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
@@ -66,7 +66,7 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
         for sequence in result:
             self.report(
                 {"INFO"},
-                f"{len(sequence.rendered)} frames drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
+                f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
             )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..rosy_addon.errors import counted
 from ..rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from .poll import poll_idle
 
@@ -26,7 +27,11 @@ class ROSY_OT_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         removed = remove_bakes(context.scene)
-        self.report({"INFO"}, f"Removed {removed.images} pictures from {removed.objects} objects")
+        self.report(
+            {"INFO"},
+            f"Removed {counted(removed.images, 'picture')} from "
+            f"{counted(removed.objects, 'object')}",
+        )
         return {"FINISHED"}
 
 

@@ -8,7 +8,7 @@ from math import pi
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
@@ -105,7 +105,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         return len(converted)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Converted the fields of {result} meshes")
+        self.report({"INFO"}, f"Converted the fields of {counted(result, 'mesh', 'meshes')}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -142,7 +142,8 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report(
-            {"INFO"}, f"Stored the fields of {len(fields)} meshes: {STORAGE_FORMS[self.form][1]}"
+            {"INFO"},
+            f"Stored the fields of {counted(len(fields), 'mesh', 'meshes')}: {STORAGE_FORMS[self.form][1]}",
         )
         return {"FINISHED"}
 

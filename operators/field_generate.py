@@ -8,7 +8,7 @@ from math import pi
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
@@ -199,7 +199,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Made a field of degree {self.degree} on {result:,} faces")
+        self.report({"INFO"}, f"Made a field of degree {self.degree} on {counted(result, 'face')}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
@@ -78,7 +78,7 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
             self.report({"WARNING"}, note)
         self.report(
             {"INFO"},
-            f"Read a field of degree {field.degree} on {len(field.vectors):,} faces of '{mesh.name}'",
+            f"Read a field of degree {field.degree} on {counted(len(field.vectors), 'face')} of '{mesh.name}'",
         )
         return {"FINISHED"}
 

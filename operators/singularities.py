@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (
     add_singularity_points,
@@ -58,7 +58,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
                 f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
                 for obj, singularities in singularities_by_object.items()
             )
-            self.report({"INFO"}, f"{count} singularities; {total}")
+            self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
         return {"FINISHED"}
 
 

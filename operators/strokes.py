@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import bpy
 
 from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes_task
+from ..rosy_addon.errors import counted
 from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import CameraSource
 from ..rosy_addon.scene.stroke_objects import remove_strokes, stroke_objects, target_objects
@@ -61,7 +62,7 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
         destination = f"'{result.obj.name}'" if result.path is None else str(result.path)
         self.report(
             {"INFO"},
-            f"{len(result.drawing.strokes):,} strokes from '{result.camera}': {destination}",
+            f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
         )
         for note in result.notes:
             self.report({"WARNING"}, note)
@@ -91,7 +92,7 @@ class ROSY_OT_strokes_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = remove_strokes(context.scene)
-        self.report({"INFO"}, f"Removed {count} object{'s' if count > 1 else ''} with strokes")
+        self.report({"INFO"}, f"Removed {counted(count, 'object')} with strokes")
         return {"FINISHED"}
 
 

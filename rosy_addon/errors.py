@@ -1,4 +1,4 @@
-"""Exceptions whose messages are shown to the user."""
+"""Exceptions whose messages are shown to the user, and the grammar of messages."""
 
 
 class RosyError(ValueError):
@@ -15,3 +15,14 @@ class NothingInViewError(RosyError):
 
 class DeviceError(RosyError):
     """There is no usable graphics card, or the shaders do not compile on it."""
+
+
+def counted(count: int, singular: str, plural: str = "") -> str:
+    """Return a number with its noun, for messages.
+
+    Examples
+    --------
+    >>> counted(1, "face"), counted(2000, "face"), counted(0, "vertex", "vertices")
+    ('1 face', '2,000 faces', '0 vertices')
+    """
+    return f"{count:,} {singular if count == 1 else plural or singular + 's'}"

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..file_io import check_folder
 from ..frame_workers import parse_frames
 from ..gpu.select import RENDER_DEVICES
@@ -152,7 +152,7 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
     )
     for result in _run_with_log(task):
         if result.skipped:
-            print_line(f"{len(result.skipped)} frames of {result.camera} are up to date")
+            print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
         print_line(f"{result.camera}: {result.sequence.path}")
     if options.save:
         print_line(save_blend())

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..field.analysis import angle_errors, dirichlet_energy, error_statistics
 from ..field.convert import Conversion, convert
 from ..field.field_io import WRITE_SUFFIXES, load_field, write_field
@@ -135,13 +135,14 @@ def _format_info(facts: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"degree {facts['degree']}",
-            f"{facts['faces']} faces, {facts['vertices']} vertices, "
+            f"{counted(facts['faces'], 'face')}, {counted(facts['vertices'], 'vertex', 'vertices')}, "
             f"Euler characteristic {facts['euler_characteristic']}",
-            f"magnitude {low:.4g} to {high:.4g}, undefined on {facts['undefined_faces']} faces",
+            f"magnitude {low:.4g} to {high:.4g}, undefined on "
+            f"{counted(facts['undefined_faces'], 'face')}",
             f"energy {facts['energy']:.6g}",
             *([] if facts["is_rosy"] else ["directions at free angles, not a RoSy"]),
             *_format_comparison(facts.get("against")),
-            f"{len(singularity_lines)} singularities",
+            counted(len(singularity_lines), "singularity", "singularities"),
             *singularity_lines,
         ]
     )

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..file_io import write_bytes
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
@@ -127,7 +127,7 @@ def load_field(
     )
     return LoadedField(
         field,
-        f"{path.name}: the field has {source_surface.face_count:,} faces, but the mesh has "
+        f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
         f"{surface.face_count:,}; the field was transferred by position from "
         f"{Path(source_surface.name).name}",
     )
@@ -164,12 +164,13 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
     )
     if raw.header_count not in (None, row_count) and not vertices_over_faces:
         raise RosyError(
-            f"{source}: declares {raw.header_count} rows of {raw.columns} numbers, but contains {row_count}"
+            f"{source}: declares {counted(raw.header_count, 'row')} of {raw.columns} numbers, but contains {row_count}"
         )
     if raw.domain is None and infer_domain(surface, row_count) is None:
         raise RosyError(
-            f"{source}: contains {row_count} rows, but the mesh {surface.name} has "
-            f"{surface.face_count} faces and {len(surface.vertices)} vertices"
+            f"{source}: contains {counted(row_count, 'row')}, but the mesh {surface.name} has "
+            f"{counted(surface.face_count, 'face')} and "
+            f"{counted(len(surface.vertices), 'vertex', 'vertices')}"
         )
 
 

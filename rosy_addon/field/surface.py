@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -377,7 +377,7 @@ def _check_polygons(
     if corner_counts.min() < 3:
         face = int(np.argmin(corner_counts))
         raise RosyError(
-            f"{name}: face {face} has {corner_counts[face]} corners, expected 3 or more"
+            f"{name}: face {face} has {counted(corner_counts[face], 'corner')}, expected 3 or more"
         )
     if corner_vertex.min() < 0 or corner_vertex.max() >= len(vertices):
         raise RosyError(f"{name}: a face refers to a vertex that does not exist")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
     closest_rosy,
@@ -99,8 +99,9 @@ def validated_field(
     domain = infer_domain(surface, len(vectors)) if domain is None else domain
     if len(vectors) != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
-            f"{source}: contains {len(vectors)} vectors, "
-            f"but the mesh {surface.name} has {faces} faces and {vertices} vertices"
+            f"{source}: contains {counted(len(vectors), 'vector')}, "
+            f"but the mesh {surface.name} has {counted(faces, 'face')} and "
+            f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
     normal = tangent_normals(surface, domain)

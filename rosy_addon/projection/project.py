@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cache import Cache
-from ..errors import NothingInViewError, RosyError
+from ..errors import NothingInViewError, RosyError, counted
 from ..field.frames import dot_components, transform_components, transport_components
 from ..field.representation import signed_power
 from ..memory import raise_mmap_threshold
@@ -178,7 +178,8 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
         vector_count, face_count = len(instance.field.vectors), instance.surface.face_count
         if vector_count != face_count:
             raise RosyError(
-                f"{name}: its field has {vector_count} vectors, but the mesh has {face_count} faces"
+                f"{name}: its field has {counted(vector_count, 'vector')}, but the mesh has "
+                f"{counted(face_count, 'face')}"
             )
         if not np.isfinite(instance.field.vectors).all():
             face = int(np.argmin(np.isfinite(instance.field.vectors).all(axis=1)))

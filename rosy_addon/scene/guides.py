@@ -120,7 +120,9 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         If there is no attribute of this name, it is of another type, or a value is not finite.
     """
     if not name or name not in mesh.attributes:
-        raise RosyError(f"mesh '{mesh.name}' has no attribute '{name}' to follow")
+        raise RosyError(
+            f"mesh '{mesh.name}' has no attribute '{name}' to follow: choose a vector attribute"
+        )
     return read_face_vectors(mesh, name)
 
 

@@ -388,5 +388,6 @@ def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bp
             f"object '{name}' has no attribute '{field_name}' with a field: make or import a field first"
         )
     raise RosyError(
-        f"object '{name}' is hidden in renders of this view layer, or its drawing is switched off"
+        f"object '{name}' is hidden in renders of this view layer, or its drawing is switched off: "
+        "show it, and switch it on"
     )

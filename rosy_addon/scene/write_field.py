@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..field.directional_field import field_directions
 from ..field.frames import dot
 from ..field.representation import face_frames
@@ -102,7 +102,7 @@ def write_mesh_field(
     face_count = len(mesh.polygons)
     if len(field.vectors) != face_count:
         raise RosyError(
-            f"mesh '{mesh.name}' has {face_count} faces, but the field has {len(field.vectors)}"
+            f"mesh '{mesh.name}' has {counted(face_count, 'face')}, but the field has {len(field.vectors)}"
         )
     if form == "ANGLE" and field.direction_ratios is not None:
         raise RosyError(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cache import Cache
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
@@ -226,8 +226,8 @@ def build_tangent_mesh(
         raise RosyError(f"{surface.name}: has no field")
     if len(field.vectors) != surface.face_count:
         raise RosyError(
-            f"{surface.name}: the field has {len(field.vectors)} vectors, but the mesh has "
-            f"{surface.face_count} faces"
+            f"{surface.name}: the field has {counted(len(field.vectors), 'vector')}, but the mesh has "
+            f"{counted(surface.face_count, 'face')}"
         )
     corner_field = run_to_completion(
         cached_corner_field_task(surface, instance.matrix, field, display, cache)

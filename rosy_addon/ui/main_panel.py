@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..errors import counted
 from ..scene.bake_records import BakeInfo, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
@@ -50,7 +51,7 @@ def _draw_existing_field(
     mesh = obj.data
     box = layout.box().column(align=True)
     box.label(text=obj.name, icon="OUTLINER_OB_MESH")
-    box.label(text=f"Degree {mesh.rosy.degree} on {len(mesh.polygons):,} faces")
+    box.label(text=f"Degree {mesh.rosy.degree} on {counted(len(mesh.polygons), 'face')}")
     has_attribute = mesh.rosy.attribute in mesh.attributes
     box.label(
         text=f"Attribute '{mesh.rosy.attribute}'" if has_attribute else "Attributes dir0, dir1 ..."

@@ -304,7 +304,7 @@ def test_killed_processes_can_be_continued(file, tmp_path):
         process.communicate()
     output = wait_for(start(file, folder, "--frames", "1-12"))
     assert frames_of(folder) == whole
-    assert "frames of Scene are up to date" in output
+    assert "of Scene up to date" in output
 
 
 def test_two_processes_in_one_folder(file, tmp_path):

@@ -11,7 +11,7 @@ from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.guides import guide_strokes_and_empties
+from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vectors
 from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
@@ -52,7 +52,7 @@ def test_no_field(scene, camera):
     with pytest.raises(RosyError, match="'Camera' is not a mesh, but of type Camera"):
         field_objects(bpy.context.view_layer, ["Camera"])
     add_field(plane, kind="axis").hide_render = True
-    with pytest.raises(RosyError, match="'Plane' is hidden in renders"):
+    with pytest.raises(RosyError, match=r"'Plane' is hidden in renders .*: show it"):
         field_objects(bpy.context.view_layer, ["Plane"])
 
 
@@ -228,6 +228,8 @@ def test_writing(scene, monkey):
 
 
 def test_guide_objects(scene, monkey):
+    with pytest.raises(RosyError, match="has no attribute 'flow' to follow: choose a vector"):
+        guide_vectors(monkey.data, "flow")
     spline = bpy.data.curves.new("Line", "CURVE").splines.new("POLY")
     line = link(bpy.data.objects.new("Line", bpy.data.curves["Line"]))
     spline.points.add(1)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
@@ -77,8 +77,8 @@ def read_fieldgen(path: Path) -> RawField:
     count = len(polygons.vertices)
     if vertex.min() < 0 or vertex.max() >= count or len(np.unique(vertex)) != count:
         raise RosyError(
-            f"{path}: expected one '# field' line for each of {count} vertices, found {len(vertex)} "
-            f"lines for vertices {vertex.min() + 1} to {vertex.max() + 1}"
+            f"{path}: expected one '# field' line for each of {count} vertices, found "
+            f"{counted(len(vertex), 'line')} for vertices {vertex.min() + 1} to {vertex.max() + 1}"
         )
     values = np.zeros((count, 1, 3))
     values[vertex, 0] = numbers[:, 1:]

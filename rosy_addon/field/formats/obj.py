@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...errors import counted
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, read_rows
 
@@ -33,7 +34,9 @@ def read_obj(path: Path) -> Polygons:
     corners = _select_rows(rows, is_face)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
-            raise corners.error(row, f"a face has {len(words)} corners, expected 3 or more")
+            raise corners.error(
+                row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
+            )
     sizes = [len(words) for words in corners.words]
     index = _position_indices(corners).ints("vertex of a face")
     # A negative index is relative to the number of vertices above its line.

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 
@@ -37,8 +37,9 @@ def read_off(path: Path) -> Polygons:
     body = rows[1:]
     if len(body) < vertex_count + face_count:
         raise RosyError(
-            f"{path}: declares {vertex_count} vertices and {face_count} faces, but ends after "
-            f"{len(body)} rows"
+            f"{path}: declares {counted(vertex_count, 'vertex', 'vertices')} and "
+            f"{counted(face_count, 'face')}, but ends after "
+            f"{counted(len(body), 'row')}"
         )
     vertices = body[:vertex_count].points("vertex")
     return Polygons(vertices, *_faces(body[vertex_count : vertex_count + face_count], vertex_count))

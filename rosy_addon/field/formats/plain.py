@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ..rosy_field import MAX_DEGREE
 from .raw_field import RawField
@@ -39,7 +39,7 @@ def read_text(path: Path) -> RawField:
     for row, words in enumerate(rows.words):
         if len(words) != columns:
             raise rows.error(
-                row, f"the row has {len(words)} numbers, the rows above have {columns}"
+                row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
     return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
 
@@ -87,7 +87,7 @@ def _check_columns(source: str, columns: int) -> None:
     """Raise an error unless a row has 3 numbers for each of 1 to `MAX_DEGREE` directions."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
-            f"{source}: has {columns} numbers per row, expected 3 for each of up to {MAX_DEGREE} "
+            f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} "
             "directions"
         )
 

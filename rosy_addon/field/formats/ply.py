@@ -12,7 +12,7 @@ from struct import Struct
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
@@ -359,5 +359,5 @@ def _list_length(path: Path, element: _Element, row: int, length) -> int:
 def _truncated(path: Path, element: _Element, row_count: int) -> RosyError:
     """The error for a file that ends after `row_count` rows of an element."""
     return RosyError(
-        f"{path}: declares {element.count} rows of element '{element.name}', but ends after {row_count}"
+        f"{path}: declares {counted(element.count, 'row')} of element '{element.name}', but ends after {row_count}"
     )

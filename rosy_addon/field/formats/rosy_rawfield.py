@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ..rosy_field import RosyField, check_degree
 from .raw_field import RawField
 from .text_rows import TextRows, abbreviate, format_rows, read_rows
@@ -89,7 +89,7 @@ def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
     row_count, remainder = divmod(sum(map(len, rows.words)) - 2, columns)
     if remainder:
         raise RosyError(
-            f"{rows.path}: declares {count} rows of {columns} numbers, but contains {row_count} and "
+            f"{rows.path}: declares {counted(count, 'row')} of {columns} numbers, but contains {row_count} and "
             "part of another"
         )
     return rows.floats("part of a vector")[2:].reshape(row_count, columns)

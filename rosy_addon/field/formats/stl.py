@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from .polygons import Polygons
 from .text_rows import TextRows, read_rows
@@ -76,7 +76,9 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     if len(data) < _HEADER_BYTES or available < count:
         if len(data) < _HEADER_BYTES:
             raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
-        raise RosyError(f"{path}: declares {count} triangles, but ends after {available}")
+        raise RosyError(
+            f"{path}: declares {counted(count, 'triangle')}, but ends after {available}"
+        )
     return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
@@ -88,7 +90,8 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
     if len(corner_rows) != 3 * loops:
         raise rows.error(
             corner_rows[-1] if corner_rows else len(rows),
-            f"the file has {len(corner_rows)} corners in {loops} complete triangles; is it truncated?",
+            f"the file has {counted(len(corner_rows), 'corner')} in "
+            f"{counted(loops, 'complete triangle')}; is it truncated?",
         )
     vertex_rows = TextRows(
         path,

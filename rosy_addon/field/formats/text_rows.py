@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...errors import RosyError, counted
 from ...file_io import read_bytes
 
 
@@ -64,7 +64,9 @@ class TextRows:
         """
         for row, words in enumerate(self.words):
             if len(words) < 3:
-                raise self.error(row, f"{label} has {len(words)} coordinates, expected 3")
+                raise self.error(
+                    row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
+                )
         points = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers).floats(
             label
         )

@@ -150,7 +150,7 @@ def test_field_makes_converts_and_info_reads(sphere, tmp_path):
     assert all(isinstance(part, int) for pair in facts["singularities"] for part in pair)
     words = rosy("info", sphere, rosy_file)
     assert words.returncode == 0
-    assert "degree 6" in words.stdout and "1280 faces" in words.stdout
+    assert "degree 6" in words.stdout and "1,280 faces" in words.stdout
 
 
 def test_the_torus_has_no_singularities_in_sum(ring):

@@ -8,6 +8,7 @@
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-long further cases of some tests, which take minutes
+#   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
@@ -16,6 +17,9 @@
 PYTHON ?= python3.11
 # Processes of a test run: `make test JOBS=1` for one, `auto` for one per core.
 JOBS   ?= auto
+# Random cases: how long, and the seed of the first one.
+FUZZ_SECONDS ?= 600
+FUZZ_SEED    ?= 1
 PYTEST  = -m pytest -p no:cacheprovider --numprocesses $(JOBS) --dist worksteal
 
 UNIT  = .venv/bin/python
@@ -25,7 +29,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long zip gallery bench clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz zip gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -64,6 +68,11 @@ lint: .venv/ready
 format: .venv/ready
 	.venv/bin/ruff format .
 	.venv/bin/ruff check --fix .
+
+fuzz: .venv/ready .venv-bpy42/ready
+	$(UNIT) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2))
+	$(BPY42) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2)) \
+		--category scenes --category animations
 
 zip: .venv-bpy42/ready
 	$(BPY42) tools/build_zip.py dist

@@ -125,11 +125,12 @@ def _command(
     command = chosen.get("command") or str(
         rng.choice(list(_OUTPUTS), p=[0.36, 0.26, 0.18, 0.17, 0.03])
     )
-    # A field file rules out a generator.
-    leave_out = {"generate"} if len(inputs) > 1 else set()
+    # A field file rules out a generator, and has a degree.
+    leave_out = {"generate", "degree"} if len(inputs) > 1 and rng.random() < 0.95 else set()
     words = random_options(rng, command, rate=chosen.get("rate", 0.12), leave_out=leave_out)
     case = Case([command, *inputs, *words, *(options or [])])
-    if command in ("render", "strokes", "turntable") and not _has(words, "--size"):
+    sized = _has(words + (options or []), "--size")
+    if command in ("render", "strokes", "turntable") and not sized:
         case.arguments += ["--size", f"{rng.integers(8, 90)}x{rng.integers(8, 90)}"]
     if command == "turntable" and not _has(words, "--pictures"):
         case.arguments += ["--pictures", "2"]
@@ -189,13 +190,13 @@ def _guide_case(rng: Generator, folder: Path) -> Case:
     """A field guided by strokes, another field or a UV map."""
     mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
     name, options = _write_mesh(rng, folder, mesh), ["--generate", "guided"]
-    if rng.random() < 0.7:
+    if rng.random() < 0.9:
         data = guide_bytes(rng, mesh)
         (folder / "guides.txt").write_bytes(damaged(rng, data) if rng.random() < 0.4 else data)
         options += ["--strokes", "guides.txt"]
-    if rng.random() < 0.3:
+    if rng.random() < 0.2:
         options += ["--guides", _write_field(rng, folder, mesh)]
-    if rng.random() < 0.3:
+    if name.endswith(".obj") and rng.random() < 0.4:
         options += ["--uv"]
     return _command(rng, folder, [name], options, rate=0.06)
 
@@ -238,45 +239,51 @@ def _tone_case(rng: Generator, folder: Path) -> Case:
     mesh = random_mesh(rng, faults=0)
     kind = ("image", "picture", "attribute")[rng.integers(3)]
     suffix = {"image": ".obj", "picture": "", "attribute": ".ply"}[kind]
-    suffix = suffix if suffix and rng.random() < 0.9 else list(WRITERS)[rng.integers(4)]
+    suffix = suffix if suffix and rng.random() < 0.95 else list(WRITERS)[rng.integers(4)]
     name = "mesh" + suffix
     (folder / name).write_bytes(mesh_bytes(rng, suffix, mesh))
+    options = [f"--tone-{kind}"]
     if kind == "attribute":
-        value = ("Color", "red", "x", "", "\x1b[31m", "green")[rng.integers(6)]
+        options.append(("Color", "Color", "red", "x", "", "\x1b[31m", "green")[rng.integers(7)])
     else:
-        value = "tone.png"
-        data = png_bytes(rng)
-        (folder / value).write_bytes(damaged(rng, data) if rng.random() < 0.2 else data)
+        width, height = (int(side) for side in rng.integers(1, 50, 2))
+        fits = kind == "picture" and rng.random() < 0.8
+        data = png_bytes(rng, (width, height) if fits else None)
+        (folder / "tone.png").write_bytes(damaged(rng, data) if rng.random() < 0.15 else data)
+        options += ["tone.png", *([f"--size={width}x{height}"] if fits else [])]
     command = "turntable" if kind != "picture" and rng.random() < 0.1 else "render"
-    return _command(rng, folder, [name], [f"--tone-{kind}", value], command=command, rate=0.08)
+    return _command(rng, folder, [name], options, command=command, rate=0.06)
 
 
 def _path_case(rng: Generator, folder: Path) -> Case:
-    """Paths that are not plain files, too long, linked, or the input itself."""
+    """Paths that are not plain files, too long, linked, odd, or the input itself."""
     mesh = random_mesh(rng, faults=0)
     name = _write_mesh(rng, folder, mesh)
     case = _command(rng, folder, [name], rate=0.03)
+    as_output = bool(case.outputs) and rng.random() < 0.7
+    position = len(case.arguments) - 1 if as_output else 1
+    suffix = Path(case.arguments[position]).suffix
+    writable = [f"link{suffix}", f"folder/../new{suffix}", f"a b{suffix}", f"\x1b[31m{suffix}"]
+    writable += [f"é\u202e{suffix}", f"-x{suffix}", f"{'x' * 250}{suffix}"]
+    others = [f"{kind}{suffix}" for kind in ("folder", "pipe", "loop", "device", "a" * 300)]
+    others += ["", ".", "-", name, f"missing/out{suffix}", f"{name}/out{suffix}", "a/" * 3000]
+    (folder / f"folder{suffix}").mkdir()
     (folder / "folder").mkdir()
-    os.mkfifo(folder / "pipe")
-    (folder / "link.png").symlink_to("target.png")
-    (folder / "loop.png").symlink_to("loop.png")
-    device = folder / "device"  # never a device of the machine if this process might replace it
-    if os.geteuid() == 0:
+    os.mkfifo(folder / f"pipe{suffix}")
+    (folder / f"link{suffix}").symlink_to(f"target{suffix}")
+    (folder / f"loop{suffix}").symlink_to(f"loop{suffix}")
+    device = folder / f"device{suffix}"
+    if os.geteuid() == 0:  # never a device of the machine if this process might replace it
         os.mknod(device, stat.S_IFCHR | 0o666, os.makedev(1, 3))
     else:
         device.symlink_to("/dev/null")
-    (folder / "null.obj").symlink_to("device")
-    paths = ["folder", "pipe", "link.png", "loop.png", "device", "null.obj", name, "", "."]
-    paths += ["a" * 300 + ".png", "missing/out.png", "folder/../new.png", "x" * 250 + ".png"]
-    paths += ["\x1b[31m.png", "é\u202e.svg", "mesh.obj/x", "-", "a/" * 3000]
+    paths = writable if rng.random() < 0.5 else others
     path = paths[rng.integers(len(paths))]
-    position = int(rng.integers(1, len(case.arguments)))
-    output = case.arguments[-1]
-    if rng.random() < 0.6 and case.outputs:
-        position = len(case.arguments) - 1
     case.arguments[position] = path
-    case.outputs |= {"target.png", "link.png", "new.png", output, path}
-    case.outputs -= {name, "folder", "pipe", "device", "null.obj", "loop.png", "", "."}
+    if as_output:
+        case.outputs = {Path(path).name, f"target{suffix}"} if path in writable else set()
+        if path.startswith("-"):
+            case.arguments[-2:] = [f"-o{path}"]
     return case
 
 

@@ -24,7 +24,7 @@ def _obj(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     lines = ["# a mesh", "mtllib scene.mtl", "o part"] if rng.random() < 0.5 else []
     number = "{:.9g} {:.9g} {:.9g}" if rng.random() < 0.5 else "{!r} {!r} {!r}"
     lines += ["v " + number.format(*point) for point in points.tolist()]
-    uv = rng.random() < 0.6
+    uv = rng.random() < 0.7
     if uv:
         lines += ["vt {:.6g} {:.6g}".format(*pair) for pair in rng.uniform(-1, 2, (len(points), 2))]
     relative = rng.random() < 0.15
@@ -35,14 +35,11 @@ def _obj(rng: Generator, points: np.ndarray, faces: list) -> bytes:
     )
     if "//1" in form or "/1" in form[3:]:
         lines.append("vn 0 0 1")
-    for index, face in enumerate(faces):
+    for face in faces:
         if rng.random() < 0.03:
             lines += ["g group", "s off", "usemtl red"]
         words = [form.format(v - len(points) if relative else v + 1) for v in face]
-        line = "f " + " ".join(words)
-        if index == 0 and rng.random() < 0.1:
-            line = line.replace(" ", " \\\n", 2)
-        lines.append(line)
+        lines.append("f " + " ".join(words))
     if rng.random() < 0.2:
         lines += ["# degree 4", *(f"# field {i} 1 0 0" for i in range(len(points)))]
     return "\n".join(lines).encode() + b"\n"

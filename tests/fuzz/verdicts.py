@@ -130,7 +130,8 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
                 return Verdict.MESSAGE, stderr.strip()[:300]
             return Verdict.ENDED, lines[-1]
         case 141 if case.stdout == "closed":
-            return (Verdict.MESSAGE, stderr) if stderr else (Verdict.ENDED, "closed pipe")
+            notes_only = all(line.startswith("rosy: ") for line in lines)
+            return (Verdict.ENDED, "closed pipe") if notes_only else (Verdict.MESSAGE, stderr)
         case 1 if case.stdout == "full":
             return Verdict.ENDED, stderr.strip()
     return Verdict.STATUS, f"status {run.status}: {stderr.strip()[-200:]}"

@@ -11,6 +11,7 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.look import Look
 from ..compositor.shading import Light
+from ..errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..render.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
@@ -69,9 +70,17 @@ def read_views(
     Raises
     ------
     RosyError
-        See `resolve_camera`, `read_scene` and `load_reference`.
+        If two cameras have the same name; see also `resolve_camera`, `read_scene` and
+        `load_reference`.
     """
     resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
+    names = [camera.name for camera in resolved_cameras]
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated is not None:
+        raise RosyError(
+            f"several cameras have the name '{repeated}', and their pictures would replace each other: "
+            "rename them in their libraries, or draw from one"
+        )
     tone_request = make_tone_request(scene, look)
     scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), cache, tone_request)
     reference = None

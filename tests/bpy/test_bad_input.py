@@ -10,7 +10,7 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
-from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vectors
 from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
@@ -296,6 +296,18 @@ def test_linked_mesh_can_be_drawn_but_not_written(library):
     field = read_mesh_field(mesh)
     with pytest.raises(RosyError, match=r"mesh 'Suzanne' is linked from .*library\.blend"):
         write_mesh_field(mesh, field)
+
+
+def test_cameras_of_one_name(library):
+    """A linked camera may have the name of a local one."""
+    bpy.ops.wm.open_mainfile(filepath=str(library))
+    add_camera()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    link(linked(library, "objects", "Camera"))
+    add_camera()
+    assert_refused("several cameras have the name 'Camera'", cameras=scene_cameras(scene))
 
 
 def test_missing_libraries_are_named(library):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import bpy
 import numpy as np
 import pytest
@@ -243,6 +245,8 @@ def test_unsuitable_pictures(scene, wall, tmp_path):
     assert "none.png" in error(tmp_path / "none.png")
     (tmp_path / "text.png").write_text("no picture")
     assert "text.png" in error(tmp_path / "text.png")
+    os.mkfifo(tmp_path / "pipe.png")
+    assert "pipe.png: cannot be read: it is not a regular file" in error(tmp_path / "pipe.png")
     assert set(bpy.data.images) == images
     save_picture(tmp_path / "wide.png", np.zeros((16, 32)))
     message = error(tmp_path / "wide.png")

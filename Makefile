@@ -9,6 +9,7 @@
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-long further cases of some tests, which take minutes
 #   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
+#   make fuzz-readers  the readers of all file formats, guided by coverage
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
@@ -29,7 +30,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz zip gallery bench clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz fuzz-readers zip gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -73,6 +74,13 @@ fuzz: .venv/ready .venv-bpy42/ready
 	$(UNIT) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2))
 	$(BPY42) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2)) \
 		--category scenes --category animations
+
+# The readers of all formats, guided by coverage; dist/fuzz-readers keeps the inputs.
+READER_KINDS = .obj .off .ply .stl .rosy .rawfield .txt .npy .sings guides.txt .png .json
+fuzz-readers: $(READER_KINDS:%=fuzz-reader-%)
+fuzz-reader-%: .venv-fuzz/ready
+	.venv-fuzz/bin/python -m tests.fuzz.readers $* dist/fuzz-readers/$* -max_len=3000 \
+		-max_total_time=$$(($(FUZZ_SECONDS) / 12)) -artifact_prefix=dist/fuzz-readers/fault-$*-
 
 zip: .venv-bpy42/ready
 	$(BPY42) tools/build_zip.py dist

@@ -48,6 +48,8 @@ class Case:
         Seconds after which the run is interrupted as by Ctrl-C.
     kill_after : float, optional
         Seconds after which the run is killed. If files are expected, it is then started again.
+    kill_when_writing : bool
+        Whether the run is killed when it begins to write a file.
     own_process : bool
         Whether to start Python anew instead of forking, which takes ten times as long.
     """
@@ -59,6 +61,7 @@ class Case:
     stdout: str = "file"
     interrupt_after: float | None = None
     kill_after: float | None = None
+    kill_when_writing: bool = False
     own_process: bool = False
 
     def may_write(self, name: str) -> bool:
@@ -333,6 +336,23 @@ def _from_scenes(name: str) -> Callable[[Generator, Path], Case]:
     return make
 
 
+def _kill_case(rng: Generator, folder: Path) -> Case:
+    """A run that replaces a file and is killed at a random moment, or while it writes."""
+    mesh = random_mesh(rng, faults=0)
+    name = _write_mesh(rng, folder, mesh)
+    command = str(rng.choice(["render", "strokes", "field", "turntable"], p=[0.4, 0.3, 0.2, 0.1]))
+    options = ["--size", "500x500"] if command != "field" else []
+    case = _command(rng, folder, [name], options, command=command, rate=0.01)
+    for output in case.outputs:
+        (folder / output).write_bytes(b"the previous contents")
+    case.own_process = True
+    if rng.random() < 0.3:
+        case.kill_when_writing = True
+    else:
+        case.kill_after = float(rng.uniform(0.1, 1.5))
+    return case
+
+
 #: All categories by name. Those of Blender files need Python with `bpy`.
 CATEGORIES = {
     "shapes": Category(_shape_case),
@@ -344,9 +364,11 @@ CATEGORIES = {
     "tones": Category(_tone_case),
     "paths": Category(_path_case, share=5),
     "streams": Category(_stream_case, share=2),
+    "kills": Category(_kill_case, share=1),
 }
 if importlib.util.find_spec("bpy") is not None:
     CATEGORIES |= {
         "scenes": Category(_from_scenes("scene_case")),
         "animations": Category(_from_scenes("animation_case"), share=2),
+        "scene-kills": Category(_from_scenes("scene_kill_case"), share=1),
     }

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from .cases import Case, hash_file
 
-#: Seconds after which a run counts as hanging, and bytes of address space that it may take beyond
-#: those of this process.
-TIME_LIMIT, MEMORY_LIMIT = 60.0, 3 << 30
+#: Seconds of the processor after which a run counts as hanging; seconds after which it does so even
+#: if it only waits; and bytes of address space that it may take beyond those of this process.
+CPU_LIMIT, TIME_LIMIT, MEMORY_LIMIT = 60, 240.0, 3 << 30
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -29,11 +29,12 @@ class Run:
     Attributes
     ----------
     status : int or None
-        Exit status, negative if a signal ended it; None if it was killed after `TIME_LIMIT`.
+        Exit status, negative if a signal ended it; None if it took longer than a limit.
     stdout, stderr : bytes
     before, after : dict of str to str
         Contents of the folder of the case: see `listing`.
     seconds : float
+        Of the processor.
     peak_bytes : int
         Largest resident memory.
     """
@@ -51,13 +52,13 @@ def execute(case: Case, folder: Path) -> Run:
     """Run a case in its folder. Standard output and error stream go to files next to the folder."""
     before = listing(folder)
     streams = [folder.with_suffix(suffix) for suffix in (".stdout", ".stderr")]
-    start = time.perf_counter()
     pid = (_start_process if case.own_process else _fork)(case, folder, streams)
-    status, usage = _wait(pid, case, start)
-    if case.kill_after is not None and case.expected and status == -signal.SIGKILL:
-        again = replace(case, kill_after=None)
-        status, usage = _wait(_start_process(again, folder, streams), again, time.perf_counter())
-    seconds = time.perf_counter() - start
+    status, usage = _wait(pid, case, folder)
+    if case.expected and status == -signal.SIGKILL:
+        again = replace(case, kill_after=None, kill_when_writing=False)
+        pid = _start_process(again, folder, streams)
+        status, usage = _wait(pid, again, folder)
+    seconds = usage.ru_utime + usage.ru_stime
     stdout, stderr = (path.read_bytes() for path in streams)
     for path in streams:
         path.unlink()
@@ -95,7 +96,7 @@ def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         os.chdir(folder)
         os.environ.update(case.environment)
-        _limit_memory()
+        _set_limits()
         from rosy_addon.cli import main
 
         status = main(case.arguments, prog="rosy")
@@ -125,7 +126,7 @@ def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
             stdout=output,
             stderr=stderr,
             env=environment | case.environment,
-            preexec_fn=_limit_memory,
+            preexec_fn=_set_limits,
         )
         if isinstance(output, int):
             os.close(output)
@@ -133,15 +134,17 @@ def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:
     return process.pid
 
 
-def _limit_memory() -> None:
+def _set_limits() -> None:
     with open("/proc/self/statm") as file:
         used = int(file.read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_LIMIT,) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT + 5))
 
 
-def _wait(pid: int, case: Case, start: float) -> tuple[int | None, resource.struct_rusage]:
+def _wait(pid: int, case: Case, folder: Path) -> tuple[int | None, resource.struct_rusage]:
     """Wait for a process, and send it the signals of the case."""
+    start = time.perf_counter()
     signals = []
     if case.interrupt_after is not None:
         signals.append((start + case.interrupt_after, signal.SIGINT))
@@ -152,10 +155,15 @@ def _wait(pid: int, case: Case, start: float) -> tuple[int | None, resource.stru
     while True:
         done, status, usage = os.wait4(pid, os.WNOHANG)
         if done:
-            return None if timed_out else os.waitstatus_to_exitcode(status), usage
+            status = os.waitstatus_to_exitcode(status)
+            return None if timed_out or status == -signal.SIGXCPU else status, usage
         if time.perf_counter() >= signals[0][0]:
             timed_out = len(signals) == 1
             os.kill(pid, signals.pop(0)[1])
             signals = signals or [(float("inf"), signal.SIGKILL)]
+        if case.kill_when_writing:
+            if any(folder.rglob(".rosy-*")):
+                os.kill(pid, signal.SIGKILL)
+            continue
         time.sleep(pause)
         pause = min(pause * 1.2, 0.02)

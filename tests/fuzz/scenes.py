@@ -95,7 +95,24 @@ def _scene_command(rng: Generator) -> Case:
     return case
 
 
-def animation_case(rng: Generator, folder: Path) -> Case:
+def scene_kill_case(rng: Generator, folder: Path) -> Case:
+    """A bake, a saved file or an animation that is killed; the animation is then resumed."""
+    case = animation_case(rng, folder, damage=False)
+    case.own_process = True
+    if rng.random() < 0.3:
+        case.kill_when_writing = True
+    else:
+        case.kill_after = float(rng.uniform(0.3, 1.6))
+    if rng.random() < 0.5 and case.expected:
+        shutil.rmtree(folder / "out")
+    else:  # new pictures for old ones
+        case.arguments = ["bake", "scene.blend", "--out", "out", "--set", "seed=5", "--save"]
+        case.outputs |= {"scene.blend", "scene.blend1"}
+        case.expected = {}
+    return case
+
+
+def animation_case(rng: Generator, folder: Path, *, damage: bool = True) -> Case:
     """A finished animation, some of whose files are damaged, lost or exchanged; then a new run."""
     _new_file()
     scene = bpy.context.scene
@@ -115,9 +132,7 @@ def animation_case(rng: Generator, folder: Path) -> Case:
         return case  # nothing in view: the run says so
     files = sorted(path for path in (folder / "out").rglob("*") if path.is_file())
     case.expected = {str(path.relative_to(folder)): hash_file(path) for path in files}
-    if rng.random() < 0.2:
-        case.kill_after, case.own_process = float(rng.uniform(0.8, 2.0)), True
-        shutil.rmtree(folder / "out")
+    if not damage:
         return case
     for _ in range(rng.integers(1, 4)):
         path, other = (files[i] for i in rng.integers(len(files), size=2))

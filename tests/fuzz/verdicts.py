@@ -68,7 +68,8 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
         return Verdict.ENDED, "interrupted before RoSy started"
     if "Traceback" in stderr:
         return Verdict.TRACEBACK, stderr.strip().splitlines()[-1]
-    killed = case.kill_after is not None and run.status == -signal.SIGKILL
+    may_be_killed = case.kill_after is not None or case.kill_when_writing
+    killed = may_be_killed and run.status == -signal.SIGKILL
     if run.status < 0 and not killed:
         return Verdict.CRASH, signal.Signals(-run.status).name
     if re.search(r"\w+Warning\b", stderr):
@@ -154,8 +155,8 @@ def _stray_files(case: Case, run: Run, killed: bool) -> str:
     for name in sorted(run.before.keys() | run.after.keys()):
         if case.may_write(name) or run.before.get(name) == run.after.get(name):
             continue
-        if killed and Path(name).name.startswith(".rosy-"):
-            continue  # a kill leaves a temporary file, as nothing can remove it
+        if case.kill_when_writing and Path(name).name.startswith(".rosy-"):
+            continue  # nothing can remove the temporary file of a process that is killed
         change = "new" if name not in run.before else "changed" if name in run.after else "gone"
         return f"{name}: {change}"
     return ""

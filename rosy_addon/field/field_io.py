@@ -21,7 +21,7 @@ from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
 from .transfer import transfer_field
-from .validate import has_finite_square, infer_domain, validated_directions, validated_field
+from .validate import apply_nonfinite_policy, infer_domain, validated_directions, validated_field
 
 #: The reader of each file name extension.
 _READERS: dict[str, Callable[[Path], RawField]] = {
@@ -140,12 +140,11 @@ def _field_from_raw(
     _check_count(raw, surface, source)
     values = raw.values
     if raw.tensors:
-        if not has_finite_square(values).all():
-            raise RosyError(f"{source}: contains tensors that are not finite")
         if len(values) != surface.face_count:
             raise RosyError(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
+        apply_nonfinite_policy(values, source, "face", nonfinite)
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE

@@ -304,8 +304,8 @@ def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfini
 
     Parameters
     ----------
-    values : (n,) or (n, 3) float ndarray
-        Angles or vectors.
+    values : (n,), (n, 3) or (n, 3, 3) float ndarray
+        Angles, vectors or tensors.
     source, domain : str
         Names of the source and the mesh elements, for the message.
     nonfinite : {"error", "zero"}
@@ -322,13 +322,19 @@ def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfini
     if not unusable.any():
         return
     if nonfinite == "error":
-        kind = "vectors" if values.ndim > 1 else "angles"
+        kind = ("angles", "vectors", "tensors")[values.ndim - 1]
         fault = f"{MAX_COMPONENT:g} or larger" if np.isfinite(modulus).all() else "not finite"
         raise RosyError(
             f"{source}: {unusable.sum()} of {len(values)} {kind} are {fault}, the first on "
             f"{domain} {int(np.argmax(unusable))}: correct them, or choose to treat them as undefined"
         )
     values[unusable] = 0.0
+
+
+def as_float64(values: np.ndarray) -> np.ndarray:
+    """Return a copy of numbers as float64, without a warning for signalling NaN."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 def has_finite_square(values: np.ndarray) -> np.ndarray:

@@ -11,7 +11,12 @@ from ..cache import Cache, content_hash
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..field.validate import apply_nonfinite_policy, project_to_tangent, tangent_normals
+from ..field.validate import (
+    apply_nonfinite_policy,
+    as_float64,
+    project_to_tangent,
+    tangent_normals,
+)
 from .field_attributes import VECTOR_TYPE, cached_field, field_values
 from .meshes import read_attribute
 
@@ -138,7 +143,7 @@ def _transported_vectors(
     nonfinite: str,
 ) -> np.ndarray:
     """Return the vectors, (F, 3) float64, transported from the original to the evaluated faces."""
-    vectors = values.astype(np.float64)
+    vectors = as_float64(values)
     apply_nonfinite_policy(vectors, source, "face", nonfinite)
     normals = tangent_normals(surface, "face")
     if original_normals is not None:

@@ -13,6 +13,7 @@ from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface, mean_per_face
 from ..field.validate import (
     apply_nonfinite_policy,
+    as_float64,
     project_to_tangent,
     validated_directions,
     validated_field,
@@ -145,7 +146,7 @@ def _field_from_angles(
 ) -> RosyField:
     """Return a unit field from angles, (F,), to the first edge of each face, in radians."""
     x, y = face_frames(surface)
-    angles = angles.astype(np.float64)
+    angles = as_float64(angles)
     defined = np.isfinite(angles)
     apply_nonfinite_policy(angles, source, "face", nonfinite)
     vectors = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * y
@@ -156,7 +157,7 @@ def _field_from_corners(
     surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
 ) -> RosyField:
     """Return a field from vectors on corners: projected to the face, then averaged as RoSys."""
-    vectors = vectors.astype(np.float64)
+    vectors = as_float64(vectors)
     apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
     corner_face_normal = normal[surface.corner_face]

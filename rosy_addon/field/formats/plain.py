@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ..rosy_field import MAX_DEGREE
+from ..validate import as_float64
 from .raw_field import RawField
 from .text_rows import format_rows, read_rows
 
@@ -66,7 +67,7 @@ def read_npy(path: Path) -> RawField:
         raise RosyError(
             f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
-    values = values.reshape(len(values), -1).astype(np.float64)
+    values = as_float64(values.reshape(len(values), -1))
     _check_columns(str(path), values.shape[1])
     return _raw_field(values)
 

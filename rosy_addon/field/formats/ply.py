@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
+from ..validate import as_float64
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 
@@ -82,8 +83,7 @@ def read_ply(path: Path) -> Polygons:
             f"{path}: face {face_index} refers to vertex {corner_vertex[corner]:.10g}, "
             f"but the vertices are numbered 0 to {len(vertices) - 1}"
         )
-    with np.errstate(invalid="ignore"):  # a signalling NaN; `build_surface` rejects all NaN
-        vertices = vertices.astype(np.float64)
+    vertices = as_float64(vertices)
     return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
 
 

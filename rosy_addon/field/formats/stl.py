@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
+from ..validate import as_float64
 from .polygons import Polygons
 from .text_rows import TextRows, read_rows
 
@@ -36,8 +37,7 @@ def read_stl(path: Path) -> Polygons:
         points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
-    with np.errstate(invalid="ignore"):  # a signalling NaN; `build_surface` rejects all NaN
-        points = points.astype(np.float64)
+    points = as_float64(points)
     vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 

@@ -149,6 +149,13 @@ def test_tensors_are_distinguished_from_three_directions(tmp_path):
     assert read_field(tmp_path / "b.npy", BALL).degree == 3
 
 
+def test_a_signalling_nan_in_an_array_is_named(tmp_path, error_of):
+    values = np.ones((BALL.face_count, 3), dtype="<f4")
+    values.view("<u4")[2, 0] = 0x7F800001
+    np.save(tmp_path / "a.npy", values)
+    assert "not finite, the first on face 2" in error_of(read_field, tmp_path / "a.npy", BALL)
+
+
 DAMAGED = {
     "a.txt": ("1 2 3\n1 2\n", "a.txt:2: the row has 2 numbers, the rows above have 3"),
     "b.txt": ("1 2\n3 4\n", "has 2 numbers per row"),

@@ -34,7 +34,7 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     """
     rows = read_rows(Path(path), comment=None)
     numbers = rows.ints("degree, count, elements and indices")
-    if len(numbers) < 2 or len(numbers) != 2 + 2 * numbers[1]:
+    if len(numbers) < 2 or len(numbers) != 2 + 2 * int(numbers[1]):
         declared = numbers[1] if len(numbers) > 1 else "no"
         contained = max(len(numbers) - 2, 0) / 2
         raise rows.error(

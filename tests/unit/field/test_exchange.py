@@ -130,6 +130,8 @@ def test_singularities_round_trip(tmp_path, error_of):
     assert "contains singularities" in error_of(read_field, tmp_path / "a.sings", surface)
     (tmp_path / "b.sings").write_text("4 3\n1 1\n2 1\n")
     assert "declares 3 singularities, but contains 2" in error_of(read_sings, tmp_path / "b.sings")
+    (tmp_path / "c.sings").write_text(f"4 {2**62} 1 1\n")
+    assert "singularities, but contains 1" in error_of(read_sings, tmp_path / "c.sings")
 
 
 def test_tensors_are_distinguished_from_three_directions(tmp_path):

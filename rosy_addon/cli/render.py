@@ -69,8 +69,9 @@ def run_render(options: argparse.Namespace) -> None:
         reference_luminance=reference_luminance,
         reference_name=str(options.tone_picture),
     )
-    picture = run_to_completion(CpuRenderer().render_task(view))
-    write_png(options.output, picture.rgba)
+    # Only the pixels are kept, not the layers of the picture.
+    rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
+    write_png(options.output, rgba)
 
 
 def add_turntable_command(subparsers: Any) -> None:

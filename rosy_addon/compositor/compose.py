@@ -34,6 +34,9 @@ from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
 from .target_tone import ReferenceRender, target_tone
 
+#: Pixels per block. Bounds memory, and fits the caches of the processor.
+BLOCK_PIXELS = 1 << 14
+
 #: Contrast of streaks in colored pictures, relative to gray pictures.
 COLOR_CONTRAST = 1.5
 
@@ -249,16 +252,17 @@ def _resolve_pixels(
     (height / supersampling, width / supersampling, 4) float32 ndarray
         Linear RGBA, not premultiplied.
     """
-    pixel_rgba = np.empty((len(pixel), 4), dtype=np.float32)
-    # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
-    pixel_rgba[:, :3] = color if supersampling == 1 else color * alpha[:, None]
-    pixel_rgba[:, 3] = alpha
-    if len(pixel) == height * width:
-        rgba = pixel_rgba
-    else:
-        rgba = np.zeros((height * width, 4), dtype=np.float32)
-        # The four floats of a pixel are copied as one complex128.
-        rgba.view(np.complex128)[:, 0][pixel] = pixel_rgba.view(np.complex128)[:, 0]
+    rgba = np.zeros((height * width, 4), dtype=np.float32)
+    # The four floats of a pixel are copied as one complex128.
+    scalars = rgba.view(np.complex128)[:, 0]
+    for start in range(0, len(pixel), BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
+        block_alpha = alpha[block, None]
+        # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
+        premultiplied = color[block] if supersampling == 1 else color[block] * block_alpha
+        block_rgba = np.empty((len(block_alpha), 4), dtype=np.float32)
+        block_rgba[:, :3], block_rgba[:, 3:] = premultiplied, block_alpha
+        scalars[pixel[block]] = block_rgba.view(np.complex128)[:, 0]
     s = supersampling
     if s == 1:
         return rgba.reshape(height, width, 4)

@@ -223,9 +223,13 @@ def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.n
     fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
     prefix_sum = np.cumsum(np.pad(image, pads, **fill), axis=axis, dtype=np.float64)
     size, window = image.shape[axis], 2 * radius + 1
-    after = prefix_sum.take(range(window, window + size), axis=axis)
-    before = prefix_sum.take(range(size), axis=axis)
-    return ((after - before) / window).astype(np.float32)
+    after, before = (
+        prefix_sum[:, start : start + size] if axis else prefix_sum[start : start + size]
+        for start in (window, 0)
+    )
+    mean = after - before
+    mean /= window
+    return mean.astype(np.float32)
 
 
 @lru_cache(maxsize=64)

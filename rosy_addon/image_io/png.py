@@ -19,6 +19,9 @@ _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
 #: files only a tenth smaller.
 ZLIB_LEVEL = 1
 
+#: Rows that are converted to display values at once. Bounds memory.
+BLOCK_ROWS = 64
+
 
 def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     """Write a picture as an sRGB PNG file with 8 bits per channel.
@@ -39,8 +42,14 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
     """Convert an (H, W, 4) linear picture to uint8 display values (sRGB). Alpha stays linear."""
-    display = np.concatenate([to_display(rgba[..., :3]), np.clip(rgba[..., 3:], 0, 1)], axis=-1)
-    return np.rint(display * 255).astype(np.uint8)
+    result = np.empty(rgba.shape, dtype=np.uint8)
+    for start in range(0, len(rgba), BLOCK_ROWS):
+        block = rgba[start : start + BLOCK_ROWS]
+        display = np.concatenate(
+            [to_display(block[..., :3]), np.clip(block[..., 3:], 0, 1)], axis=-1
+        )
+        np.rint(display * 255, out=result[start : start + BLOCK_ROWS], casting="unsafe")
+    return result
 
 
 def png_bytes(rgba: np.ndarray) -> bytes:

@@ -1,8 +1,17 @@
-"""Tuning of the C library's memory allocator: keep freed memory for the next arrays."""
+"""Memory: how much this process can still take, refusal of what needs more, and reuse of it."""
 
 from __future__ import annotations
 
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
 import numpy as np
+
+from .errors import RosyError
 
 #: Size in bytes of the array that raises the threshold. The GNU C library raises the threshold for
 #: freed blocks of up to 32 MiB only.
@@ -19,3 +28,124 @@ def raise_mmap_threshold() -> None:
     no effect with other C libraries.
     """
     np.empty(MMAP_THRESHOLD_BYTES, dtype=np.uint8)
+
+
+def check_memory(needed: float, subject: str, advice: str) -> None:
+    """Check that a step can take the memory that it needs, before it takes any.
+
+    Parameters
+    ----------
+    needed : float
+        Bytes, from an estimate.
+    subject : str
+        What needs them, for the message, such as "a picture of 800 x 600 pixels".
+    advice : str
+        What the user can do instead, for the message.
+
+    Raises
+    ------
+    RosyError
+        If more is needed than `available_memory`.
+    """
+    free = available_memory()
+    if free is not None and needed > free:
+        raise RosyError(
+            f"{subject} needs about {format_bytes(needed)} of memory, {format_bytes(free)} are "
+            f"free: {advice}"
+        )
+
+
+def format_bytes(count: float) -> str:
+    """Return a number of bytes as text, as in "850 MB", "9.1 GB" or "21 GB"."""
+    if count < 0.9995e9:
+        return f"{count / 1e6:.0f} MB"
+    return f"{count / 1e9:.1f} GB" if count < 9.95e9 else f"{count / 1e9:,.0f} GB"
+
+
+def available_memory() -> int | None:
+    """Return how many bytes this process can still take. None if that is not known.
+
+    It is the least of what the system has left, including its swap space, and of what the limits of
+    control groups (containers) and of the address space leave. On macOS, which compresses and swaps
+    on demand, it is the total memory. Never raises.
+    """
+    found = []
+    for source in (_system_memory, _control_group_memory, _address_space):
+        # A source that the system does not have, or that has another form than expected.
+        with suppress(Exception):
+            found += source()
+    return max(min(found), 0) if found else None
+
+
+def _system_memory() -> Iterator[int]:
+    """Yield the bytes that the operating system has left."""
+    if sys.platform == "win32":
+        yield from _windows_memory()
+    elif sys.platform == "darwin":
+        size, width = ctypes.c_uint64(), ctypes.c_size_t(8)
+        library = ctypes.CDLL(None)
+        if not library.sysctlbyname(
+            b"hw.memsize", ctypes.byref(size), ctypes.byref(width), None, ctypes.c_size_t(0)
+        ):
+            yield size.value
+    else:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        kilobytes = {name: int(rest.split()[0]) for name, rest in (s.split(":") for s in lines)}
+        yield (kilobytes["MemAvailable"] + kilobytes["SwapFree"]) * 1024
+
+
+def _windows_memory() -> Iterator[int]:
+    """Yield the bytes that Windows still commits to this process, in memory and page files."""
+
+    class MemoryStatus(ctypes.Structure):
+        _fields_ = [
+            ("size", ctypes.c_uint32),
+            ("load_percent", ctypes.c_uint32),
+            *((name, ctypes.c_uint64) for name in ("total", "free", "total_commit", "free_commit")),
+            *((name, ctypes.c_uint64) for name in ("total_space", "free_space", "extended")),
+        ]
+
+    status = MemoryStatus(size=ctypes.sizeof(MemoryStatus))
+    if ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
+        yield min(status.free_commit, status.free_space)
+
+
+def _control_group_memory(root: Path = Path("/")) -> Iterator[int]:
+    """Yield the bytes that each control group of this process leaves, under a root directory.
+
+    The files of a group are read where they are mounted, and those of the groups that contain it.
+    In a container, the path of the group may not exist; its files are then those of the mount.
+    Memory that only caches files is free.
+    """
+    for line in (root / "proc/self/cgroup").read_text().splitlines():
+        _, controllers, path = line.split(":", 2)
+        if controllers == "":
+            mount = root / "sys/fs/cgroup"
+            limit_name, usage_name, cached_name = "memory.max", "memory.current", "inactive_file"
+        elif "memory" in controllers.split(","):
+            mount = root / "sys/fs/cgroup/memory"
+            limit_name, usage_name = "memory.limit_in_bytes", "memory.usage_in_bytes"
+            cached_name = "total_inactive_file"
+        else:
+            continue
+        group = mount / path.lstrip("/")
+        for folder in (group, *group.parents):
+            # A group without a limit has no such file, or the limit "max".
+            with suppress(OSError, ValueError):
+                limit = int((folder / limit_name).read_text())
+                used = int((folder / usage_name).read_text())
+                counts = (folder / "memory.stat").read_text().split()
+                cached = dict(zip(counts[::2], counts[1::2], strict=True)).get(cached_name, 0)
+                yield limit - used + int(cached)
+            if folder == mount:
+                break
+
+
+def _address_space() -> Iterator[int]:
+    """Yield the bytes that the limit of the address space of this process leaves, if it has one."""
+    import resource  # not on Windows
+
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        yield limit - pages * os.sysconf("SC_PAGE_SIZE")

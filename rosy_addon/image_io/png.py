@@ -11,6 +11,7 @@ import numpy as np
 from ..color import to_display, to_linear
 from ..errors import RosyError
 from ..file_io import read_bytes, write_bytes
+from ..memory import check_memory
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
@@ -19,7 +20,7 @@ _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
 #: files only a tenth smaller.
 ZLIB_LEVEL = 1
 
-#: Rows that are converted to display values at once. Bounds memory.
+#: Rows that are converted to or from display values at once. Bounds memory.
 BLOCK_ROWS = 64
 
 
@@ -76,6 +77,12 @@ def _pack_chunk(kind: bytes, data: bytes) -> bytes:
 _CHANNELS_BY_COLOR_TYPE = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 _PALETTE_COLOR_TYPE = 3
 
+#: The most bytes that a byte of zlib's format can stand for.
+MAX_COMPRESSION = 1032
+
+#: Bytes of a pixel of a picture that has been read, and of each of its bytes while it is decoded.
+PIXEL_BYTES, DECODING_BYTES = 16, 4
+
 
 def read_png(path: str | os.PathLike[str]) -> np.ndarray:
     """Read a PNG file with 8 or 16 bits per channel. Its values are assumed to be sRGB.
@@ -92,8 +99,8 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
     Raises
     ------
     RosyError
-        If the file cannot be read, is not a valid PNG file, is interlaced, or has fewer than 8 bits
-        per channel.
+        If the file cannot be read, is not a valid PNG file, is interlaced, has fewer than 8 bits per
+        channel, or needs more memory than there is.
     """
     chunks = _read_chunks(path, read_bytes(path))
     invalid_file = RosyError(f"{path}: is damaged, or not a valid .png file")
@@ -109,17 +116,44 @@ def read_png(path: str | os.PathLike[str]) -> np.ndarray:
         )
     bytes_per_sample = bits // 8
     bytes_per_pixel = _CHANNELS_BY_COLOR_TYPE[color_type] * bytes_per_sample
+    row_bytes = 1 + width * bytes_per_pixel
+    _check_size(path, width, height, row_bytes, len(chunks.get(b"IDAT", b"")))
     try:
-        rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), dtype=np.uint8)
-        rows = rows.reshape(height, 1 + width * bytes_per_pixel)
+        # No more is decompressed than the header says.
+        decompressor = zlib.decompressobj()
+        data = decompressor.decompress(chunks[b"IDAT"], height * row_bytes + 1)
+        if not decompressor.eof:
+            raise invalid_file
+        rows = np.frombuffer(data, dtype=np.uint8).reshape(height, row_bytes)
         values = _undo_filters(rows[:, 1:].reshape(height, width, bytes_per_pixel), rows[:, 0])
-        if color_type == _PALETTE_COLOR_TYPE:
-            values = _apply_palette(values, chunks)
+        palette = _palette(chunks) if color_type == _PALETTE_COLOR_TYPE else None
+        return _to_linear_rgba(values[::-1], palette, bytes_per_sample)
     except (KeyError, ValueError, IndexError, zlib.error):
         raise invalid_file from None
-    if bytes_per_sample == 2:
-        values = values.reshape(height, width, -1).view(">u2")
-    return _to_linear_rgba(values[::-1].astype(np.float32) / np.float32(256**bytes_per_sample - 1))
+
+
+def _check_size(
+    path: str | os.PathLike[str], width: int, height: int, row_bytes: int, compressed: int
+) -> None:
+    """Check the size of a picture in a header against its compressed data and the free memory.
+
+    Raises
+    ------
+    RosyError
+        If it is 0 or more than the data can hold, or needs more memory than there is.
+    """
+    size = height * row_bytes
+    if not width or not height:
+        raise RosyError(f"{path}: is damaged: its size is {width} x {height} pixels")
+    if size > MAX_COMPRESSION * compressed:
+        raise RosyError(
+            f"{path}: is damaged: {width} x {height} pixels are more than its data can hold"
+        )
+    check_memory(
+        PIXEL_BYTES * width * height + DECODING_BYTES * size,
+        f"{path}: a picture of {width} x {height} pixels",
+        "choose a smaller picture",
+    )
 
 
 def _read_chunks(path: str | os.PathLike[str], data: bytes) -> dict[bytes, bytes]:
@@ -181,21 +215,43 @@ def _undo_filters(rows: np.ndarray, filter_types: np.ndarray) -> np.ndarray:
     return out[1:, 1:].astype(np.uint8)
 
 
-def _apply_palette(values: np.ndarray, chunks: dict[bytes, bytes]) -> np.ndarray:
-    """Return the (H, W, 4) uint8 colors of (H, W, 1) palette indices."""
+def _palette(chunks: dict[bytes, bytes]) -> np.ndarray:
+    """Return the (n, 4) uint8 colors of a palette."""
     colors = np.frombuffer(chunks[b"PLTE"], dtype=np.uint8).reshape(-1, 3)
     palette = np.full((len(colors), 4), 255, dtype=np.uint8)
     palette[:, :3] = colors
     alpha = np.frombuffer(chunks.get(b"tRNS", b""), dtype=np.uint8)
     palette[: len(alpha), 3] = alpha
-    return palette[values[..., 0]]
+    return palette
 
 
-def _to_linear_rgba(values: np.ndarray) -> np.ndarray:
-    """Convert gray, gray and alpha, RGB or RGBA display values, 0 to 1, to (H, W, 4) linear RGBA."""
-    channels = values.shape[2]
-    rgba = np.ones((*values.shape[:2], 4), dtype=np.float32)
-    rgba[..., :3] = to_linear(values[..., : 3 if channels > 2 else 1])
-    if channels % 2 == 0:
-        rgba[..., 3] = values[..., -1]
+def _to_linear_rgba(
+    samples: np.ndarray, palette: np.ndarray | None, bytes_per_sample: int
+) -> np.ndarray:
+    """Convert the bytes of pixels to linear RGBA, in blocks of rows.
+
+    Parameters
+    ----------
+    samples : (H, W, bytes per pixel) uint8 ndarray
+        Gray, gray and alpha, RGB or RGBA display values, or indices of a palette.
+    palette : (n, 4) uint8 ndarray or None
+    bytes_per_sample : {1, 2}
+
+    Returns
+    -------
+    (H, W, 4) float32 ndarray
+    """
+    rgba = np.ones((*samples.shape[:2], 4), dtype=np.float32)
+    for start in range(0, len(samples), BLOCK_ROWS):
+        block = samples[start : start + BLOCK_ROWS]
+        if palette is not None:
+            block = palette[block[..., 0]]
+        if bytes_per_sample == 2:
+            block = np.ascontiguousarray(block).view(">u2")
+        values = block.astype(np.float32) / np.float32(256**bytes_per_sample - 1)
+        channels = values.shape[2]
+        out = rgba[start : start + BLOCK_ROWS]
+        out[..., :3] = to_linear(values[..., : 3 if channels > 2 else 1])
+        if channels % 2 == 0:
+            out[..., 3] = values[..., -1]
     return rgba

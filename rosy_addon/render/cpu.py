@@ -6,9 +6,11 @@ from ..cache import Cache
 from ..compositor.compose import compose_task
 from ..compositor.picture import Picture
 from ..compositor.target_tone import check_tone
+from ..errors import RosyError
 from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.project import cached_project_task, project_task
+from ..projection.project import cached_project_task, check_instances, project_task
+from .picture_memory import check_picture_memory
 from .view_input import ViewInput
 
 #: Share of the progress bar that projecting takes.
@@ -38,9 +40,21 @@ class CpuRenderer:
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
+        self._check_memory(view)
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache)
         return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
+
+    def _check_memory(self, view: ViewInput) -> None:
+        """Check that there is enough memory, if need be after the cache has given back its own."""
+        check_instances(view.instances, view.sample_camera, view.look.display)
+        try:
+            check_picture_memory(view)
+        except RosyError:
+            if not self._cache:
+                raise
+            self._cache.clear()
+            check_picture_memory(view)
 
     def _gbuffer_task(self, view: ViewInput) -> Task[GBuffer]:
         """Return the G-buffer from the cache, or project the meshes."""

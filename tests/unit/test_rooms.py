@@ -30,11 +30,11 @@ BASE_ROOMS = {
 MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
-    "memory": set(),
+    "memory": {"errors"},
     "cache": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
-    "file_io": {"errors"},
+    "file_io": {"errors", "memory"},
     "settings": {"errors"},
     "field": BASE_ROOMS,
     "projection": BASE_ROOMS | {"field"},

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 import zlib
 
 import numpy as np
 import pytest
 
+from rosy_addon import memory
 from rosy_addon.color import luminance, to_display, to_linear
 from rosy_addon.image_io.png import read_png, write_png
 
@@ -150,6 +152,46 @@ def test_errors_of_damaged_files(tmp_path, error_of):
     chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes([7, 0])))
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
     assert "is damaged" in error_of(read_png, path)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "data", "message"),
+    [
+        (0, 5, bytes(5), "is damaged: its size is 0 x 5 pixels"),
+        (5, 0, b"", "is damaged: its size is 5 x 0 pixels"),
+        (18_000, 18_000, bytes(18_000), "18000 x 18000 pixels are more than its data can hold"),
+        (4, 4, bytes(1 << 26), "is damaged, or not a valid .png file"),
+        (4, 4, bytes(19), "is damaged, or not a valid .png file"),
+    ],
+)
+def test_sizes_that_are_not_those_of_the_data(tmp_path, error_of, width, height, data, message):
+    """They are refused before memory is taken, also for more data than the header says."""
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    chunks = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(data))
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunks)
+    tracemalloc.start()
+    try:
+        assert message in error_of(read_png, tmp_path / "a.png")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 21
+    finally:
+        tracemalloc.stop()
+
+
+def test_pictures_too_large_for_the_memory(tmp_path, error_of, monkeypatch):
+    rgba = np.random.default_rng(1).random((600, 500, 4), dtype=np.float32)
+    write_png(tmp_path / "a.png", rgba)
+    tracemalloc.start()
+    try:
+        read_png(tmp_path / "a.png")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    monkeypatch.setattr(memory, "available_memory", lambda: int(1.25 * peak))
+    read_png(tmp_path / "a.png")
+    monkeypatch.setattr(memory, "available_memory", lambda: int(0.75 * peak))
+    message = error_of(read_png, tmp_path / "a.png")
+    assert "a picture of 500 x 600 pixels needs about" in message
+    assert "choose a smaller picture" in message
 
 
 def test_luminance_over_white():

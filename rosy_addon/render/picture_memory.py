@@ -1,0 +1,259 @@
+"""The memory that a picture takes, estimated before it is taken.
+
+The estimate is the resident memory that `CpuRenderer.render_task` takes at its peak, beyond what
+the process holds before. It is the largest of the needs of the stages, each of which is a number
+of bytes for each sample of the frame, visible sample, pixel of the picture, triangle and so on.
+The numbers are sizes of arrays, fitted to measurements; `bench/memory.py` compares the estimate
+with what pictures take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compositor.fast_lic import (
+    BATCH_SIZE,
+    HALF_WINDOW_STEPS,
+    MAX_BATCH_STEPS,
+    MAX_STATES_PER_STRIP,
+)
+from ..compositor.hatching import (
+    has_breaks,
+    has_outline,
+    has_overshoot,
+    has_paper_grain,
+)
+from ..compositor.look import Look, colors_magnitude, is_hatched
+from ..compositor.look_units import look_in_pixels, supersampled_look
+from ..field.directional_field import field_harmonics, field_symmetry
+from ..memory import MMAP_THRESHOLD_BYTES, available_memory, check_memory
+from ..projection.gbuffer import MeshInstance
+from ..projection.project import rasterize_instances
+from ..projection.rasterizer import MAX_BAND_PIXELS
+from .view_input import ViewInput
+
+#: Longest side in pixels of the small frame in which the visible pixels are counted.
+COUNTING_SIDE = 256
+
+#: Bytes of a visible sample: in the G-buffer, of each further channel of its field, while it is
+#: projected, and of its tone and its links to neighbors.
+GBUFFER_BYTES, CHANNEL_BYTES, PROJECTION_BYTES, FIELD_BYTES = 85, 8, 9, 30
+
+#: Bytes of a sample of a band of the depth buffer, and of a visible sample, while rasterizing.
+DEPTH_BUFFER_BYTES, FRAGMENT_BYTES = 18, 30
+
+#: Bytes of a triangle: while its corners are computed, and of its connectivity, which is kept.
+TRIANGLE_BYTES, KEPT_TRIANGLE_BYTES = 145, 35
+
+#: Bytes of a visible sample while noise is made that is anchored to the surface: with lengths in
+#: pixels, and in Blender units. Bytes of a sample of the rectangle around the visible samples while
+#: noise is made that is anchored to the picture.
+SURFACE_NOISE_BYTES, WORLD_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 265, 34
+
+#: Bytes of a visible sample with the methods "members" and "brute", and of each of its lines or
+#: directions there.
+MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 135, 48, 165, 32
+
+#: Bytes of a step of the streamlines of a batch.
+STEP_BYTES = 24
+
+#: Bytes of the statistics of streaks, which are simulated once for a look.
+STATISTICS_BYTES = 100_000_000
+
+#: Bytes of a visible sample while its color is computed: gray; colored; by magnitude; hatched.
+GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 135
+
+#: Bytes of a shadow map of a light, while it is made.
+SHADOW_MAP_BYTES = 110_000_000
+
+#: Bytes of a pixel of a finished picture, and while it is written to a file.
+PICTURE_BYTES, WRITING_BYTES = 16, 16
+
+#: Fraction of the memory of arrays below `MMAP_THRESHOLD_BYTES` that the C library keeps for later
+#: arrays after they are freed.
+KEPT_FRACTION = 0.85
+
+
+class Coverage(NamedTuple):
+    """How much of a frame shows surfaces with a field, as fractions from 0 to 1.
+
+    Attributes
+    ----------
+    visible : float
+        Pixels that show them.
+    columns, rows : float
+        Sides of the rectangle around these pixels.
+    """
+
+    visible: float = 1.0
+    columns: float = 1.0
+    rows: float = 1.0
+
+
+def check_picture_memory(view: ViewInput) -> None:
+    """Check that a picture can take the memory that it needs.
+
+    The visible pixels are counted only if a picture full of them would need more than there is.
+
+    Raises
+    ------
+    RosyError
+        If it needs more than `available_memory`.
+    """
+    free = available_memory()
+    if free is None or picture_memory(view, Coverage()) <= free:
+        return
+    camera, samples = view.camera, view.look.supersampling
+    each = f" with {samples} x {samples} samples each" if samples > 1 else ""
+    check_memory(
+        picture_memory(view, view_coverage(view)),
+        f"a picture of {camera.width} x {camera.height} pixels{each}",
+        "choose a smaller size" + (", or less supersampling" if samples > 1 else ""),
+    )
+
+
+def view_coverage(view: ViewInput) -> Coverage:
+    """Return the coverage of a view, counted in a small frame."""
+    camera = view.camera
+    scale = min(COUNTING_SIDE / max(camera.width, camera.height), 1)
+    width, height = (max(round(side * scale), 1) for side in (camera.width, camera.height))
+    fragments, first_triangle = rasterize_instances(view.instances, camera.resized(width, height))
+    instance_id = np.searchsorted(first_triangle, fragments.triangle, side="right") - 1
+    has_field = np.array([instance.field is not None for instance in view.instances])
+    pixel = fragments.pixel[has_field[instance_id]]
+    if not len(pixel):
+        return Coverage(0.0, 0.0, 0.0)
+    row, column = np.divmod(pixel, width)
+    return Coverage(
+        len(pixel) / (width * height),
+        (int(column.max() - column.min()) + 1) / width,
+        (int(row[-1] - row[0]) + 1) / height,
+    )
+
+
+def picture_memory(view: ViewInput, coverage: Coverage) -> int:
+    """Estimate the memory that `CpuRenderer` takes for a picture.
+
+    Parameters
+    ----------
+    view : ViewInput
+    coverage : Coverage
+        From `view_coverage`, or a bound.
+
+    Returns
+    -------
+    int
+        Bytes at the peak, beyond those that are taken before, up to the writing of the picture to a
+        file.
+    """
+    camera = view.sample_camera
+    frame = camera.width * camera.height
+    pixels = view.camera.width * view.camera.height
+    visible = frame * coverage.visible
+    triangles = sum(len(instance.surface.triangles) for instance in view.instances)
+    look = supersampled_look(look_in_pixels(view.look, camera, view.instances))
+    lines, channels = _lines_and_channels(view.instances)
+    noise_channels = 3 if look.noise == "colour" else 1
+    image_bytes = 4 * (lines + 1) * noise_channels + 8
+
+    gbuffer = (GBUFFER_BYTES + CHANNEL_BYTES * channels) * visible + KEPT_TRIANGLE_BYTES * triangles
+    shadow_maps = SHADOW_MAP_BYTES if look.shadows and look.light != "headlight" else 0
+    base = gbuffer + FIELD_BYTES * visible
+    images = base + image_bytes * visible
+    colored = images + (4 * noise_channels + 16) * visible
+    lic = base + _lic_bytes(view, look, coverage, lines, noise_channels)
+    if has_overshoot(look):
+        tones = 4 * (lines + 6) * visible
+        lic = max(lic, images + tones + _sheets_bytes(view, look, coverage, lines, 3))
+    # What LIC has freed is used again, if its arrays are small.
+    kept = KEPT_FRACTION * lic if 8 * visible < MMAP_THRESHOLD_BYTES else 0
+    # The rows without visible samples are never written to, so they take no memory.
+    sample_rows = PICTURE_BYTES * frame * coverage.rows
+    downsampled = PICTURE_BYTES * pixels if look.supersampling > 1 else 0
+    return int(
+        max(
+            DEPTH_BUFFER_BYTES * min(frame, MAX_BAND_PIXELS) + FRAGMENT_BYTES * visible,
+            gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles,
+            gbuffer + shadow_maps,
+            lic,
+            images + STATISTICS_BYTES,
+            images + _color_bytes(look, lines, noise_channels) * visible,
+            max(colored, kept) + sample_rows + downsampled,
+            (downsampled or sample_rows) + WRITING_BYTES * pixels,
+        )
+    )
+
+
+def _lines_and_channels(instances: Sequence[MeshInstance]) -> tuple[int, int]:
+    """Return the largest number of lines of a field, and the largest number of its channels."""
+    fields = [instance.field for instance in instances if instance.field is not None]
+    return (
+        max((field_symmetry(field).line_count for field in fields), default=1),
+        max(
+            (len(field_harmonics(field)) + (field.family_count > 1) for field in fields), default=0
+        ),
+    )
+
+
+def _lic_bytes(
+    view: ViewInput, look: Look, coverage: Coverage, lines: int, noise_channels: int
+) -> float:
+    """Return the bytes that noise and LIC images take, beyond the fields of pixels."""
+    camera = view.sample_camera
+    frame = camera.width * camera.height
+    visible = frame * coverage.visible
+    if look.anchor == "surface":
+        each = SURFACE_NOISE_BYTES if look.unit == "pixels" else WORLD_NOISE_BYTES
+        noise = each * visible
+    else:
+        window = frame * coverage.columns * coverage.rows
+        noise = IMAGE_NOISE_BYTES * window + (12 + 4 * noise_channels) * visible
+    degree = max(instance.field.degree for instance in view.instances if instance.field is not None)
+    if look.method == "sheets":
+        lic = _sheets_bytes(view, look, coverage, lines, noise_channels)
+    elif look.method == "members":
+        lic = (MEMBERS_BYTES + MEMBERS_LINE_BYTES * lines + 12 * noise_channels) * visible
+    else:
+        image_bytes = 4 * lines * (noise_channels - 1)
+        lic = (BRUTE_BYTES + BRUTE_DIRECTION_BYTES * degree + image_bytes) * visible
+    return max(noise, lic)
+
+
+def _sheets_bytes(
+    view: ViewInput, look: Look, coverage: Coverage, lines: int, noise_channels: int
+) -> float:
+    """Return the bytes that the method "sheets" takes; see `fast_lic`."""
+    camera = view.sample_camera
+    visible = camera.width * camera.height * coverage.visible
+    columns, rows = camera.width * coverage.columns, camera.height * coverage.rows
+    line_bytes, cell_bytes = 25 + 16 * noise_channels, 11 + 8 * noise_channels
+    if look.magnitude in ("length", "both"):
+        cell_bytes += 16
+    if visible * 2 * lines > MAX_STATES_PER_STRIP:
+        margin = look.length * look.step + 2
+        strip_rows = max(MAX_STATES_PER_STRIP / (2 * lines) / camera.width, 3 * margin)
+        rows = min(rows, strip_rows + 3 * margin)
+        # The strip below, and copies of the fields of pixels.
+        line_bytes, cell_bytes = line_bytes + 4 + 4 * noise_channels, cell_bytes + 38
+    strip = (line_bytes * lines + cell_bytes) * columns * rows
+    half_length = max(HALF_WINDOW_STEPS, look.length // 2) + look.length
+    steps = min(BATCH_SIZE * half_length, MAX_BATCH_STEPS)
+    images = (8 * noise_channels + 4 * lines * noise_channels + 4) * visible
+    return images + strip + STEP_BYTES * steps
+
+
+def _color_bytes(look: Look, lines: int, noise_channels: int) -> float:
+    """Return the bytes of a visible sample while its color is computed, beyond its LIC images."""
+    if not is_hatched(look):
+        if colors_magnitude(look):
+            return MAGNITUDE_BYTES
+        colored = noise_channels > 1 or look.hue == "families"
+        return COLOR_BYTES if colored else GRAY_BYTES
+    extra = 4 * lines + 8 if has_breaks(look) else 0
+    extra += 35 if look.wobble > 0 else 0
+    extra += 4 * lines + 8 if has_paper_grain(look) else 0
+    extra += 4 * lines if has_overshoot(look) else 0
+    return HATCHING_BYTES + extra + (4 if has_outline(look) else 0)

@@ -8,7 +8,7 @@ from math import pi
 
 import bpy
 
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.errors import REPORTED_ERRORS, RosyError, counted, error_text
 from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
@@ -138,8 +138,8 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
             for mesh, field in fields.items():
                 default_name = "rosy_angle" if self.form == "ANGLE" else attribute_name(mesh)
                 write_mesh_field(mesh, field, self.attribute or default_name, self.form)
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+        except REPORTED_ERRORS as error:
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
         self.report(
             {"INFO"},

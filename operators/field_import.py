@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.errors import REPORTED_ERRORS, counted, error_text
 from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
@@ -71,8 +71,8 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
                 mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
             )
             store_fields(self, context, {mesh: field}, self.attribute)
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+        except REPORTED_ERRORS as error:
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
         if note:
             self.report({"WARNING"}, note)

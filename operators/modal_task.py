@@ -12,7 +12,7 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import REPORTED_ERRORS, error_text
 from ..rosy_addon.progress import Progress, Task, run_to_completion
 from ..rosy_addon.ui import job_status
 
@@ -213,8 +213,8 @@ class ModalTaskMixin:
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             result = run_to_completion(self.make_task(context))
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+        except REPORTED_ERRORS as error:
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
         self.finish(context, result)
         return {"FINISHED"}
@@ -224,8 +224,8 @@ class ModalTaskMixin:
             return self.execute(context)
         try:
             self._job = Job(context, self.make_task(context), self.required_data(context))
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+        except REPORTED_ERRORS as error:
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -239,8 +239,8 @@ class ModalTaskMixin:
                 if job.run_slice(context):
                     self.finish(context, job.result)
                     return {"FINISHED"}
-            except RosyError as error:
-                self.report({"ERROR"}, str(error))
+            except REPORTED_ERRORS as error:
+                self.report({"ERROR"}, error_text(error))
                 return {"CANCELLED"}
         if job.stop_reason is not None:
             self.report({"INFO"}, f"RoSy stopped, {self.cancel_note}: {job.stop_reason}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.errors import REPORTED_ERRORS, counted, error_text
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (
     add_singularity_points,
@@ -41,8 +41,8 @@ class ROSY_OT_singularities(bpy.types.Operator):
         depsgraph = context.evaluated_depsgraph_get()
         try:
             singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
-        except RosyError as error:
-            self.report({"ERROR"}, str(error))
+        except REPORTED_ERRORS as error:
+            self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
         for obj, singularities in singularities_by_object.items():
             overlay.hide(obj.name)

@@ -26,3 +26,14 @@ def counted(count: int, singular: str, plural: str = "") -> str:
     ('1 face', '2,000 faces', '0 vertices')
     """
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
+
+
+#: The errors that end a command or an operator with a message of one line; see `error_text`.
+REPORTED_ERRORS = (RosyError, MemoryError)
+
+
+def error_text(error: Exception) -> str:
+    """Return the message of one line to the user, for one of `REPORTED_ERRORS`."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory: choose a smaller size or a smaller mesh"
+    return str(error)

@@ -6,11 +6,19 @@ import os
 import secrets
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from .errors import RosyError
+from .memory import check_memory, format_bytes
+
+#: Bytes at the beginning of a file that show whether it is binary.
+HEAD_BYTES = 4096
+
+#: Bytes at the beginning of a text file in which words and lines are counted, and bytes of memory
+#: that each takes while the file is parsed.
+COUNTED_BYTES, WORD_MEMORY, LINE_MEMORY = 1 << 16, 110, 200
 
 
 def read_bytes(
@@ -22,20 +30,22 @@ def read_bytes(
     ----------
     path : path-like
     reject_binary : bool
-        Raise an error if the first 4096 bytes contain a zero byte. The rest is then not read.
+        Raise an error if the first `HEAD_BYTES` contain a zero byte. The rest is then not read.
     max_bytes : int, optional
         Largest permitted size of the file. At most one byte more is read.
 
     Raises
     ------
     RosyError
-        If the file is missing, is a folder, cannot be read, is larger than `max_bytes`, or is
-        binary and `reject_binary` is set.
+        If the file is missing, is a folder, cannot be read, is larger than `max_bytes` or than the
+        free memory, or is binary and `reject_binary` is set.
     """
     with open_file(path) as file:
-        head = file.read(4096)
+        head = file.read(HEAD_BYTES)
         if reject_binary and b"\0" in head:
             raise RosyError(f"{path}: expected text, found binary data")
+        if max_bytes is None:
+            check_memory(os.fstat(file.fileno()).st_size, f"{path}", "choose a smaller file")
         data = head + file.read(-1 if max_bytes is None else max(max_bytes + 1 - len(head), 0))
     if max_bytes is not None and len(data) > max_bytes:
         raise RosyError(f"{path}: is larger than the limit of {max_bytes:,} bytes")
@@ -59,7 +69,37 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be read: {error_text(error)}") from error
+        raise RosyError(f"{path}: cannot be read: {os_error_text(error)}") from error
+
+
+def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> None:
+    """Check that a file of numbers can take the memory that it needs, by its size.
+
+    Parameters
+    ----------
+    path : path-like
+    binary_memory : float
+        Bytes of memory that a byte of the file takes if it is binary.
+
+    Raises
+    ------
+    RosyError
+        If it needs more than `available_memory`.
+    """
+    head = b""
+    with suppress(OSError):  # the error is raised where the file is read
+        if os.path.isfile(path):
+            with open(path, "rb") as file:
+                head, size = file.read(COUNTED_BYTES), os.path.getsize(path)
+    if not head:
+        return
+    memory_per_byte = binary_memory
+    if b"\0" not in head[:HEAD_BYTES]:
+        words, lines = len(head.split()), head.count(b"\n")
+        memory_per_byte = (WORD_MEMORY * words + LINE_MEMORY * lines) / len(head)
+    check_memory(
+        size * memory_per_byte, f"{path}: a file of {format_bytes(size)}", "choose a smaller file"
+    )
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
@@ -102,7 +142,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     except BaseException as error:  # an interrupt as well
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise RosyError(f"{path}: cannot be written: {error_text(error)}") from error
+            raise RosyError(f"{path}: cannot be written: {os_error_text(error)}") from error
         raise
 
 
@@ -131,7 +171,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be written: {error_text(error)}") from error
+        raise RosyError(f"{path}: cannot be written: {os_error_text(error)}") from error
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
@@ -159,7 +199,7 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{folder}: cannot be written: {error_text(error)}") from error
+        raise RosyError(f"{folder}: cannot be written: {os_error_text(error)}") from error
     check_writable(Path(folder) / "picture.png")
 
 
@@ -174,9 +214,9 @@ def make_folder(folder: str | os.PathLike[str]) -> None:
     try:
         os.makedirs(folder, exist_ok=True)
     except (OSError, ValueError) as error:
-        raise RosyError(f"{folder}: cannot be created: {error_text(error)}") from error
+        raise RosyError(f"{folder}: cannot be created: {os_error_text(error)}") from error
 
 
-def error_text(error: OSError | ValueError) -> str:
+def os_error_text(error: OSError | ValueError) -> str:
     """Return the reason of an error in lower case, without number and path."""
     return (getattr(error, "strerror", None) or str(error)).lower()

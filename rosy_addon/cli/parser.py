@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from ..errors import RosyError
+from ..errors import REPORTED_ERRORS, error_text
 from .bake import add_bake_command
 from .field import add_field_command, add_info_command
 from .presets import add_presets_command
@@ -44,11 +44,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
         options = _build_parser(prog).parse_args(_join_negative_values(arguments))
         options.run(options)
         sys.stdout.flush()
-    except RosyError as error:
-        print_error(str(error))
-        return EXIT_USER_ERROR
-    except MemoryError:
-        print_error("there is not enough memory: choose a smaller size or a smaller mesh")
+    except REPORTED_ERRORS as error:
+        print_error(error_text(error))
         return EXIT_USER_ERROR
     except KeyboardInterrupt:
         print_error("stopped")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import RosyError, counted
-from ..file_io import write_bytes
+from ..file_io import check_parsing_memory, write_bytes
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import directions_text, npy_bytes, read_npy, read_text
@@ -36,6 +36,10 @@ WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUF
 
 #: Degree of files that do not state one, if the caller gives none.
 DEFAULT_DEGREE = 4
+
+
+#: Bytes of memory that a byte of an .npy file takes until its field is made.
+NPY_MEMORY = 4
 
 
 class LoadedField(NamedTuple):
@@ -111,6 +115,7 @@ def load_field(
         raise RosyError(
             f"{path}: is not a field file: its name must end in {_join_names(READ_SUFFIXES)}"
         )
+    check_parsing_memory(path, NPY_MEMORY)
     raw = reader(path)
     if degree is not None and raw.degree is not None and raw.degree != degree:
         raise RosyError(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
+from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot, normalize
@@ -51,6 +52,9 @@ MIN_PROJECTION = 1e-12
 
 #: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
 CURVATURE_SMOOTHING_ROUNDS = 2
+
+#: Bytes of memory that a face takes at the peak, by kind. The other kinds take little.
+BYTES_PER_FACE = {"smoothest": 750, "curvature": 720, "features": 1000, "guided": 1000}
 
 
 @dataclass(frozen=True)
@@ -122,9 +126,15 @@ def generate_task(
     Raises
     ------
     RosyError
-        If the kind is unknown, or cannot make a field of this degree on this surface.
+        If the kind is unknown, cannot make a field of this degree on this surface, or needs more
+        memory than there is.
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
+    check_memory(
+        BYTES_PER_FACE.get(settings.kind, 0) * surface.face_count,
+        f"{surface.name}: a field on {surface.face_count:,} faces",
+        "choose a smaller mesh, or another kind of field",
+    )
     yield Progress(0.0, "generating the field")
     if settings.kind == "smoothest":
         return (yield from smoothest_task(surface, degree))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RosyError
+from ..file_io import check_parsing_memory
 from .formats.obj import read_obj
 from .formats.off import read_off
 from .formats.ply import read_ply
@@ -23,6 +24,9 @@ READERS: dict[str, Callable[[Path], Polygons]] = {
     ".ply": read_ply,
     ".stl": read_stl,
 }
+
+#: Bytes of memory that a byte of a binary file takes until its surface is built.
+BINARY_MEMORY = {".ply": 20, ".stl": 10}
 
 #: Angle between face normals in radians above which an edge counts as sharp, because files do not
 #: mark sharp edges. Curved regions rarely exceed 60 degrees even in coarse meshes (an octagonal
@@ -49,8 +53,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
     Raises
     ------
     RosyError
-        If the file is missing, has another extension, is malformed or truncated, or is not a mesh
-        with faces. The message names the file and, in text files, the line.
+        If the file is missing, has another extension, is malformed or truncated, needs more memory
+        than there is, or is not a mesh with faces. The message names the file and, in text files, the line.
 
     Examples
     --------
@@ -63,5 +67,6 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
         raise RosyError(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
+    check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     polygons = reader(path)
     return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)

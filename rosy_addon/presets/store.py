@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..file_io import error_text, make_folder, read_bytes, write_bytes
+from ..file_io import os_error_text, make_folder, read_bytes, write_bytes
 from ..image_io.png import write_png
 from ..settings import settings_of
 from .preview import draw_preview
@@ -110,7 +110,7 @@ def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
-        raise RosyError(f"{user_folder}: presets cannot be read: {error_text(error)}") from error
+        raise RosyError(f"{user_folder}: presets cannot be read: {os_error_text(error)}") from error
     paths = [user_folder / name for name in names if name.endswith(".json")]
     return {path.stem: path for path in paths if os.path.isfile(path)}
 
@@ -354,7 +354,7 @@ def _delete_file(path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError as reason:
-        raise RosyError(f"{path}: cannot be deleted: {error_text(reason)}") from None
+        raise RosyError(f"{path}: cannot be deleted: {os_error_text(reason)}") from None
 
 
 def _read_json_object(path: str | os.PathLike[str]) -> dict[str, Any]:

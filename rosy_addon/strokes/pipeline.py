@@ -29,6 +29,7 @@ from .spacing import (
     values_at_points,
     weight_by_tone,
 )
+from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
 from .style import StrokeStyle
 from .svg import Pen, simplify_mask
@@ -121,7 +122,8 @@ def draw_instances_task(
     Raises
     ------
     RosyError
-        If no instance has a field, a spacing is not valid, or no stroke is visible.
+        If no instance has a field, a spacing is not valid, no stroke is visible, or strokes need
+        more memory than there is.
     """
     style = style or StrokeStyle()
     cache = Cache() if cache is None else cache
@@ -133,7 +135,8 @@ def draw_instances_task(
     strokes_of_instances = []
     for rank, index in enumerate(drawn):
         start, stop = (0.05 + 0.8 * done / len(drawn) for done in (rank, rank + 1))
-        task = _trace_instance(instances[index], camera, style, lights, cache)
+        clipped = clip_to_frame or not style.hidden
+        task = _trace_instance(instances[index], camera, style, lights, clipped, cache)
         strokes_of_instances.append((yield from subtask(task, start, stop)))
     if not strokes_of_instances:
         raise _no_visible_stroke(camera)
@@ -160,6 +163,7 @@ def _trace_instance(
     camera: Camera,
     style: StrokeStyle,
     lights: Sequence[LightSource],
+    clipped: bool,
     cache: Cache,
 ) -> Task[Strokes]:
     """Return all strokes of a mesh instance, with its outline, including hidden parts."""
@@ -169,6 +173,7 @@ def _trace_instance(
         spacing = spacing_by_tone(spacing, tone)
     if style.curvature:
         spacing = spacing_by_curvature(instance.surface, spacing, style.curvature)
+    check_stroke_memory(instance, spacing, camera, clipped)
     strokes = yield from trace_strokes_task(
         instance, spacing, cross_creases=style.cross_creases, cache=cache
     )

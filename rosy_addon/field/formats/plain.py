@@ -6,6 +6,7 @@ A row holds one member vector (3 numbers), all N directions (3 N) or a symmetric
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,12 @@ from .text_rows import format_rows, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
+
+#: The readers of the header of an `.npy` file, by version.
+_NPY_HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 
 def read_text(path: Path) -> RawField:
@@ -45,6 +52,16 @@ def read_text(path: Path) -> RawField:
     return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
 
 
+def _check_npy_size(data: bytes) -> None:
+    """Raise `ValueError` if the header of an `.npy` file declares more than the file contains."""
+    file = io.BytesIO(data)
+    version = np.lib.format.read_magic(file)
+    if version in _NPY_HEADERS:
+        shape, _, dtype = _NPY_HEADERS[version](file)
+        if math.prod(shape) * dtype.itemsize > len(data):
+            raise ValueError(f"it declares the shape {shape}, which is more than it contains")
+
+
 def read_npy(path: Path) -> RawField:
     """Read an `.npy` array of shape (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
 
@@ -55,6 +72,7 @@ def read_npy(path: Path) -> RawField:
     """
     data = read_bytes(path)
     try:
+        _check_npy_size(data)
         values = np.load(io.BytesIO(data), allow_pickle=False)
     except Exception as reason:  # numpy evaluates the header as Python, which can raise any error
         message_lines = str(reason).splitlines() or [type(reason).__name__]

@@ -1,0 +1,234 @@
+"""Memory: how much is free, the refusal of what needs more, and how good the estimates are."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+from bench import cases
+from rosy_addon import memory
+from rosy_addon.cache import Cache
+from rosy_addon.compositor.look import Look
+from rosy_addon.errors import RosyError
+from rosy_addon.field.field_io import load_field
+from rosy_addon.field.generate import generate
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import Camera
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.render.picture_memory import (
+    STATISTICS_BYTES,
+    Coverage,
+    picture_memory,
+    view_coverage,
+)
+from rosy_addon.render.view_input import ViewInput
+from rosy_addon.strokes.pipeline import draw_instances
+from rosy_addon.strokes.style import StrokeStyle
+
+
+def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:
+    """Return a view of a ball that covers most of the frame."""
+    ball = cases.instance(1000, degree)
+    return ViewInput((ball,), cases.camera(width, height), Look(**settings))
+
+
+def limit_memory(monkeypatch, free: float) -> None:
+    """Let the process believe that this many bytes are free."""
+    monkeypatch.setattr(memory, "available_memory", lambda: int(free))
+    monkeypatch.setattr("rosy_addon.render.picture_memory.available_memory", lambda: int(free))
+
+
+# --- what is free ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(8.5e8, "850 MB"), (9.06e9, "9.1 GB"), (2.1e10, "21 GB")]
+)
+def test_bytes_as_text(count, text):
+    assert memory.format_bytes(count) == text
+
+
+def test_limits_of_control_groups(tmp_path):
+    """Of the group and of the one around it; files that are only cached are free."""
+    (tmp_path / "proc/self").mkdir(parents=True)
+    (tmp_path / "proc/self/cgroup").write_text("0::/outer/inner\n7:memory:/box\n2:cpu:/\n")
+    mount = tmp_path / "sys/fs/cgroup"
+    for folder, limit, names in (
+        (mount / "outer/inner", "max", ("memory.max", "memory.current", "inactive_file")),
+        (mount / "outer", "5000", ("memory.max", "memory.current", "inactive_file")),
+        # In a container, the path of its group does not exist.
+        (
+            mount / "memory",
+            "7000",
+            ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
+        ),
+    ):
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / names[0]).write_text(f"{limit}\n")
+        (folder / names[1]).write_text("1000\n")
+        (folder / "memory.stat").write_text(f"anon 600\n{names[2]} 300\n")
+    assert list(memory._control_group_memory(tmp_path)) == [4300, 6300]
+
+
+def test_unknown_memory_is_none(monkeypatch, tmp_path):
+    """A source that fails does not hide the others, and nothing is refused without any."""
+
+    def fail():
+        raise OSError
+
+    sources = ("_system_memory", "_control_group_memory", "_address_space")
+    for name in sources:
+        monkeypatch.setattr(memory, name, fail)
+    assert memory.available_memory() is None
+    memory.check_memory(1e30, "a picture", "choose a smaller size")
+    monkeypatch.setattr(memory, "_address_space", lambda: iter([-5]))
+    assert memory.available_memory() == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit holds on Linux")
+def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
+    """Before memory is taken: in less time than the picture takes, and no file is written."""
+    mesh, picture = tmp_path / "quad.obj", tmp_path / "a.png"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    limits = "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30)); "
+    command = "from rosy_addon.cli.parser import main; sys.exit(main(prog='rosy'))"
+    completed = subprocess.run(
+        [sys.executable, "-c", limits + command]
+        + ["render", mesh, "--view", "0,0", "--size", "6000x6000", "-o", picture],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert completed.returncode == 2
+    (line,) = completed.stderr.splitlines()[-1:]
+    assert "a picture of 6000 x 6000 pixels" in line
+    assert " GB of memory, " in line
+    assert "choose a smaller size" in line
+    assert not picture.exists()
+
+
+# --- estimates ------------------------------------------------------------------------------------
+
+
+def traced_peak(work) -> int:
+    """Return the largest number of bytes that are allocated at once."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize(
+    ("degree", "settings"),
+    [
+        (4, {}),
+        (4, {"method": "brute", "length": 1, "supersampling": 2}),
+        (4, {"method": "members", "length": 1, "supersampling": 2}),
+        (2, {"anchor": "surface", "supersampling": 2}),
+        (4, {"ink": "hatch", "supersampling": 2}),
+    ],
+    ids=str,
+)
+def test_estimates_of_pictures_are_within_a_quarter(degree, settings):
+    view = ball_view(degree=degree, **settings)
+    expected = picture_memory(view, view_coverage(view))
+    peak = traced_peak(lambda: run_to_completion(CpuRenderer().render_task(view)))
+    assert 0.75 <= expected / peak <= 1.25
+
+
+def test_the_visible_pixels_are_counted():
+    """A few of them need much less memory than a picture full of them."""
+    view = ball_view(500, 2000)
+    coverage = view_coverage(view)
+    assert 0.18 < coverage.visible < 0.25
+    assert coverage.columns > 0.9
+    assert 0.22 < coverage.rows < 0.3
+    assert picture_memory(view, coverage) < 0.5 * picture_memory(view, Coverage())
+
+
+def test_the_estimate_grows_with_the_size():
+    sizes = [picture_memory(ball_view(side, side), Coverage()) for side in (100, 1000, 10_000)]
+    assert STATISTICS_BYTES < sizes[0] < sizes[1] < sizes[2] / 50
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+def test_pictures_are_refused_before_they_are_drawn(monkeypatch, error_of):
+    view = ball_view(1600, 1200, supersampling=2)
+    needed = picture_memory(view, view_coverage(view))
+    limit_memory(monkeypatch, 0.9 * needed)
+
+    def draw():
+        return run_to_completion(CpuRenderer().render_task(view))
+
+    peak = traced_peak(lambda: error_of(draw))
+    assert peak < 0.02 * needed
+    assert error_of(draw).startswith(
+        f"a picture of 1600 x 1200 pixels with 2 x 2 samples each needs about "
+        f"{memory.format_bytes(needed)} of memory, {memory.format_bytes(int(0.9 * needed))} are free: "
+    )
+
+
+def test_the_cache_gives_its_memory_back(monkeypatch):
+    """It is emptied only if there is not enough without."""
+    view, cache = ball_view(), Cache()
+    cache.put("an earlier picture", np.zeros(3))
+    limit_memory(monkeypatch, 1e12)
+    run_to_completion(CpuRenderer(cache, keep_gbuffers=False).render_task(view))
+    assert cache.get("an earlier picture") is not None
+    limit_memory(monkeypatch, 1e6)
+    with pytest.raises(RosyError):
+        run_to_completion(CpuRenderer(cache).render_task(view))
+    assert not len(cache)
+
+
+def test_meshes_and_fields_are_refused_by_the_size_of_the_file(tmp_path, monkeypatch, error_of):
+    rows = "".join(f"v {x} {x % 7} {x % 3}\n" for x in range(3000))
+    faces = "".join(f"f {x} {x + 1} {x + 2}\n" for x in range(1, 2998))
+    (tmp_path / "a.obj").write_text(rows + faces)
+    peak = traced_peak(lambda: read_mesh(tmp_path / "a.obj"))
+    limit_memory(monkeypatch, 2 * peak)
+    surface = read_mesh(tmp_path / "a.obj")
+    limit_memory(monkeypatch, 0.5 * peak)
+    assert "a.obj: a file of 0 MB needs about" in error_of(read_mesh, tmp_path / "a.obj")
+    limit_memory(monkeypatch, 1000)
+    np.save(tmp_path / "a.npy", np.ones((surface.face_count, 3)))
+    assert "a.npy: a file of 0 MB needs" in error_of(load_field, tmp_path / "a.npy", surface)
+    assert "a field on 2,997 faces needs about" in error_of(generate, surface, "smoothest", 4)
+
+
+def test_strokes_are_refused_by_their_spacing(monkeypatch, error_of):
+    ball, camera = cases.instance(1000, 4), cases.camera(256)
+    limit_memory(monkeypatch, 10e6)
+    message = error_of(draw_instances, [ball], camera, StrokeStyle(spacing=4.0))
+    assert "a drawing of strokes with this spacing needs about" in message
+    draw_instances([ball], camera, StrokeStyle(spacing=30.0))
+
+
+def test_lack_of_memory_is_one_line(monkeypatch, capsys, tmp_path):
+    """If the system says so only when the memory is taken."""
+    from rosy_addon.cli import parser, render
+
+    def fail(_):
+        raise MemoryError
+
+    monkeypatch.setattr(render, "check_output", fail)
+    assert parser.main(["render", "a.obj", "-o", str(tmp_path / "a.png")]) == 2
+    assert "there is not enough memory" in capsys.readouterr().err
+
+
+def test_small_frames_are_counted_in_full():
+    """A camera of one pixel has a coverage as well."""
+    view = ball_view(1, 1)
+    assert isinstance(view.camera, Camera)
+    assert view_coverage(view).visible in (0.0, 1.0)

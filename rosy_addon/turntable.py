@@ -17,6 +17,7 @@ from .errors import RosyError
 from .file_io import write_bytes
 from .image_io.gif import gif_bytes
 from .image_io.png import write_png
+from .memory import check_memory
 from .progress import Progress, Task, subtask
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
@@ -29,6 +30,9 @@ VIDEO_SUFFIXES = (".mp4", ".gif")
 #: A function that encodes a video. Its arguments are the folder of pictures, their number and size,
 #: the frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
+
+#: Bytes of memory of a pixel of a .gif: its colors until the end, and its compressed data.
+GIF_BYTES = 4.5
 
 #: Points per circle of the hull that is framed.
 HULL_SAMPLES = 48
@@ -109,6 +113,8 @@ def turntable_task(
         for index, view in enumerate(views):
             start, stop = (ENCODING_START * done / count for done in (index, index + 1))
             label = f"picture {index + 1} of {count}"
+            if not index:
+                writer.check_memory(count, view.camera.width, view.camera.height)
             yield Progress(start, label)
             picture = yield from subtask(renderer.render_task(view), start, stop, label)
             writer.add(picture.rgba)
@@ -144,6 +150,21 @@ class VideoWriter:
 
     def __exit__(self, *_: object) -> None:
         self._temp_folder.cleanup()
+
+    def check_memory(self, count: int, width: int, height: int) -> None:
+        """Check that a number of pictures can take the memory that they need as a .gif.
+
+        Raises
+        ------
+        RosyError
+            If they need more than `available_memory`.
+        """
+        if self._is_gif:
+            check_memory(
+                GIF_BYTES * count * width * height,
+                f"a .gif of {count} pictures of {width} x {height} pixels",
+                "choose a smaller size or fewer pictures, or write an .mp4",
+            )
 
     def add(self, rgba: np.ndarray) -> None:
         """Add a picture.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from rosy.rosy_addon import memory
 from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
+from rosy.rosy_addon.render import picture_memory
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vectors
 from rosy.rosy_addon.scene.meshes import mesh_surface
@@ -54,6 +56,12 @@ def test_no_field(scene, camera):
     add_field(plane, kind="axis").hide_render = True
     with pytest.raises(RosyError, match=r"'Plane' is hidden in renders .*: show it"):
         field_objects(bpy.context.view_layer, ["Plane"])
+
+
+def test_more_memory_than_there_is(scene, camera, monkey, monkeypatch):
+    monkeypatch.setattr(picture_memory, "available_memory", lambda: 10**9)
+    monkeypatch.setattr(memory, "available_memory", lambda: 10**9)
+    assert_refused("a picture of 9000 x 9000 pixels", "1.0 GB are free", size=(9000, 9000))
 
 
 def test_hidden_in_the_viewport(scene, camera, monkey):

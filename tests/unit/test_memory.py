@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from rosy_addon.render.picture_memory import (
 from rosy_addon.render.view_input import ViewInput
 from rosy_addon.strokes.pipeline import draw_instances
 from rosy_addon.strokes.style import StrokeStyle
+from rosy_addon.turntable import turntable_task, turntable_views
 
 
 def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:
@@ -147,11 +149,13 @@ def test_estimates_of_pictures_are_within_a_quarter(degree, settings):
 
 def test_the_visible_pixels_are_counted():
     """A few of them need much less memory than a picture full of them."""
-    view = ball_view(500, 2000)
+    view = ball_view(4000, 4000)
+    projection = np.diag([0.5, 0.5, 1, 1]) @ view.camera.projection
+    view = replace(view, camera=replace(view.camera, projection=projection))
     coverage = view_coverage(view)
     assert 0.18 < coverage.visible < 0.25
-    assert coverage.columns > 0.9
-    assert 0.22 < coverage.rows < 0.3
+    assert 0.45 < coverage.columns < 0.6
+    assert 0.45 < coverage.rows < 0.6
     assert picture_memory(view, coverage) < 0.5 * picture_memory(view, Coverage())
 
 
@@ -205,6 +209,29 @@ def test_meshes_and_fields_are_refused_by_the_size_of_the_file(tmp_path, monkeyp
     np.save(tmp_path / "a.npy", np.ones((surface.face_count, 3)))
     assert "a.npy: a file of 0 MB needs" in error_of(load_field, tmp_path / "a.npy", surface)
     assert "a field on 2,997 faces needs about" in error_of(generate, surface, "smoothest", 4)
+
+
+def test_a_header_with_more_numbers_than_the_file(tmp_path, error_of):
+    surface = cases.ball(100)
+    np.save(tmp_path / "a.npy", np.ones((surface.face_count, 3)))
+    shape = b"(%d, 3)" % surface.face_count
+    data = (tmp_path / "a.npy").read_bytes()
+    (tmp_path / "a.npy").write_bytes(
+        data.replace(shape + b", }" + b" " * 9, b"(%d, 3), }" % 10**11)
+    )
+    assert traced_peak(lambda: error_of(load_field, tmp_path / "a.npy", surface)) < 1 << 20
+    assert "which is more than it contains" in error_of(load_field, tmp_path / "a.npy", surface)
+
+
+def test_a_gif_is_refused_before_its_first_picture(tmp_path, monkeypatch, error_of):
+    limit_memory(monkeypatch, 2e9)
+    ball = cases.instance(1000, 4)
+    views = turntable_views(ball, Look(), 500, (1000, 1000), (0, 0))
+    task = turntable_task(CpuRenderer(), views, 500, tmp_path / "a.gif", 24)
+    assert "a .gif of 500 pictures of 1000 x 1000 pixels needs about 2.2 GB" in error_of(
+        run_to_completion, task
+    )
+    assert not list(tmp_path.iterdir())
 
 
 def test_strokes_are_refused_by_their_spacing(monkeypatch, error_of):

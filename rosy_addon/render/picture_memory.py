@@ -28,7 +28,8 @@ from ..compositor.hatching import (
 )
 from ..compositor.look import Look, colors_magnitude, is_hatched
 from ..compositor.look_units import look_in_pixels, supersampled_look
-from ..field.directional_field import field_harmonics, field_symmetry
+from ..field.directional_field import ratio_harmonics
+from ..field.symmetry import FieldSymmetry
 from ..memory import MMAP_THRESHOLD_BYTES, available_memory, check_memory
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import rasterize_instances
@@ -37,6 +38,9 @@ from .view_input import ViewInput
 
 #: Longest side in pixels of the small frame in which the visible pixels are counted.
 COUNTING_SIDE = 256
+
+#: Number of faces whose directions are looked at.
+SAMPLED_FACES = 1000
 
 #: Bytes of a visible sample: in the G-buffer, of each further channel of its field, while it is
 #: projected, and of its tone and its links to neighbors.
@@ -188,14 +192,19 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
 
 
 def _lines_and_channels(instances: Sequence[MeshInstance]) -> tuple[int, int]:
-    """Return the largest number of lines of a field, and the largest number of its channels."""
-    fields = [instance.field for instance in instances if instance.field is not None]
-    return (
-        max((field_symmetry(field).line_count for field in fields), default=1),
-        max(
-            (len(field_harmonics(field)) + (field.family_count > 1) for field in fields), default=0
-        ),
-    )
+    """Return the largest number of lines of a field, and the largest number of its channels.
+
+    The directions of some faces show which harmonics a field has.
+    """
+    lines, channels = 1, 0
+    for field in (instance.field for instance in instances if instance.field is not None):
+        harmonics: dict[int, np.ndarray] = {}
+        if field.direction_ratios is not None:
+            step = max(len(field.direction_ratios) // SAMPLED_FACES, 1)
+            harmonics = ratio_harmonics(field.direction_ratios[::step])
+        lines = max(lines, FieldSymmetry(field.degree, tuple(harmonics)).line_count)
+        channels = max(channels, len(harmonics) + (field.family_count > 1))
+    return lines, channels
 
 
 def _lic_bytes(

@@ -106,6 +106,32 @@ def test_errors_of_export(with_field, tmp_path):
     assert "field.rosy" in error_of(bpy.ops.rosy.field_export, filepath=str(path))
 
 
+@pytest.mark.parametrize(
+    ("free", "message"), [(10**5, "are free: choose a"), (None, "there is not enough memory")]
+)
+def test_lack_of_memory_is_reported(with_field, monkeypatch, free, message):
+    """Whether it is known before, or noticed when the memory is taken."""
+    modules = {
+        name: sys.modules[f"bl_ext.user_default.rosy.rosy_addon.{name}"]
+        for name in ("memory", "render.picture_memory")
+    }
+
+    def fail(*_):
+        raise MemoryError
+
+    before = contents()
+    for module in modules.values():
+        monkeypatch.setattr(module, "available_memory", (lambda: free) if free else fail)
+    for operator, settings in (
+        (bpy.ops.rosy.bake, {}),
+        (bpy.ops.rosy.field_generate, {"kind": "smoothest"}),
+    ):
+        error = error_of(operator, **settings)
+        assert message in error
+        assert "Traceback" not in error
+    assert contents() == before
+
+
 def test_reasons_of_disabled_buttons(scene):
     assert not bpy.ops.rosy.bake.poll()
     assert "Select a mesh" in error_of(bpy.ops.rosy.field_generate)

@@ -1,0 +1,190 @@
+"""The loop of the monkey, inside Blender. Run by monkey.py, which reads what this prints."""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import json
+import os
+import sys
+import time
+import traceback
+from contextlib import nullcontext
+from pathlib import Path
+from random import Random
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+import monkey_state as state
+from monkey_actions import ACTIONS, Action, CheckError, Monkey, forget_files, remove_everything
+
+#: Number of parts of a run. After each, everything is removed and the memory is measured.
+PARTS = 8
+
+#: Megabytes by which the resident memory may grow in the second half of a run, and per step.
+MAX_GROWTH, MAX_GROWTH_PER_STEP = 40.0, 0.02
+
+#: Seconds after which the Python stack of a step is printed.
+STEP_SECONDS = 120.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seed", type=int)
+    parser.add_argument("--steps", type=int)
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--blender-only", action="store_true")
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
+    faulthandler.enable()
+    preferences = bpy.context.preferences
+    preferences.view.show_splash = False
+    preferences.edit.undo_steps = 20
+    preferences.filepaths.use_auto_save_temporary_files = False
+    preferences.filepaths.save_version = 0
+    work = run(options)
+    if bpy.app.background:
+        for _ in work:
+            pass
+        return
+    bpy.app.timers.register(lambda: tick(work), first_interval=1.0, persistent=True)
+
+
+def tick(work) -> float | None:
+    try:
+        pause = next(work)
+    except StopIteration:
+        # As a user ends Blender, so that RoSy is unregistered.
+        bpy.app.timers.register(lambda: bpy.ops.wm.quit_blender() and None, first_interval=0.1)
+        return None
+    except SystemExit as error:
+        sys.stdout.flush()
+        os._exit(error.code)
+    return 0.01 if pause is None else pause
+
+
+def say(text: str) -> None:
+    print(text, flush=True)
+
+
+def run(options: argparse.Namespace):
+    """Yield after each slice of work that Blender may handle events after; exit at the end."""
+    window = not bpy.app.background
+    monkey = Monkey(options.folder, window, not options.blender_only, lambda text: say(f"  {text}"))
+    actions = [a for a in ACTIONS if monkey.uses_rosy or not a.uses_rosy]
+    weights = [a.weight for a in actions]
+    part_steps = max(options.steps // PARTS, 1)
+    start, measured = time.monotonic(), []
+    try:
+        yield from restart(monkey)
+        counts = state.data_counts()
+        for step in range(options.steps):
+            monkey.random = Random(f"{options.seed} {step}")
+            (chosen,) = monkey.random.choices(actions, weights)
+            say(f"monkey step {step}: {chosen.name}")
+            faulthandler.dump_traceback_later(STEP_SECONDS)
+            yield from in_context(monkey, chosen)
+            if window:
+                yield 0.01
+            faulthandler.cancel_dump_traceback_later()
+            if (step + 1) % part_steps == 0:
+                say(f"monkey step {step}: the end of a part")
+                yield from restart(monkey)
+                measured.append(check_memory(monkey, counts))
+                say(f"  {measured[-1]}")
+        growth = check_growth(measured, options.steps)
+    except CheckError as failure:
+        say(f"monkey failed: {failure}")
+        sys.exit(1)
+    except BaseException:
+        say(f"monkey failed: {traceback.format_exc().strip().splitlines()[-1]}")
+        traceback.print_exc()
+        sys.exit(1)
+    seconds = time.monotonic() - start
+    summary = {
+        "steps": options.steps,
+        "seconds": round(seconds),
+        "steps per second": round(options.steps / seconds, 1),
+        "MB at the end": round(measured[-1]["MB"]),
+        "MB grown in the second half": round(growth, 1),
+    }
+    say(f"monkey done: {json.dumps(summary)}")
+
+
+def in_context(monkey: Monkey, chosen: Action):
+    """Run an action, in the context of the 3D view if there is a window."""
+    work, bare = chosen.slices(monkey), chosen.bare
+    while True:
+        try:
+            with nullcontext() if bare or not monkey.window else in_view():
+                pause = next(work)
+        except StopIteration:
+            return
+        if isinstance(pause, str):
+            bare, pause = pause == "bare", None
+        yield pause
+
+
+def in_view():
+    """Return a context in which operators find the 3D view."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    return bpy.context.temp_override(window=window, area=area, region=region)
+
+
+def restart(monkey: Monkey):
+    """Remove all that RoSy made, and open an empty file with one mesh and a camera."""
+    if monkey.uses_rosy:
+        yield from remove_everything(monkey)
+        state.rosy("rosy_addon.viewport.session").stop()
+        state.rosy("rosy_addon.ui.overlay").hide()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.3 if monkey.window else None
+    forget_files(monkey)
+    if monkey.uses_rosy and (left := state.handlers()):
+        raise CheckError("handlers are left: " + "; ".join(left))
+    if monkey.window:
+        open_panel()
+        yield 0.3
+
+
+def open_panel() -> None:
+    """Show RoSy's tab of the sidebar."""
+    window = bpy.context.window_manager.windows[0]
+    area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    area.spaces.active.show_region_ui = True
+    for region in area.regions:
+        if region.type == "UI":
+            region.active_panel_category = "RoSy"
+
+
+def check_memory(monkey: Monkey, counts: dict[str, int]) -> dict:
+    """Check that an empty file holds nothing, nor does Python, and measure the memory."""
+    if monkey.uses_rosy:
+        state.rosy("rosy_addon.cache").BAKE_CACHE.clear()
+        state.rosy("rosy_addon.scene.staleness").MESH_STATES.clear()
+    if (found := state.data_counts()) != counts:
+        raise CheckError(f"an empty file holds {found}, it held {counts}")
+    alive = state.python_objects()
+    return {
+        "MB": round(state.resident_megabytes(), 1),
+        "alive": sum(alive.values()),
+        "by class": alive,
+    }
+
+
+def check_growth(measured: list[dict], steps: int) -> float:
+    """Check that neither memory nor objects grow in the second half. Return the megabytes."""
+    if len(measured) < PARTS:
+        return 0.0
+    half, end = measured[len(measured) // 2 - 1], measured[-1]
+    growth = end["MB"] - half["MB"]
+    if growth > MAX_GROWTH + MAX_GROWTH_PER_STEP * steps:
+        raise CheckError(f"the memory grew by {growth:.0f} MB in the second half: {measured}")
+    if end["alive"] > half["alive"] + 50:
+        raise CheckError(f"{half['by class']} became {end['by class']}")
+    return growth
+
+
+main()

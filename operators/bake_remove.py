@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.errors import counted
-from ..rosy_addon.scene.bake_records import list_bakes, remove_bakes
+from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from .poll import poll_idle
 
 
@@ -20,7 +20,7 @@ class ROSY_OT_remove(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not poll_idle(cls):
             return False
-        if not list_bakes(context.scene):
+        if not has_pictures(context.scene):
             cls.poll_message_set("This scene has no baked pictures")
             return False
         return True

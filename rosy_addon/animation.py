@@ -10,6 +10,7 @@ give equal bytes. Two processes may therefore share one folder; at worst they dr
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -84,7 +85,7 @@ def bake_animation_task(
     Parameters
     ----------
     scene : bpy.types.Scene
-        Its current frame is restored at the end.
+        Its current frame and camera are restored at the end.
     frames : sequence of int
     cameras : sequence of bpy.types.Object, optional
         One image sequence for each. By default there is one sequence, from the camera that renders
@@ -111,7 +112,8 @@ def bake_animation_task(
         raise RosyError("frames need a folder: choose Output > Store > In a Folder")
     check_folder(settings.folder)
     frames = list(frames)
-    original_frame = scene.frame_current, scene.frame_subframe
+    original_frame = scene.frame_current + scene.frame_subframe
+    original_camera = scene.camera
     rendered_frames: dict[str, list[int]] = {}
     skipped_frames: dict[str, list[int]] = {}
     sequence_cameras: dict[str, Camera] = {}
@@ -158,7 +160,10 @@ def bake_animation_task(
     finally:
         exit_stack.close()
         cache.clear()  # it holds renderers, which refer to the cache
-        scene.frame_set(original_frame[0], subframe=original_frame[1])
+        # `frame_set` takes no negative subframes, which frames before 0 have.
+        whole_frame = math.floor(original_frame)
+        scene.frame_set(whole_frame, subframe=original_frame - whole_frame)
+        scene.camera = original_camera  # markers may have changed it
 
 
 def bake_animation(

@@ -1,12 +1,27 @@
 """Exceptions whose messages are shown to the user, and the grammar of messages."""
 
+import re
+
+#: Characters that terminals act on: control characters except tab and newline, and those that
+#: change the direction of text. Names in files may contain them.
+UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def escape_unsafe(text: str) -> str:
+    """Return a text with escapes, such as ``\\x1b``, for `UNSAFE` characters."""
+    return UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+
 
 class RosyError(ValueError):
     """An error that the user can correct, with a message of one line.
 
     The message says where the error is (object, attribute, file or line), what was found and what
-    was expected. Operators report it. The command line prints it and exits with status 2.
+    was expected. Operators report it. The command line prints it and exits with status 2. Line
+    breaks and other control characters, which names may have, are escaped.
     """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(escape_unsafe(message.replace("\n", "\\n").replace("\t", "\\t")))
 
 
 class NothingInViewError(RosyError):

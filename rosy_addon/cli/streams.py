@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 from typing import TextIO
 
-#: Characters that terminals act on: control characters except tab and newline, and those that
-#: change the direction of text. Names in files may contain them.
-UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+from ..errors import escape_unsafe
 
 
 def printable(text: str, encoding: str | None = None) -> str:
@@ -26,9 +23,8 @@ def printable(text: str, encoding: str | None = None) -> str:
     >>> printable("a\\x1b[31mb")
     'a\\\\x1b[31mb'
     """
-    text = UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
     encoding = encoding or "utf-8"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
+    return escape_unsafe(text).encode(encoding, "backslashreplace").decode(encoding)
 
 
 def print_line(text: str, file: TextIO | None = None) -> None:

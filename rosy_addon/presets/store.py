@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..file_io import os_error_text, make_folder, read_bytes, write_bytes
+from ..file_io import make_folder, os_error_text, read_bytes, write_bytes
 from ..image_io.png import write_png
 from ..settings import settings_of
 from .preview import draw_preview

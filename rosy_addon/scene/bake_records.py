@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from .look_properties import read_look
-from .owned_data import delete_owned, is_rosy_modifier
+from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import material_of_group, remove_picture_modifiers
 from .staleness import camera_state, find_stale_reason, look_state, object_state
 
@@ -155,6 +155,25 @@ def _is_shown(record: bpy.types.PropertyGroup) -> bool:
     return any(material_of_group(node_group) == record.material for node_group in node_groups)
 
 
+def has_pictures(scene: bpy.types.Scene) -> bool:
+    """Whether there is anything for `remove_bakes` to remove.
+
+    A picture may have no record, as on appended objects, and a record no image, if the user deleted
+    it.
+    """
+    return bool(scene.rosy.bakes or _baked_objects(scene))
+
+
+def _baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the objects that show pictures, and are recorded or in the scene."""
+    recorded_names = {entry.name for record in scene.rosy.bakes for entry in record.objects}
+    return [
+        obj
+        for obj in bpy.data.objects
+        if (obj.name in recorded_names or obj.name in scene.objects) and removable_modifiers(obj)
+    ]
+
+
 def remove_bakes(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None
 ) -> RemovalCounts:
@@ -168,13 +187,7 @@ def remove_bakes(
         object is left. By default all pictures are removed.
     """
     records = scene.rosy.bakes
-    recorded_names = {entry.name for record in records for entry in record.objects}
-    baked_objects = [
-        obj
-        for obj in bpy.data.objects
-        if (obj.name in recorded_names or obj.name in scene.objects)
-        and any(map(is_rosy_modifier, obj.modifiers))
-    ]
+    baked_objects = _baked_objects(scene)
     targets = baked_objects if objects is None else [obj for obj in objects if obj in baked_objects]
     node_groups = 0
     for obj in targets:
@@ -190,4 +203,5 @@ def remove_bakes(
             records.remove(index)
             materials += delete_owned(material)
             images += delete_owned(image)
+    delete_unused()
     return RemovalCounts(len(targets), images, materials, node_groups)

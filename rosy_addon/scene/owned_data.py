@@ -17,6 +17,18 @@ def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
     return group is not None and bool(group.get(OWNED_TAG))
 
 
+def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
+    """Return the modifiers that RoSy added to an object, and that are not linked from a library."""
+    if obj.library is not None:
+        return []
+    is_override = obj.override_library is not None
+    return [
+        modifier
+        for modifier in obj.modifiers
+        if is_rosy_modifier(modifier) and not (is_override and modifier.is_override_data)
+    ]
+
+
 def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Return the modifiers of an object without those that RoSy added."""
     return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
@@ -45,3 +57,11 @@ def delete_owned(datablock: bpy.types.ID | None) -> int:
         return 0
     bpy.data.batch_remove([datablock])
     return 1
+
+
+def delete_unused() -> None:
+    """Delete the node groups, materials and images that RoSy created and that nothing uses."""
+    # A group uses its material, and that its image.
+    for collection in (bpy.data.node_groups, bpy.data.materials, bpy.data.images):
+        unused = [block for block in collection if block.get(OWNED_TAG) and not block.users]
+        bpy.data.batch_remove(unused)

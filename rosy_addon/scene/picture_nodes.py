@@ -9,7 +9,7 @@ import numpy as np
 
 from .blender_images import NEUTRAL_GRAY
 from .compat import has_nodes_by_default
-from .owned_data import delete_owned, is_rosy_modifier
+from .owned_data import delete_owned, is_rosy_modifier, removable_modifiers
 
 #: Name of the modifier that shows a picture.
 MODIFIER_NAME = "RoSy"
@@ -235,7 +235,7 @@ def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) 
 
 def remove_picture_modifiers(obj: bpy.types.Object) -> int:
     """Remove RoSy's modifiers from an object, and return the number of deleted node groups."""
-    existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    existing = removable_modifiers(obj)
     node_groups = {modifier.node_group for modifier in existing}
     for modifier in existing:
         obj.modifiers.remove(modifier)

@@ -88,7 +88,8 @@ def add_singularity_points(
     data = _new_point_cloud(name, len(singularity_data))
     point_object = bpy.data.objects.new(name, data)
     point_object[OWNED_TAG] = obj.name
-    data.attributes["position"].data.foreach_set("vector", singularity_data.points.ravel())
+    if len(singularity_data):  # an empty point cloud has no positions
+        data.attributes["position"].data.foreach_set("vector", singularity_data.points.ravel())
     for key, values in (
         (INDEX_ATTRIBUTE, singularity_data.index),
         (DEGREE_ATTRIBUTE, np.full(len(singularity_data), singularity_data.degree)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..errors import counted
-from ..scene.bake_records import BakeInfo, list_bakes
+from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.scene_reader import field_objects
@@ -130,8 +130,9 @@ def _draw_picture_section(
     row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
     if not objects:
         layout.label(text="Needs a field to draw", icon="INFO")
-    if bake_infos:
+    if has_pictures(context.scene):
         layout.operator("rosy.remove", icon="TRASH")
+    if bake_infos:
         _draw_view_hints(layout, context, bake_infos)
     if objects:
         _draw_view_transform_warning(layout, context.scene)

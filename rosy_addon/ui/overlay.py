@@ -17,6 +17,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..errors import RosyError
 from ..scene.singularity_points import Singularities, read_singularities
 from ..viewport.view3d import redraw
 
@@ -84,10 +85,18 @@ def hide(object_name: str | None = None) -> None:
 
 
 def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> None:
-    """Read the singularities again of objects that show them and whose fields have changed."""
-    for obj in context.view_layer.objects:
-        if obj.data in meshes and is_shown(obj.name):
-            show(obj.name, read_singularities(obj, context.evaluated_depsgraph_get()))
+    """Read the singularities again of objects that show them and whose fields have changed.
+
+    They are hidden if they cannot be read, for example because a modifier loses the field.
+    """
+    for name in list(_OVERLAY.singularities):
+        obj = context.view_layer.objects.get(name)
+        if obj is None or obj.data not in meshes:
+            continue
+        try:
+            show(name, read_singularities(obj, context.evaluated_depsgraph_get()))
+        except RosyError:
+            hide(name)
 
 
 def _clear_on_load(*_: Any) -> None:

@@ -12,6 +12,7 @@ import traceback
 from contextlib import nullcontext
 from pathlib import Path
 from random import Random
+from typing import NamedTuple
 
 import bpy
 
@@ -23,10 +24,20 @@ from monkey_actions import ACTIONS, Action, CheckError, Monkey, forget_files, re
 PARTS = 8
 
 #: Megabytes by which the resident memory may grow in the second half of a run, and per step.
-MAX_GROWTH, MAX_GROWTH_PER_STEP = 40.0, 0.02
+MAX_GROWTH, MAX_GROWTH_PER_STEP = 400.0, 0.02
+
+#: Number of objects of one of RoSy's classes that may be added in the second half: new settings.
+MAX_OBJECTS_GROWTH = 20
 
 #: Seconds after which the Python stack of a step is printed.
 STEP_SECONDS = 120.0
+
+
+class Memory(NamedTuple):
+    """Memory while the file is empty: resident megabytes, and numbers of objects by class."""
+
+    megabytes: float
+    objects: dict[str, int]
 
 
 def main() -> None:
@@ -81,9 +92,11 @@ def run(options: argparse.Namespace):
         for step in range(options.steps):
             monkey.random = Random(f"{options.seed} {step}")
             (chosen,) = monkey.random.choices(actions, weights)
-            say(f"monkey step {step}: {chosen.name}")
+            say(f"monkey step {step}: {chosen.name} ({state.resident_megabytes():.0f} MB)")
             faulthandler.dump_traceback_later(STEP_SECONDS)
             yield from in_context(monkey, chosen)
+            if chosen.name != "undo":
+                bpy.ops.ed.undo_push(message=chosen.name)
             if window:
                 yield 0.01
             faulthandler.cancel_dump_traceback_later()
@@ -91,7 +104,6 @@ def run(options: argparse.Namespace):
                 say(f"monkey step {step}: the end of a part")
                 yield from restart(monkey)
                 measured.append(check_memory(monkey, counts))
-                say(f"  {measured[-1]}")
         growth = check_growth(measured, options.steps)
     except CheckError as failure:
         say(f"monkey failed: {failure}")
@@ -105,9 +117,11 @@ def run(options: argparse.Namespace):
         "steps": options.steps,
         "seconds": round(seconds),
         "steps per second": round(options.steps / seconds, 1),
-        "MB at the end": round(measured[-1]["MB"]),
+        "MB at the end": round(measured[-1].megabytes),
         "MB grown in the second half": round(growth, 1),
     }
+    for (operator, outcome), count in sorted(monkey.outcomes.items()):
+        say(f"  rosy.{operator} {outcome} {count} times")
     say(f"monkey done: {json.dumps(summary)}")
 
 
@@ -159,31 +173,33 @@ def open_panel() -> None:
             region.active_panel_category = "RoSy"
 
 
-def check_memory(monkey: Monkey, counts: dict[str, int]) -> dict:
+def check_memory(monkey: Monkey, counts: dict[str, int]) -> Memory:
     """Check that an empty file holds nothing, nor does Python, and measure the memory."""
     if monkey.uses_rosy:
         state.rosy("rosy_addon.cache").BAKE_CACHE.clear()
         state.rosy("rosy_addon.scene.staleness").MESH_STATES.clear()
     if (found := state.data_counts()) != counts:
         raise CheckError(f"an empty file holds {found}, it held {counts}")
-    alive = state.python_objects()
-    return {
-        "MB": round(state.resident_megabytes(), 1),
-        "alive": sum(alive.values()),
-        "by class": alive,
-    }
+    state.return_free_memory()
+    return Memory(state.resident_megabytes(), state.python_objects())
 
 
-def check_growth(measured: list[dict], steps: int) -> float:
+def check_growth(measured: list[Memory], steps: int) -> float:
     """Check that neither memory nor objects grow in the second half. Return the megabytes."""
     if len(measured) < PARTS:
         return 0.0
     half, end = measured[len(measured) // 2 - 1], measured[-1]
-    growth = end["MB"] - half["MB"]
+    growth = end.megabytes - half.megabytes
     if growth > MAX_GROWTH + MAX_GROWTH_PER_STEP * steps:
-        raise CheckError(f"the memory grew by {growth:.0f} MB in the second half: {measured}")
-    if end["alive"] > half["alive"] + 50:
-        raise CheckError(f"{half['by class']} became {end['by class']}")
+        sizes = [round(memory.megabytes) for memory in measured]
+        raise CheckError(f"the memory grew by {growth:.0f} MB in the second half: {sizes}")
+    grown = {
+        name: (half.objects.get(name, 0), count)
+        for name, count in end.objects.items()
+        if count > half.objects.get(name, 0) + MAX_OBJECTS_GROWTH
+    }
+    if grown:
+        raise CheckError(f"the numbers of objects grew in the second half: {grown}")
     return growth
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from fnmatch import fnmatchcase
 from glob import escape
 from typing import Any
@@ -18,8 +20,17 @@ EXTENSION = "bl_ext.user_default.rosy"
 #: Custom property of RoSy's datablocks.
 OWNED_TAG = "rosy_made"
 
-#: Datablocks of Blender's interface, and others that no operator of RoSy's can reach.
-IGNORED_COLLECTIONS = {"window_managers", "screens", "workspaces", "brushes", "fonts", "palettes"}
+#: Datablocks of Blender's interface and brushes, and others that no operator of RoSy's can reach.
+IGNORED_COLLECTIONS = {
+    "all_ids",
+    "window_managers",
+    "screens",
+    "workspaces",
+    "brushes",
+    "fonts",
+    "palettes",
+    "libraries",
+}
 
 #: Values of attributes by data type: the property, the number of values, and their type.
 ATTRIBUTE_VALUES = {
@@ -84,7 +95,9 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
         view_layer.name,
         bpy.context.mode,
         view_layer.objects.active and view_layer.objects.active.name,
-        sorted(obj.name for obj in view_layer.objects if obj.select_get() and not is_owned(obj)),
+        sorted(
+            obj.name for obj in view_layer.objects if obj and obj.select_get() and not is_owned(obj)
+        ),
     )
     return state
 
@@ -254,9 +267,9 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_store": _FIELD,
     "field_import": _FIELD,
     "field_export": (),
-    "singularities": ("owned/objects/*", "owned/meshes/*", "owned/pointclouds/*"),
+    "singularities": ("owned/objects/*", "meshes/* singularities*", "pointclouds/* singularities*"),
     "occlusion": (
-        "meshes/*/attributes/rosy_occlusion",
+        "meshes/*/attributes/Occlusion",
         "scenes/SCENE/rosy/tone_attribute",
         "scenes/SCENE/rosy/look/tone",
     ),
@@ -312,8 +325,14 @@ def allowed_changes(operator: str, attribute: str | None = None) -> list[str]:
 
 def leftovers() -> list[str]:
     """Return what RoSy has left behind, after everything that it made was removed."""
-    left = [f"{kind}: '{block.name}'" for kind, block in all_datablocks() if is_owned(block)]
+    left = [
+        f"{kind}: '{block.name}'"
+        for kind, block in all_datablocks()
+        if is_owned(block) and not block.use_fake_user and block.library is None
+    ]
     for obj in bpy.data.objects:
+        if obj.library is not None or obj.override_library is not None:
+            continue
         left += [
             f"modifier '{modifier.name}' of '{obj.name}'"
             for modifier in obj.modifiers
@@ -352,13 +371,20 @@ def resident_megabytes() -> float:
     return int(line.split()[1]) / 1024
 
 
+def return_free_memory() -> None:
+    """Return freed memory to the system, where the C library can, so that it is not measured."""
+    gc.collect()
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
+
+
 def python_objects() -> dict[str, int]:
     """Return the number of objects of RoSy's classes that are alive, and of arrays, by class."""
     gc.collect()
     counts: dict[str, int] = {}
     for obj in gc.get_objects():
         cls = type(obj)
-        if cls.__module__.startswith(EXTENSION):
+        if str(cls.__module__).startswith(EXTENSION):
             counts[cls.__qualname__] = counts.get(cls.__qualname__, 0) + 1
     return counts
 

@@ -14,10 +14,10 @@ from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars
-from ..rosy_addon.scene.field_attributes import attribute_name, has_field
+from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
-from ..rosy_addon.scene.write_field import STORAGE_FORMS, write_mesh_field
+from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
 
@@ -135,9 +135,7 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
-            for mesh, field in fields.items():
-                default_name = "rosy_angle" if self.form == "ANGLE" else attribute_name(mesh)
-                write_mesh_field(mesh, field, self.attribute or default_name, self.form)
+            assign_fields(fields, self.attribute, self.form)
         except REPORTED_ERRORS as error:
             self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}

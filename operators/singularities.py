@@ -38,28 +38,36 @@ class ROSY_OT_singularities(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = [obj for obj in selected_mesh_objects(context) if has_field(obj)]
+        if self.show == "NONE":
+            _hide(context, objects)
+            return {"FINISHED"}
         depsgraph = context.evaluated_depsgraph_get()
         try:
             singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
         except REPORTED_ERRORS as error:
             self.report({"ERROR"}, error_text(error))
             return {"CANCELLED"}
+        _hide(context, objects)
         for obj, singularities in singularities_by_object.items():
-            overlay.hide(obj.name)
-            remove_singularity_points(context.scene, obj)
             if self.show in ("OVERLAY", "BOTH"):
                 overlay.show(obj.name, singularities)
             if self.show in ("POINTS", "BOTH"):
                 add_singularity_points(context.scene, obj, singularities)
-        if self.show != "NONE":
-            count = sum(map(len, singularities_by_object.values()))
-            total = "; ".join(
-                f"'{obj.name}': sum of the indices "
-                f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
-                for obj, singularities in singularities_by_object.items()
-            )
-            self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
+        count = sum(map(len, singularities_by_object.values()))
+        total = "; ".join(
+            f"'{obj.name}': sum of the indices "
+            f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
+            for obj, singularities in singularities_by_object.items()
+        )
+        self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
         return {"FINISHED"}
+
+
+def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
+    """Remove the overlay and the points of objects."""
+    for obj in objects:
+        overlay.hide(obj.name)
+        remove_singularity_points(context.scene, obj)
 
 
 CLASSES = (ROSY_OT_singularities,)

@@ -110,7 +110,10 @@ def store_record(
 def _update_record(
     scene: bpy.types.Scene, name: str, image: bpy.types.Image, material: bpy.types.Material
 ) -> bpy.types.PropertyGroup:
-    """Return the record of a name with a new image and material. The older ones are deleted."""
+    """Return the record of a name with a new image and material.
+
+    The older ones are deleted, unless another scene shows them.
+    """
     record = scene.rosy.bakes.get(name)
     if record is None:
         record = scene.rosy.bakes.add()
@@ -118,11 +121,20 @@ def _update_record(
     old_datablocks = (record.material, record.image)
     record.image, record.material = image, material
     for old_datablock, new_datablock in zip(old_datablocks, (material, image), strict=True):
-        if old_datablock is not None:
+        if old_datablock is not None and not _is_recorded(old_datablock):
             old_datablock.user_remap(new_datablock)
             delete_owned(old_datablock)
             new_datablock.name = f"RoSy {name}"
     return record
+
+
+def _is_recorded(datablock: bpy.types.ID | None) -> bool:
+    """Whether a record of any scene has an image or material. Copies of a scene share them."""
+    return any(
+        datablock in (record.image, record.material)
+        for scene in bpy.data.scenes
+        for record in scene.rosy.bakes
+    )
 
 
 def list_bakes(scene: bpy.types.Scene) -> list[BakeInfo]:
@@ -165,13 +177,18 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
 
 
 def _baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects that show pictures, and are recorded or in the scene."""
-    recorded_names = {entry.name for record in scene.rosy.bakes for entry in record.objects}
-    return [
-        obj
-        for obj in bpy.data.objects
-        if (obj.name in recorded_names or obj.name in scene.objects) and removable_modifiers(obj)
-    ]
+    """Return the objects of a scene, and of the collections that it instances, with pictures."""
+    reached: dict[bpy.types.Object, None] = {}
+
+    def add_objects(collection: bpy.types.Collection) -> None:
+        for obj in collection.all_objects:
+            if obj not in reached:
+                reached[obj] = None
+                if obj.instance_collection is not None:
+                    add_objects(obj.instance_collection)
+
+    add_objects(scene.collection)
+    return [obj for obj in reached if removable_modifiers(obj)]
 
 
 def remove_bakes(
@@ -201,7 +218,7 @@ def remove_bakes(
         if objects is None or not records[index].objects:
             image, material = records[index].image, records[index].material
             records.remove(index)
-            materials += delete_owned(material)
-            images += delete_owned(image)
+            materials += 0 if _is_recorded(material) else delete_owned(material)
+            images += 0 if _is_recorded(image) else delete_owned(image)
     delete_unused()
     return RemovalCounts(len(targets), images, materials, node_groups)

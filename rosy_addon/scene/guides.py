@@ -155,9 +155,13 @@ def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:
 
 def _split_strokes(attributes, offsets) -> list[np.ndarray]:
     """Return the points of each curve, (n, 3), from the ``position`` attribute and the offsets."""
-    if "position" not in attributes or not len(offsets):
+    points = (
+        _read_coordinates(attributes["position"].data, "vector", 3)
+        if "position" in attributes
+        else ()
+    )
+    if not len(points):  # the offsets of an empty drawing cannot be read
         return []
-    points = _read_coordinates(attributes["position"].data, "vector", 3)
     start = np.empty(len(offsets), dtype=np.int32)
     offsets.foreach_get("value", start)
     return np.split(points, start[1:-1])

@@ -21,6 +21,9 @@ from .field_attributes import (
 )
 from .meshes import mesh_surface
 
+#: Name of the attribute of a field that is stored as angles.
+DEFAULT_ANGLE_NAME = "rosy_angle"
+
 #: Forms in which a field can be stored: label and description in the user interface.
 STORAGE_FORMS = {
     "VECTOR": ("One Vector", "One direction on each face, from which the others follow"),
@@ -29,39 +32,39 @@ STORAGE_FORMS = {
 }
 
 
-def assign_fields(fields: dict[bpy.types.Mesh, RosyField], name: str | None = None) -> None:
-    """Store fields on meshes as vectors on faces, all or none of them.
+def assign_fields(
+    fields: dict[bpy.types.Mesh, RosyField], name: str | None = None, form: str = "VECTOR"
+) -> None:
+    """Store fields on meshes, all or none of them.
 
     Parameters
     ----------
     fields : dict of bpy.types.Mesh to RosyField
     name : str, optional
-        Name of the attribute. By default the existing field of each mesh is replaced.
+        Name of the attribute. By default the existing field of each mesh is replaced; for "ANGLE",
+        the name is `DEFAULT_ANGLE_NAME`.
+    form : {"VECTOR", "DIRECTIONS", "ANGLE"}
+        See `write_mesh_field`.
 
     Raises
     ------
     RosyError
         If a field cannot be stored on its mesh. Nothing is changed in this case.
     """
-    # Meshes that cannot accept a field come first, so that an error is raised before any change.
-    names = {mesh: name or _target_attribute(mesh) for mesh in fields}
-    for mesh in sorted(fields, key=lambda mesh: _accepts_field(mesh, names[mesh])):
-        write_mesh_field(mesh, fields[mesh], names[mesh])
+    names = {mesh: name or _default_name(mesh, form) for mesh in fields}
+    for mesh, field in fields.items():
+        _check_storable(mesh, field, names[mesh], form)
+    for mesh, field in fields.items():
+        write_mesh_field(mesh, field, names[mesh], form)
 
 
-def _target_attribute(mesh: bpy.types.Mesh) -> str:
-    """Return the attribute of a mesh's field, or a default if that has another form."""
+def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
+    """Return the name of the attribute of a mesh's field in a form."""
+    if form == "ANGLE":
+        return DEFAULT_ANGLE_NAME
     name = attribute_name(mesh)
-    return (
-        name
-        if name not in mesh.attributes or is_face_vector_field(mesh, name)
-        else DEFAULT_FIELD_NAME
-    )
-
-
-def _accepts_field(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether a field can be stored on a mesh under a name as vectors on faces."""
-    return is_editable(mesh) and (name not in mesh.attributes or is_face_vector_field(mesh, name))
+    is_other_form = form == "VECTOR" and name in mesh.attributes
+    return DEFAULT_FIELD_NAME if is_other_form and not is_face_vector_field(mesh, name) else name
 
 
 def write_mesh_field(
@@ -98,17 +101,7 @@ def write_mesh_field(
     read_mesh_field : The inverse.
     """
     name = name or DEFAULT_FIELD_NAME
-    _check_writable(mesh)
-    face_count = len(mesh.polygons)
-    if len(field.vectors) != face_count:
-        raise RosyError(
-            f"mesh '{mesh.name}' has {counted(face_count, 'face')}, but the field has {len(field.vectors)}"
-        )
-    if form == "ANGLE" and field.direction_ratios is not None:
-        raise RosyError(
-            f"mesh '{mesh.name}': the directions of its field are not a RoSy, so one angle cannot "
-            "store them"
-        )
+    _check_storable(mesh, field, name, form)
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
@@ -128,6 +121,34 @@ def write_mesh_field(
     return attribute
 
 
+def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> None:
+    """Raise an error if `write_mesh_field` cannot store a field. Nothing is changed."""
+    _check_writable(mesh)
+    face_count = len(mesh.polygons)
+    if len(field.vectors) != face_count:
+        raise RosyError(
+            f"mesh '{mesh.name}' has {counted(face_count, 'face')}, but the field has {len(field.vectors)}"
+        )
+    has_free_directions = field.direction_ratios is not None
+    if form == "ANGLE" and has_free_directions:
+        raise RosyError(
+            f"mesh '{mesh.name}': the directions of its field are not a RoSy, so one angle cannot "
+            "store them"
+        )
+    if has_free_directions and name in mesh.attributes:
+        _check_attribute_type(mesh, name, VECTOR_TYPE)
+    names = [name]
+    if form == "DIRECTIONS" or has_free_directions:
+        names = [f"dir{index}" for index in range(field.degree)]
+    for new_name in names:
+        is_new = new_name not in mesh.attributes
+        attribute = _get_or_create_attribute(
+            mesh, new_name, ANGLE_TYPE if form == "ANGLE" else VECTOR_TYPE
+        )
+        if is_new:
+            mesh.attributes.remove(attribute)
+
+
 def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.types.Attribute:
     """Store all directions of a field as ``dir0`` ... ``dir{N-1}``; remove ``dirN`` and so on."""
     directions = (
@@ -136,11 +157,8 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
         else field.source_directions
     )
     names = [f"dir{index}" for index in range(field.degree)]
-    for direction_name in names:
-        _check_attribute_type(mesh, direction_name, VECTOR_TYPE)
     vector_attribute = mesh.attributes.get(name)
     if field.direction_ratios is not None and vector_attribute is not None:
-        _check_attribute_type(mesh, name, VECTOR_TYPE)
         mesh.attributes.remove(vector_attribute)
     extra_index = field.degree
     while f"dir{extra_index}" in mesh.attributes:

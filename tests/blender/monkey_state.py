@@ -161,8 +161,8 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
         return
     state[f"{path}/basis"] = (
         obj.data and obj.data.name,
-        obj.parent and obj.parent.name,
-        _plain(obj.matrix_basis),
+        obj.parent and not is_owned(obj.parent) and obj.parent.name,
+        None if obj.animation_data else _plain(obj.matrix_basis),
         _plain(obj.matrix_parent_inverse),
         obj.hide_render,
         obj.hide_viewport,
@@ -171,7 +171,7 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
     )
     state[f"{path}/collections"] = sorted(collection.name for collection in obj.users_collection)
     state[f"{path}/slots"] = [
-        (slot.link, slot.material and slot.material.name) for slot in obj.material_slots
+        (slot.link, _material_name(slot.material)) for slot in obj.material_slots
     ]
     state[f"{path}/groups"] = [group.name for group in obj.vertex_groups]
     modifiers = []
@@ -186,10 +186,16 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
         _add_values(state, f"{path}/rosy", obj.rosy)
 
 
+def _material_name(material: bpy.types.Material | None) -> str | None:
+    """Return the name of a user's material. RoSy's come to meshes if its modifier is applied."""
+    return None if material is None or is_owned(material) else material.name
+
+
 def _add_mesh(state: Fingerprint, mesh: bpy.types.Mesh) -> None:
     path = f"meshes/{_full_name(mesh)}"
-    state[f"{path}/counts"] = (len(mesh.vertices), len(mesh.edges), len(mesh.polygons))
-    state[f"{path}/materials"] = [material and material.name for material in mesh.materials]
+    if not mesh.is_editmode:  # of the last time that edit mode was left, or the mesh evaluated
+        state[f"{path}/counts"] = (len(mesh.vertices), len(mesh.edges), len(mesh.polygons))
+    state[f"{path}/materials"] = [_material_name(material) for material in mesh.materials]
     keys = mesh.shape_keys
     state[f"{path}/keys"] = keys and [(block.name, block.value) for block in keys.key_blocks]
     if hasattr(mesh, "rosy"):
@@ -328,7 +334,7 @@ def leftovers() -> list[str]:
     left = [
         f"{kind}: '{block.name}'"
         for kind, block in all_datablocks()
-        if is_owned(block) and not block.use_fake_user and block.library is None
+        if is_owned(block) and block.library is None and not _is_used(block)
     ]
     for obj in bpy.data.objects:
         if obj.library is not None or obj.override_library is not None:
@@ -342,9 +348,18 @@ def leftovers() -> list[str]:
         left += [
             f"attribute '{attribute.name}' of '{mesh.name}'"
             for attribute in mesh.attributes
-            if attribute.name.startswith(("rosy_stand_in", "rosy_face_normal", "rosy_projection"))
+            if attribute.name.startswith(("rosy_stand_in", "rosy_face_normal"))
         ]
     return left
+
+
+def _is_used(block: bpy.types.ID) -> bool:
+    """Whether the user needs a datablock of RoSy's, as for strokes that the user has copied."""
+    users = bpy.data.user_map(subset=[block])[block]
+    stroke_data = ("grease_pencil", "GreasePencil", "GreasePencilv3", "Curves")
+    return block.use_fake_user or any(
+        not is_owned(user) or type(user).__name__ in stroke_data for user in users
+    )
 
 
 def handlers() -> list[str]:
@@ -371,11 +386,17 @@ def resident_megabytes() -> float:
     return int(line.split()[1]) / 1024
 
 
-def return_free_memory() -> None:
-    """Return freed memory to the system, where the C library can, so that it is not measured."""
+def release_free_memory() -> None:
+    """Return freed memory to the system, as far as the allocator of this Blender can."""
     gc.collect()
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL("libc.so.6").malloc_trim(0)
+    process = ctypes.CDLL(None)
+    for release in (
+        lambda: process.malloc_trim(0),  # the GNU C library
+        lambda: process.scalable_allocation_command(0, None),  # TBB: TBBMALLOC_CLEAN_ALL_BUFFERS
+        lambda: process.mallctl(b"arena.4096.purge", None, None, None, 0),  # jemalloc: all arenas
+    ):
+        with suppress(AttributeError):
+            release()
 
 
 def python_objects() -> dict[str, int]:

@@ -382,7 +382,7 @@ def rename_of_rosys(monkey):
     owned = [block for c in (bpy.data.images, bpy.data.materials, bpy.data.node_groups,
              bpy.data.objects) for block in c if is_owned(block)]  # fmt: skip
     block = monkey.pick(owned)
-    if block is not None:
+    if block is not None and block.library is None:
         block.name = monkey.name()
 
 
@@ -1050,8 +1050,8 @@ def prepare(monkey, probability=0.5):
     if monkey.chance(0.5):
         scene.rosy.directory = str(monkey.folder / "pictures")
     angle = monkey.random.uniform(0, 2 * math.pi)
-    camera_object = bpy.data.objects.get("Eye")
-    if camera_object is None or camera_object.type != "CAMERA" or camera_object.data is None:
+    camera_object = next((o for o in bpy.data.objects if o.name == "Eye" and not o.library), None)
+    if camera_object is None or camera_object.type != "CAMERA" or camera_object.library is not None:
         camera_object = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
     if camera_object.name not in scene.objects:
         scene.collection.objects.link(camera_object)
@@ -1136,6 +1136,8 @@ def strokes(monkey):
     randomize(monkey, settings, style, 0.2)
     if settings.unit == "world" or settings.spacing < 3:  # any number of strokes
         settings.unit, settings.spacing = "pixels", monkey.pick([4.0, 9.0, 1e4])
+    if settings.spacing < 9:  # the crossings of many strokes in a large face take minutes
+        settings.gaps = 0.0
     settings.selected = monkey.chance(0.2)
     settings.plotter, settings.paper = monkey.chance(0.3), monkey.chance(0.5)
     kind = monkey.pick(["PENCIL", "CURVES", "SVG"])

@@ -102,12 +102,15 @@ def run(options: argparse.Namespace):
             (chosen,) = monkey.random.choices(actions, weights)
             say(f"monkey step {step}: {chosen.name} ({state.resident_megabytes():.0f} MB)")
             faulthandler.dump_traceback_later(STEP_SECONDS)
+            step_start = time.monotonic()
             yield from in_context(monkey, chosen)
             if chosen.name != "undo":
                 push_undo(chosen.name)
             if window:
                 yield 0.01
             faulthandler.cancel_dump_traceback_later()
+            if (seconds := time.monotonic() - step_start) > 3:
+                say(f"  took {seconds:.0f} s")
             if (step + 1) % part_steps == 0:
                 say(f"monkey step {step}: the end of a part")
                 yield from restart(monkey)

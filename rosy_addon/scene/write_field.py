@@ -187,10 +187,12 @@ def _get_or_create_attribute(
     _check_attribute_type(mesh, name, data_type)
     attribute = mesh.attributes.get(name)
     if attribute is None:
+        old_names = set(mesh.attributes.keys())
         attribute = mesh.attributes.new(name, data_type, "FACE")
         if attribute is None or attribute.name != name:
-            if attribute is not None:
-                mesh.attributes.remove(attribute)
+            # Blender may have made one of another name, and not say so.
+            for new_name in set(mesh.attributes.keys()) - old_names:
+                mesh.attributes.remove(mesh.attributes[new_name])
             raise RosyError(
                 f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose another one"
             )

@@ -107,7 +107,7 @@ def run_seed(options: argparse.Namespace, seed: int, folder: Path) -> bool:
     work = folder / f"seed-{seed}"
     shutil.copytree(folder / "user", work / "user")
     headless = [] if options.window or options.real_blender else ["-b"]
-    window = ["--window-geometry", "0", "0", "900", "640", "--enable-event-simulate"]
+    window = ["--window-geometry", "0", "0", "640", "480", "--enable-event-simulate"]
     command = [
         *blender_command(options, options.window), *headless, *(window if options.window else []),
         "--python-exit-code", "1", "-P", str(HERE / "monkey_loop.py"), "--",

@@ -398,10 +398,7 @@ def edit_of_rosys(monkey):
     elif what == "group node" and group and group.nodes:
         group.nodes.remove(monkey.pick(group.nodes))
     elif what == "image" and image:
-        if monkey.chance(0.5):
-            image.scale(7, 5)
-        else:
-            image.reload()
+        image.reload()
     elif what == "fake user" and image:
         image.use_fake_user = True
     elif what == "tag" and material:
@@ -789,8 +786,8 @@ def save_and_reopen(monkey):
         raise CheckError("the saved file differs: " + "; ".join(differences[:8]))
 
 
-#: Paths that Blender itself does not save.
-UNSAVED = ("*/tool_settings/*",)
+#: Paths that Blender itself does not save, or reads again from libraries.
+UNSAVED = ("*/tool_settings/*", "*@*.blend*")
 
 
 @action(1)

@@ -9,7 +9,7 @@ import os
 import sys
 import time
 import traceback
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from random import Random
 from typing import NamedTuple
@@ -170,18 +170,21 @@ def restart(monkey: Monkey):
     if monkey.uses_rosy and (left := state.handlers()):
         raise CheckError("handlers are left: " + "; ".join(left))
     if monkey.window:
-        open_panel()
-        yield 0.3
+        yield from open_panel()
 
 
-def open_panel() -> None:
-    """Show RoSy's tab of the sidebar."""
+def open_panel():
+    """Show RoSy's tab of the sidebar. Its name can be set once the sidebar was drawn."""
     window = bpy.context.window_manager.windows[0]
     area = next(area for area in window.screen.areas if area.type == "VIEW_3D")
     area.spaces.active.show_region_ui = True
-    for region in area.regions:
-        if region.type == "UI":
-            region.active_panel_category = "RoSy"
+    for _ in range(100):
+        area.tag_redraw()
+        yield 0.05
+        sidebar = next(region for region in area.regions if region.type == "UI")
+        with suppress(AttributeError):
+            sidebar.active_panel_category = "RoSy"
+            return
 
 
 def check_memory(monkey: Monkey, counts: dict[str, int]) -> Memory:

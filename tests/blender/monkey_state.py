@@ -119,6 +119,8 @@ def _pixels(datablock: bpy.types.ID) -> Any:
     """Return a digest of the pixels of an image."""
     if not isinstance(datablock, bpy.types.Image) or datablock.source != "FILE":
         return None
+    if datablock.is_dirty:  # changed by the user, and not saved with the file
+        return None
     values = np.empty(len(datablock.pixels), dtype=np.float32)
     datablock.pixels.foreach_get(values)
     return tuple(datablock.size), _digest(values)

@@ -10,6 +10,7 @@
 #   make test-long further cases of some tests, which take minutes
 #   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
 #   make fuzz-readers  the readers of all file formats, guided by coverage
+#   make monkey    random actions in a full Blender: make monkey BLENDER=/path/to/blender
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make gallery   the pictures of docs/gallery
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
@@ -30,7 +31,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz fuzz-readers zip gallery bench clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz fuzz-readers zip monkey gallery bench \
+        clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -84,6 +86,17 @@ fuzz-reader-%: .venv-fuzz/ready
 
 zip: .venv-bpy42/ready
 	$(BPY42) tools/build_zip.py dist
+
+# Seeds MONKEY_SEED, MONKEY_SEED + 1 and so on; MONKEY_OPTIONS=--window for a window.
+MONKEY_SEED    ?= 1
+MONKEY_SEEDS   ?= 1
+MONKEY_STEPS   ?= 400
+MONKEY_OPTIONS ?=
+BLENDER        ?= blender
+
+monkey: zip
+	.venv-bpy42/bin/python tests/blender/monkey.py dist/*.zip --blender "$(BLENDER)" \
+	    --seed $(MONKEY_SEED) --seeds $(MONKEY_SEEDS) --steps $(MONKEY_STEPS) $(MONKEY_OPTIONS)
 
 gallery: .venv-gallery/ready
 	.venv-gallery/bin/python -m tools.gallery

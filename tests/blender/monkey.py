@@ -3,7 +3,8 @@
 
     tests/blender/monkey.py ROSY.zip --blender /path/to/blender [--seed N] [--seeds COUNT]
                             [--steps COUNT] [--window] [--blender-only]
-    tests/blender/monkey.py ROSY.zip --real-blender stable|latest ...
+
+With `--which stable|latest`, the path is that of a `real-blender` script.
 
 Each seed runs in a Blender of its own, with empty preferences and the zip installed. The actions
 are the table of monkey_actions.py; what is checked after each of them is in monkey_state.py and
@@ -55,9 +56,9 @@ def main() -> int:
     try:
         zipped = folder / "rosy.zip"
         shutil.copy(options.zip, zipped)
-        install = ("-b", "--command", "extension", "install-file", "-r", "user_default", "--enable")
+        install = ("--command", "extension", "install-file", "-r", "user_default", "--enable")
         subprocess.run(
-            [*blender_command(options, False), *install[options.real_blender is not None :], str(zipped)],
+            [*blender_command(options, False), *install, str(zipped)],
             env=environment(folder / "user"), cwd=REPOSITORY, check=True, stdout=subprocess.DEVNULL,
         )  # fmt: skip
         failures = sum(not run_seed(options, seed, folder) for seed in options.seed_range)
@@ -72,7 +73,7 @@ def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("zip", type=Path)
     parser.add_argument("--blender", default=os.environ.get("BLENDER"), help="path of Blender")
-    parser.add_argument("--real-blender", choices=("stable", "latest"))
+    parser.add_argument("--which", choices=("stable", "latest"), help="for a real-blender script")
     parser.add_argument("--seed", type=int, default=1, help="the first seed, by default 1")
     parser.add_argument("--seeds", type=int, default=1, help="number of seeds, by default 1")
     parser.add_argument("--steps", type=int, default=400, help="steps of each seed")
@@ -80,8 +81,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--blender-only", action="store_true", help="leave out RoSy's actions")
     parser.add_argument("--log", type=Path, help="folder for the whole output of each seed")
     options = parser.parse_args()
-    if (options.blender is None) == (options.real_blender is None):
-        parser.error("give either the path of Blender (--blender or BLENDER) or --real-blender")
+    if not options.blender:
+        parser.error("give the path of Blender: --blender, or the variable BLENDER")
     if not options.zip.is_file():
         parser.error(f"{options.zip} is not a file: build it first")
     options.seed_range = range(options.seed, options.seed + options.seeds)
@@ -90,11 +91,10 @@ def parse_arguments() -> argparse.Namespace:
 
 def blender_command(options: argparse.Namespace, window: bool) -> list[str]:
     """Return the command that starts Blender, to which its arguments are appended."""
-    if options.real_blender is None:
-        return [options.blender]
-    script = str(REPOSITORY.parent / "shared/tools/real-blender")
-    verb = ["gui", options.real_blender, "-s", "86400"] if window else ["run", options.real_blender]
-    return [script, *verb]
+    if options.which is None:
+        return [options.blender, *([] if window else ["-b"])]
+    verb = ["gui", options.which, "-s", "86400"] if window else ["run", options.which]
+    return [options.blender, *verb]
 
 
 def environment(user_folder: Path) -> dict[str, str]:
@@ -106,10 +106,9 @@ def run_seed(options: argparse.Namespace, seed: int, folder: Path) -> bool:
     """Run one seed, and print how it ended. Return whether it passed."""
     work = folder / f"seed-{seed}"
     shutil.copytree(folder / "user", work / "user")
-    headless = [] if options.window or options.real_blender else ["-b"]
     window = ["--window-geometry", "0", "0", "640", "480", "--enable-event-simulate"]
     command = [
-        *blender_command(options, options.window), *headless, *(window if options.window else []),
+        *blender_command(options, options.window), *(window if options.window else []),
         "--python-exit-code", "1", "-P", str(HERE / "monkey_loop.py"), "--",
         "--seed", str(seed), "--steps", str(options.steps), "--folder", str(work),
         *(["--blender-only"] if options.blender_only else []),

@@ -122,6 +122,12 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             *options.pytest, str(HERE),
         )  # fmt: skip
         add_junit(counts, results)
+        monkey = [
+            sys.executable, str(HERE / "monkey.py"), str(zipped), "--steps", "150",
+            "--blender", str(options.real_blender.resolve()), "--which", options.which,
+        ]  # fmt: skip
+        status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode
+        counts["failed" if status else "passed"] += 1
     windows = [WINDOWS[name] for name in options.windows.split(",") if name != "none"]
     if windows:
         shots = folder / "shots"

@@ -370,6 +370,22 @@ def test_singularities_as_points(scene):
     )
 
 
+def test_singularities_of_fields_without_any_or_lost(scene):
+    bpy.ops.mesh.primitive_plane_add()
+    plane = bpy.context.object
+    bpy.ops.rosy.field_generate(kind="axis", axis=(1, 0, 0))
+    assert bpy.ops.rosy.singularities(show="BOTH") == {"FINISHED"}
+    modifier = plane.modifiers.new("Remesh", "REMESH")
+    modifier.mode, modifier.octree_depth = "BLOCKS", 2
+    # What is shown can be made again and hidden, although the field cannot be read.
+    assert "has no" in error_of(bpy.ops.rosy.singularities, show="BOTH")
+    assert bpy.ops.rosy.field_generate(kind="axis", axis=(1, 0, 0)) == {"FINISHED"}
+    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
+    assert not overlay.is_shown("Plane")
+    assert bpy.ops.rosy.singularities(show="NONE") == {"FINISHED"}
+    assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == []
+
+
 def test_opening_a_file_hides_singularities(scene):
     overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
     handlers = len(bpy.app.handlers.load_pre)

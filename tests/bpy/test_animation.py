@@ -76,6 +76,26 @@ def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
 
 
+def test_the_frame_and_the_camera_are_restored(moving, tmp_path):
+    marker = moving.timeline_markers.new("Other", frame=4)
+    marker.camera = add_camera("Other")
+    moving.frame_set(-5, subframe=0.5)
+    moving.camera = None
+    before = moving.frame_current, moving.frame_subframe
+    bake_animation(moving, [5], settings=OutputSettings(folder=tmp_path))
+    assert (moving.frame_current, moving.frame_subframe) == before
+    assert moving.camera is None
+
+
+def test_a_folder_that_cannot_be_created_is_named(moving, tmp_path, monkeypatch):
+    def fails(*_, **__):
+        raise FileNotFoundError(2, "No such file or directory")
+
+    monkeypatch.setattr(Path, "mkdir", fails)
+    with pytest.raises(RosyError, match="none: cannot be created: no such file"):
+        bake_animation(moving, [5], settings=OutputSettings(folder=tmp_path / "none"))
+
+
 def test_frames_that_are_up_to_date_are_skipped(moving, tmp_path):
     settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)

@@ -12,7 +12,7 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene import staleness
-from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
+from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.look_properties import apply_look, read_look
 from rosy.rosy_addon.scene.pictures import show_bake
@@ -117,6 +117,35 @@ def test_remove_leaves_no_trace(scene, camera, monkey):
     assert (removed.objects, removed.images, removed.materials, removed.node_groups) == (2, 2, 2, 2)
     assert contents() == before
     assert remove_bakes(scene).objects == 0
+
+
+def test_remove_what_lost_its_record_or_users(scene, camera, monkey):
+    """The user deleted the image, the modifier or the record, or copied the object."""
+    before = contents()
+    (baked,) = bake(scene)
+    bpy.data.images.remove(baked.image)
+    assert not list_bakes(scene) and has_pictures(scene)
+    remove_bakes(scene)
+    assert contents() == before and not has_pictures(scene)
+    bake(scene)
+    scene.rosy.bakes.clear()
+    assert has_pictures(scene)
+    remove_bakes(scene)
+    assert contents() == before
+    bake(scene)
+    monkey.modifiers.clear()
+    remove_bakes(scene)
+    assert contents() == before
+
+
+def test_remove_from_a_copy_of_the_scene(scene, camera, monkey):
+    (baked,) = bake(scene)
+    bpy.ops.scene.new(type="FULL_COPY")
+    copy = bpy.context.scene
+    assert copy != scene and [info.image for info in list_bakes(copy)] == [baked.image]
+    remove_bakes(copy)
+    assert not has_pictures(copy)
+    assert [(info.image, info.is_shown) for info in list_bakes(scene)] == [(baked.image, True)]
 
 
 def test_remove_from_one_object(scene, camera, monkey):

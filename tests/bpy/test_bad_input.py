@@ -17,7 +17,7 @@ from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vector
 from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
-from rosy.rosy_addon.scene.write_field import write_mesh_field
+from rosy.rosy_addon.scene.write_field import assign_fields, write_mesh_field
 from scenes import (
     add_camera,
     add_field,
@@ -248,6 +248,30 @@ def test_guide_objects(scene, monkey):
     bpy.context.view_layer.update()
     with pytest.raises(RosyError, match="object 'Suzanne' has a scale of zero"):
         guide_strokes_and_empties([line], monkey)
+
+
+@pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
+def test_fields_are_stored_on_all_meshes_or_none(scene, monkey, form):
+    other = add_plane("Other")
+    name = {"VECTOR": "taken", "DIRECTIONS": "dir0", "ANGLE": "taken"}[form]
+    other.data.attributes.new(name, "BOOLEAN", "POINT")
+    fields = {
+        obj.data: generate(mesh_surface(obj.data), "axis", 4)
+        for obj in (add_plane(), monkey, other)
+    }
+    before = contents()
+    with pytest.raises(RosyError, match=f"mesh 'Other' already has an attribute '{name}'"):
+        assign_fields(fields, "taken", form)
+    with pytest.raises(RosyError, match=r"mesh 'Plane': 'x+' cannot be the name of an attribute"):
+        assign_fields({mesh: fields[mesh] for mesh in list(fields)[:1]}, "x" * 300)
+    assert contents() == before
+
+
+def test_errors_with_odd_names_are_one_line(scene, camera, monkey):
+    monkey.name = "line\nbreak\t\x1b[31m"
+    monkey.data.attributes.remove(monkey.data.attributes["rosy"])
+    monkey.data.attributes.new("rosy", "INT", "EDGE")
+    assert_refused(r"line\nbreak\t\x1b[31m")
 
 
 def test_bake_in_edit_mode(scene, camera, monkey):

@@ -55,7 +55,7 @@ TRIANGLE_BYTES, KEPT_TRIANGLE_BYTES = 145, 35
 #: Bytes of a visible sample while noise is made that is anchored to the surface: with lengths in
 #: pixels, and in Blender units. Bytes of a sample of the rectangle around the visible samples while
 #: noise is made that is anchored to the picture.
-SURFACE_NOISE_BYTES, WORLD_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 265, 34
+SURFACE_NOISE_BYTES, WORLD_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 225, 34
 
 #: Bytes of a visible sample with the methods "members" and "brute", and of each of its lines or
 #: directions there.

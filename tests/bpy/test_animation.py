@@ -87,15 +87,6 @@ def test_the_frame_and_the_camera_are_restored(moving, tmp_path):
     assert moving.camera is None
 
 
-def test_a_folder_that_cannot_be_created_is_named(moving, tmp_path, monkeypatch):
-    def fails(*_, **__):
-        raise FileNotFoundError(2, "No such file or directory")
-
-    monkeypatch.setattr(Path, "mkdir", fails)
-    with pytest.raises(RosyError, match="none: cannot be created: no such file"):
-        bake_animation(moving, [5], settings=OutputSettings(folder=tmp_path / "none"))
-
-
 def test_frames_that_are_up_to_date_are_skipped(moving, tmp_path):
     settings = OutputSettings(folder=tmp_path)
     bake_animation(moving, range(1, 5), settings=settings)

@@ -363,7 +363,7 @@ CATEGORIES = {
     "looks": Category(_look_case),
     "tones": Category(_tone_case),
     "paths": Category(_path_case, share=5),
-    "streams": Category(_stream_case, share=2),
+    "streams": Category(_stream_case, share=1),
     "kills": Category(_kill_case, share=1),
 }
 if importlib.util.find_spec("bpy") is not None:

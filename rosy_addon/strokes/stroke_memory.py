@@ -8,12 +8,15 @@ from ..field.directional_field import field_symmetry
 from ..memory import check_memory
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .visibility import pixel_size
+from .visibility import pixel_size, project_to_pixels
 
 #: Bytes of a square of the surface as wide as the spacing, for each family of lines: of strokes that
 #: are not clipped, and of those that are, which take more for each pixel of their length. Fitted to
 #: measurements.
 SQUARE_BYTES, CLIPPED_SQUARE_BYTES, CLIPPED_PIXEL_BYTES = 2200, 850, 350
+
+#: Pixels of the spacing from which on the points of strokes do not get denser: close to the camera.
+MAX_SPACING_PIXELS = 4096
 
 
 def check_stroke_memory(
@@ -65,7 +68,10 @@ def stroke_memory(
     triangle_spacing = spacing[triangle_vertex].mean(axis=1)
     squares = area / triangle_spacing**2
     if clipped:
-        pixels = triangle_spacing / pixel_size(a, camera)
+        centroid = (a + b + c) / 3
+        is_in_front = np.isfinite(project_to_pixels(centroid, camera)[0]).all(axis=1)
+        pixels = triangle_spacing / pixel_size(centroid, camera)
+        pixels = np.minimum(pixels, MAX_SPACING_PIXELS) * is_in_front
         needed = squares * (CLIPPED_SQUARE_BYTES + CLIPPED_PIXEL_BYTES * pixels)
     else:
         needed = squares * SQUARE_BYTES

@@ -13,8 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from PIL import Image
 
-from rosy_addon.cli.streams import UNSAFE
-from rosy_addon.errors import RosyError
+from rosy_addon.errors import UNSAFE, RosyError
 from rosy_addon.field.formats.text_rows import read_rows
 
 from .cases import Case

@@ -246,7 +246,7 @@ def test_lack_of_memory_is_one_line(monkeypatch, capsys, tmp_path):
     """If the system says so only when the memory is taken."""
     from rosy_addon.cli import parser, render
 
-    def fail(_):
+    def fail(*_):
         raise MemoryError
 
     monkeypatch.setattr(render, "check_output", fail)

@@ -18,15 +18,8 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 import monkey_state as state
-from monkey_actions import (
-    ACTIONS,
-    Action,
-    CheckError,
-    Monkey,
-    forget_files,
-    push_undo,
-    remove_everything,
-)
+from monkey_actions import ACTIONS, Action, CheckError, Monkey, push_undo
+from monkey_rosy import forget_files, remove_everything
 
 #: Number of parts of a run. After each, everything is removed and the memory is measured.
 PARTS = 8

@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("--blender-only", action="store_true")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
     faulthandler.enable()
+    os.chdir(options.folder)  # where files without a folder go
     preferences = bpy.context.preferences
     preferences.view.show_splash = False
     preferences.edit.undo_steps = 20

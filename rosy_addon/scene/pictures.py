@@ -160,9 +160,11 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     Raises
     ------
     RosyError
-        If the folder is relative to the .blend file, and this was never saved.
+        If there is none, or it is relative to the .blend file, and this was never saved.
     """
     directory = scene.rosy.directory
+    if not directory.strip():
+        raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
     if directory.startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
     return Path(bpy.path.abspath(directory))

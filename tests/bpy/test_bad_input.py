@@ -381,6 +381,8 @@ def test_unwritable_folder(scene, camera, monkey, tmp_path, as_float):
     blocked.write_text("in the way")
     scene.rosy.directory = str(blocked)
     assert_refused(str(blocked))
+    scene.rosy.directory = " "
+    assert_refused("scene 'Scene' has no folder for pictures")
     scene.rosy.directory = str(blocked / "below")
     assert_refused(str(blocked))
     scene.rosy.directory = "//pictures"

@@ -28,7 +28,7 @@ PARTS = 8
 MAX_GROWTH = 150.0
 
 #: Number of objects of one of RoSy's classes that may be added in the second half: new settings.
-MAX_OBJECTS_GROWTH = 20
+MAX_OBJECTS_GROWTH = 60
 
 #: Seconds after which the Python stack of a step is printed.
 STEP_SECONDS = 120.0

@@ -123,7 +123,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         )  # fmt: skip
         add_junit(counts, results)
         monkey = [
-            sys.executable, str(HERE / "monkey.py"), str(zipped), "--steps", "150",
+            sys.executable, str(HERE / "monkey.py"), str(zipped), "--steps", "400",
             "--blender", str(options.real_blender.resolve()), "--which", options.which,
         ]  # fmt: skip
         status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode

@@ -14,6 +14,7 @@ from conftest import ROOT
 from bench import cases
 from rosy_addon import memory
 from rosy_addon.cache import Cache
+from rosy_addon.compositor import image_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.field.field_io import load_field
@@ -120,7 +121,8 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 
 def traced_peak(work) -> int:
-    """Return the largest number of bytes that are allocated at once."""
+    """Return the largest number of bytes that are allocated at once, with no noise in the cache."""
+    image_noise._noise_tiles.cache_clear()
     tracemalloc.start()
     try:
         work()
@@ -162,6 +164,19 @@ def test_the_visible_pixels_are_counted():
 def test_the_estimate_grows_with_the_size():
     sizes = [picture_memory(ball_view(side, side), Coverage()) for side in (100, 1000, 10_000)]
     assert STATISTICS_BYTES < sizes[0] < sizes[1] < sizes[2] / 50
+
+
+def test_a_wide_high_pass_takes_no_more_than_a_narrow_one():
+    """Beyond a margin around the picture, the mean of the noise is known."""
+    pixel = np.arange(24 * 24, dtype=np.int32)
+
+    def noise(high_pass: float) -> np.ndarray:
+        return image_noise.image_noise(pixel, 24, 1.5, 0, 1, high_pass=high_pass)
+
+    widest_full_margin = image_noise.MAX_MARGIN / (3 * image_noise.BLUR_FACTOR)
+    peaks = [traced_peak(lambda x=x: noise(x)) for x in (1024.0, widest_full_margin)]
+    assert peaks[0] < 1.1 * peaks[1]
+    assert abs(noise(1024.0).mean() - image_noise.NOISE_MEAN) < 0.1
 
 
 # --- refusals -------------------------------------------------------------------------------------

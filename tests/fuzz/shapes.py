@@ -122,10 +122,10 @@ def _star(rng: Generator) -> Polygons:
 def _comb(rng: Generator) -> Polygons:
     """One concave polygon with long narrow teeth."""
     teeth = int(rng.choice([2, 20, 400]))
-    x = np.repeat(np.arange(2 * teeth), 1) * 1.0
-    y = np.where(np.arange(2 * teeth) % 2, 10.0, 0.1)
+    x = np.linspace(0, 2, 2 * teeth)
+    y = np.where(np.arange(2 * teeth) % 2, 1.0, 0.1)
     points = np.stack([x, y, 0 * x], axis=1)
-    points = np.concatenate([points, [[2.0 * teeth, -1, 0], [-1, -1, 0]]])
+    points = np.concatenate([points, [[2, -0.1, 0], [0, -0.1, 0]]])
     return points, [tuple(range(len(points)))[::-1]]
 
 

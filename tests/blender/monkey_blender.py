@@ -597,6 +597,9 @@ def link_or_append(monkey):
         if obj is not None and obj.name not in bpy.context.scene.objects:
             bpy.context.scene.collection.objects.link(obj)
             obj.select_set(monkey.chance(0.5))
+    for obj in bpy.data.objects:  # parents and targets, as Blender's own Append does
+        if obj.library is None and not obj.users_collection:
+            bpy.context.scene.collection.objects.link(obj)
 
 
 @action(1)

@@ -46,6 +46,9 @@ BAD_TEXTS = (
 #: Seconds without any output after which Blender counts as hanging.
 SILENCE_SECONDS = 150.0
 
+#: Number of lines of one step after which Blender counts as hanging, too.
+MAX_LINES_PER_STEP = 100_000
+
 #: Number of actions, and of other lines, that are printed after a failure.
 LAST_STEPS, LAST_LINES = 15, 60
 
@@ -142,6 +145,7 @@ class Log:
         self.lines: deque[str] = deque(maxlen=LAST_LINES)
         self.summary: str | None = None
         self.failure: str | None = None
+        self.line_count = 0
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
         self.file = None if path is None else path.open("w")
@@ -153,10 +157,14 @@ class Log:
         if line.startswith(STEP):
             self.steps.append(line)
             self.lines.clear()
+            self.line_count = 0
         else:
             self.lines.append(line)
+            self.line_count += 1
         if line.startswith(FAILED):
             self.failure = self.failure or line.removeprefix(FAILED)
+        elif self.line_count > MAX_LINES_PER_STEP:
+            self.failure = self.failure or "it prints without end"
         elif line.startswith(DONE):
             self.summary = line.removeprefix(DONE)
         elif any(text in line for text in BAD_TEXTS):
@@ -179,6 +187,9 @@ def watch(process: subprocess.Popen, log: Log) -> str | None:
             log.add(line)
             if log.failure is not None:
                 silence = 1.0  # the rest of the message
+            if log.line_count > MAX_LINES_PER_STEP:
+                stop(process)
+                return log.failure
     except queue.Empty:
         stop(process)
         return log.failure or f"no output for {silence:.0f} s"

@@ -87,7 +87,7 @@ def add_singularity_points(
     name = f"{obj.name} singularities"
     data = _new_point_cloud(name, len(singularity_data))
     point_object = bpy.data.objects.new(name, data)
-    point_object[OWNED_TAG] = obj.name
+    point_object[OWNED_TAG], data[OWNED_TAG] = obj.name, True
     if len(singularity_data):  # an empty point cloud has no positions
         data.attributes["position"].data.foreach_set("vector", singularity_data.points.ravel())
     for key, values in (

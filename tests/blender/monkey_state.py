@@ -275,7 +275,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_store": _FIELD,
     "field_import": _FIELD,
     "field_export": (),
-    "singularities": ("owned/objects/*", "meshes/* singularities*", "pointclouds/* singularities*"),
+    "singularities": ("owned/objects/*", "owned/meshes/*", "owned/pointclouds/*"),
     "occlusion": (
         "meshes/*/attributes/Occlusion",
         "scenes/SCENE/rosy/tone_attribute",

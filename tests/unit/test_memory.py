@@ -14,7 +14,7 @@ from conftest import ROOT
 from bench import cases
 from rosy_addon import memory
 from rosy_addon.cache import Cache
-from rosy_addon.compositor import image_noise
+from rosy_addon.compositor import image_noise, streak_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.field.field_io import load_field
@@ -121,8 +121,9 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 
 def traced_peak(work) -> int:
-    """Return the largest number of bytes that are allocated at once, with no noise in the cache."""
+    """Return the largest number of bytes that are allocated at once, as in a new process."""
     image_noise._noise_tiles.cache_clear()
+    streak_statistics.streak_statistics.cache_clear()
     tracemalloc.start()
     try:
         work()

@@ -132,6 +132,7 @@ def traced_peak(work) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("degree", "settings"),
     [
@@ -167,6 +168,7 @@ def test_the_estimate_grows_with_the_size():
     assert STATISTICS_BYTES < sizes[0] < sizes[1] < sizes[2] / 50
 
 
+@pytest.mark.slow
 def test_a_wide_high_pass_takes_no_more_than_a_narrow_one():
     """Beyond a margin around the picture, the mean of the noise is known."""
     pixel = np.arange(24 * 24, dtype=np.int32)
@@ -250,6 +252,7 @@ def test_a_gif_is_refused_before_its_first_picture(tmp_path, monkeypatch, error_
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_strokes_are_refused_by_their_spacing(monkeypatch, error_of):
     ball, camera = cases.instance(1000, 4), cases.camera(256)
     limit_memory(monkeypatch, 10e6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,6 +13,12 @@ from .stroke_set import POINT_COLUMNS, Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
 PAIR_BATCH_SIZE = 1 << 20
+
+#: Sine of the angle between segments below which they count as parallel.
+MIN_SINE = 1e-9
+
+#: Difference of the keys of strips, and the tolerance of positions along them; see `_strip_keys`.
+STRIP_STRIDE, ROUNDING = 4.0, 1e-6
 
 
 class Crossings(NamedTuple):
@@ -42,31 +49,102 @@ def find_crossings(strokes: Strokes) -> Crossings:
     arc, stroke = strokes.arc, strokes.stroke
     segment_end = np.flatnonzero(np.diff(stroke, prepend=-1) == 0)
     segment_end = segment_end[np.argsort(strokes.triangle[segment_end], kind="stable")]
-    triangle = strokes.triangle[segment_end]
-    # Pair each segment with the later segments in the same triangle.
-    last = np.searchsorted(triangle, triangle, side="right")
-    count = last - np.arange(len(segment_end)) - 1
-    total = np.cumsum(count)
     batches = []
-    start = 0
-    while start < len(segment_end):
-        done = total[start - 1] if start else 0
-        stop = max(int(np.searchsorted(total, done + PAIR_BATCH_SIZE, side="right")), start + 1)
-        first = np.repeat(np.arange(start, stop), count[start:stop])
-        begin = np.cumsum(count[start:stop]) - count[start:stop]
-        second = first + 1 + np.arange(len(first)) - np.repeat(begin, count[start:stop])
-        batches.append(
-            _intersect_segments(strokes.points, stroke, segment_end[first], segment_end[second])
-        )
-        start = stop
+    for first, second in _close_pairs(strokes, segment_end):
+        first, second = segment_end[first], segment_end[second]
+        batches.append(_intersect_segments(strokes.points, stroke, first, second))
     if not batches:
         return Crossings(np.empty((0, 2), dtype=np.int64), np.empty((0, 2)))
     first, second, fraction_first, fraction_second = (
         np.concatenate(column) for column in zip(*batches, strict=True)
     )
-    pairs = np.stack([first, second], axis=1)
-    fraction = np.stack([fraction_first, fraction_second], axis=1)
+    order = np.lexsort((second, first, strokes.triangle[first]))
+    pairs = np.stack([first, second], axis=1)[order]
+    fraction = np.stack([fraction_first, fraction_second], axis=1)[order]
     return Crossings(stroke[pairs], arc[pairs - 1] + fraction * (arc[pairs] - arc[pairs - 1]))
+
+
+def _close_pairs(
+    strokes: Strokes, segment_end: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield all pairs of segments of a triangle that are close enough to cross, in batches.
+
+    Each triangle is divided into strips as wide as its longest segment, and the segments of a strip
+    are sorted along it. So a segment is compared only with those beside it, in its own strip and in
+    the next one.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    segment_end : (m,) ndarray of int
+        Numbers of the end points of the segments, sorted by their triangle.
+
+    Yields
+    ------
+    first, second : (k,) int64 ndarray
+        Positions in `segment_end`, first < second.
+    """
+    if not len(segment_end):
+        return
+    key, window = _strip_keys(strokes, segment_end)
+    order = np.argsort(key, kind="stable")
+    key, window = key[order], window[order]
+    own_strip = np.arange(1, len(key) + 1), np.searchsorted(key, key + window, side="right")
+    next_strip = (
+        np.searchsorted(key, key + (STRIP_STRIDE - window)),
+        np.searchsorted(key, key + (STRIP_STRIDE + window), side="right"),
+    )
+    for low, high in (own_strip, next_strip):
+        for segment, other in _ranges(low, high):
+            segment, other = order[segment], order[other]
+            yield np.minimum(segment, other), np.maximum(segment, other)
+
+
+def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return sort keys of segments, and how far the keys of segments that cross may differ.
+
+    The key is the number of the strip times `STRIP_STRIDE`, plus the position along it, 0 to 1.
+    """
+    start, end = strokes.points[segment_end - 1], strokes.points[segment_end]
+    middle = (start + end) / 2
+    triangle = strokes.triangle[segment_end]
+    group_start = np.flatnonzero(np.diff(triangle, prepend=triangle[0] - 1))
+    size = np.diff(np.append(group_start, len(segment_end)))
+    length = np.linalg.norm(end - start, axis=1)
+    reach = np.maximum.reduceat(length, group_start) * (1 + ROUNDING)
+    low = np.minimum.reduceat(middle, group_start)
+    extent = np.maximum.reduceat(middle, group_start) - low
+    # The two axes along which the segments of a triangle spread most.
+    row = np.arange(len(size))
+    along, across = np.argsort(extent, axis=1)[:, 2], np.argsort(extent, axis=1)[:, 1]
+    strip_width = np.maximum(reach, extent[row, across] / size)
+    strip_width[strip_width == 0] = 1
+    strip_count = (extent[row, across] / strip_width).astype(
+        np.int64
+    ) + 2  # an empty one at the end
+    scale = np.maximum(extent[row, along], reach)
+    scale[scale == 0] = 1
+    first_strip = np.cumsum(strip_count) - strip_count
+    group = np.repeat(row, size)
+    offset = middle - low[group]
+    segment = np.arange(len(group))
+    strip = first_strip[group] + (offset[segment, across[group]] / strip_width[group]).astype(int)
+    position = offset[segment, along[group]] / scale[group]
+    return strip * STRIP_STRIDE + position, (reach / scale)[group] + ROUNDING
+
+
+def _ranges(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield each index i with all indices from low[i] to high[i] - 1, in batches."""
+    count = np.maximum(high - low, 0)
+    total = np.cumsum(count)
+    start = 0
+    while start < len(count):
+        done = total[start - 1] if start else 0
+        stop = max(int(np.searchsorted(total, done + PAIR_BATCH_SIZE, side="right")), start + 1)
+        index = np.repeat(np.arange(start, stop), count[start:stop])
+        begin = np.cumsum(count[start:stop]) - count[start:stop]
+        yield index, np.arange(len(index)) + np.repeat(low[start:stop] - begin, count[start:stop])
+        start = stop
 
 
 def _intersect_segments(
@@ -89,10 +167,12 @@ def _intersect_segments(
     r, s = points[first] - p, points[second] - q
     normal = np.cross(r, s)
     norm_squared = np.einsum("ni,ni->n", normal, normal)
-    denominator = np.where(norm_squared > 0, norm_squared, 1)
+    lengths_squared = np.einsum("ni,ni->n", r, r) * np.einsum("ni,ni->n", s, s)
+    is_oblique = norm_squared > MIN_SINE**2 * lengths_squared
+    denominator = np.where(is_oblique, norm_squared, 1)
     t = np.einsum("ni,ni->n", np.cross(q - p, s), normal) / denominator
     u = np.einsum("ni,ni->n", np.cross(q - p, r), normal) / denominator
-    crosses = (norm_squared > 0) & (t >= 0) & (t < 1) & (u >= 0) & (u < 1)
+    crosses = is_oblique & (t >= 0) & (t < 1) & (u >= 0) & (u < 1)
     return first[crosses], second[crosses], t[crosses], u[crosses]
 
 

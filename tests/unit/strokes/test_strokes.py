@@ -650,6 +650,17 @@ def test_ends_that_meet_head_on_are_not_tapered():
     assert np.allclose(end_width, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])
 
 
+def test_parallel_strokes_do_not_cross():
+    """Their direction and their places are exact, but for rounding off the plane."""
+    random = np.random.default_rng(0)
+    step = np.array([1 / 64, 1 / 128, 0])
+    start = random.integers(0, 1024, (100, 1, 3)) / 1024 * (1, 1, 0)
+    points = start + np.arange(11)[:, None] * step
+    points[..., 2] = random.normal(scale=1e-16, size=points.shape[:2])
+    directions = np.tile(normalize(step), (points[..., 0].size, 1))
+    assert not len(find_crossings(planar_strokes(points, directions, 0.1)).stroke)
+
+
 def test_gaps_at_crossings():
     instance = instance_of(plane(3, 3), 4)
     strokes = trace_strokes(instance, 0.2)

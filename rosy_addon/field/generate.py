@@ -30,6 +30,9 @@ from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_task
 from .surface import Surface, build_surface, sum_per_face
 
+#: The smallest number whose inverse is finite.
+TINY = float(np.finfo(np.float64).tiny)
+
 #: Kinds of generated fields, with the descriptions shown in the interface.
 GENERATORS = {
     "smoothest": "The smoothest field, with few singularities",
@@ -145,7 +148,9 @@ def generate_task(
         field = yield from subtask(curvature_task(surface, degree), 0.0, split)
         if not settings.smoothing_length:
             return field
-        weight = (field.magnitude / (settings.smoothing_length * surface.extent)) ** 2
+        # The extent is zero if all faces are points; then so is the magnitude.
+        length = max(settings.smoothing_length * surface.extent, TINY)
+        weight = (field.magnitude / length) ** 2
         task = _guided_or_smoothest_task(surface, degree, normalize(field.vectors), weight)
         return (yield from subtask(task, split, 1.0))
     if settings.kind == "features":
@@ -350,7 +355,8 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     confidence = deviator_norm / (
         np.maximum(np.abs(mean), deviator_norm) + 0.01 / max(radius, 1e-30)
     )
-    phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=deviator_norm > 0)
+    is_curved = deviator_norm > TINY
+    phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
     rotation = corner_rotations(
         smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal

@@ -97,7 +97,7 @@ def _numbers(count: int, spread: float) -> Callable[[Generator], str]:
 
 def _size(rng: Generator) -> str:
     if rng.random() < 0.05:
-        return ("0x0", "1x1", "16384x1", "1x4000", "99999x99999", "16384x16384", "20x-3")[
+        return ("0x0", "1x1", "16384x1", "1x4000", "99999x99999", "16384x2", "20x-3")[
             rng.integers(7)
         ]
     width, height = rng.integers(1, 120, 2)

@@ -11,7 +11,12 @@ from shapes import cylinder, from_quads, from_triangles, icosphere, plane, torus
 from rosy_addon.errors import RosyError
 from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
-from rosy_addon.field.generate import axis_field, curvature_field, generate
+from rosy_addon.field.generate import (
+    GeneratorSettings,
+    axis_field,
+    curvature_field,
+    generate,
+)
 from rosy_addon.field.representation import (
     face_frames,
     face_representation,
@@ -280,3 +285,14 @@ def test_impossible_meshes():
         build_surface(np.zeros((3, 3)), [0, 1, 3], [0, 3])
     with pytest.raises(RosyError, match="vertex 1"):
         build_surface([[0, 0, 0], [0, np.nan, 0], [1, 0, 0]], [0, 1, 2], [0, 3])
+
+
+def test_curvatures_next_to_nothing(error_of):
+    """Smaller than numbers with an inverse, and on a mesh without extent."""
+    grid = plane(4, 4)
+    points = grid.vertices + (0, 0, 5e-320) * np.random.default_rng(0).random((25, 1))
+    surface = build_surface(points, grid.corner_vertex, grid.face_start)
+    assert np.isfinite(generate(surface, "curvature", 4).vectors).all()
+    surface = build_surface(0 * points + 1, grid.corner_vertex, grid.face_start)
+    settings = GeneratorSettings("curvature", smoothing_length=0.3)
+    assert "without area" in error_of(generate, surface, settings, 4)

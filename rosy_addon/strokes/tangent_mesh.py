@@ -35,6 +35,10 @@ MIN_AREA_RATIO = 1e-9
 #: at the corners of the triangle.
 ZERO_FIELD_RATIO = 1e-4
 
+#: Largest angle in radians between the normal of a triangle and the shading normals in it. If they
+#: are steeper, strokes beside each other count as on different parts of a fold.
+MAX_TILT = 0.6
+
 
 @dataclass(frozen=True, eq=False)
 class TangentMesh:
@@ -119,8 +123,14 @@ class TangentMesh:
         return weights / weights.sum(axis=1, keepdims=True)
 
     def shading_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) interpolated unit normals."""
-        return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
+        """Return the (n, 3) interpolated unit normals, at most `MAX_TILT` off the triangle's own."""
+        shading = normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
+        flat = self.normal[triangle]
+        cosine = dot(shading, flat)
+        steep = np.flatnonzero(cosine < np.cos(MAX_TILT))
+        sideways = normalize(shading[steep] - cosine[steep, None] * flat[steep])
+        shading[steep] = np.cos(MAX_TILT) * flat[steep] + np.sin(MAX_TILT) * sideways
+        return shading
 
     def to_world(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
         """Convert (n,) complex tangents in the frames of triangles to (n, 3) vectors."""

@@ -27,6 +27,7 @@ from rosy_addon.strokes.pipeline import (
 from rosy_addon.strokes.spacing import lit_tone
 from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.svg import Pen
+from rosy_addon.strokes.trace import trace_strokes_task
 from rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 
 IDENTITY = np.eye(4)
@@ -172,6 +173,24 @@ def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
     assert np.linalg.norm(offset_points, axis=1).min() > 1 and len(hidden.strokes) > len(
         drawing.strokes
     )
+
+
+@pytest.mark.parametrize("tilt", [0.8, 1.4, 2.8])
+def test_seeding_ends_where_shading_normals_are_steep(tilt):
+    """As on polygons that are not flat: strokes beside each other still find each other."""
+    flat = plane(2, 2)
+    normal = np.tile((0.0, np.sin(tilt), np.cos(tilt)), (len(flat.corner_vertex), 1))
+    surface = build_surface(
+        flat.vertices, flat.corner_vertex, flat.face_start, corner_normal=normal
+    )
+    instance = MeshInstance(
+        surface, IDENTITY, generate(surface, GeneratorSettings("axis", (1, 0, 0)), 2)
+    )
+    task = trace_strokes_task(instance, 0.1)
+    with pytest.raises(StopIteration) as done:
+        for _ in range(300):
+            next(task)
+    assert 30 < done.value.value.length.sum() < 50
 
 
 def test_seeding_ends_where_all_strokes_are_short():

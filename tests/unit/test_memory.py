@@ -122,8 +122,12 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 def traced_peak(work) -> int:
     """Return the largest number of bytes that are allocated at once, as in a new process."""
-    image_noise._noise_tiles.cache_clear()
-    streak_statistics.streak_statistics.cache_clear()
+    for function in (
+        image_noise._noise_tiles,
+        image_noise.streak_moments,
+        streak_statistics.streak_statistics,
+    ):
+        function.cache_clear()
     tracemalloc.start()
     try:
         work()

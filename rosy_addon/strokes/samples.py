@@ -208,7 +208,7 @@ class StrokeSamples(ColumnTable):
         member = np.where(member == 0, particles.member, member)
         direction = mesh.directions_at(triangle, weights, member)
         position = mesh.points_at(triangle, weights)
-        normal = mesh.shading_normals_at(triangle, weights)
+        normal = mesh.limited_normals_at(triangle, weights)
         world_direction = mesh.transport_to_normal(
             triangle, mesh.to_world(triangle, direction), normal
         )

@@ -123,8 +123,12 @@ class TangentMesh:
         return weights / weights.sum(axis=1, keepdims=True)
 
     def shading_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) interpolated unit normals, at most `MAX_TILT` off the triangle's own."""
-        shading = normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
+        """Return the (n, 3) interpolated unit normals."""
+        return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
+
+    def limited_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return the shading normals, but at most `MAX_TILT` off those of the triangles."""
+        shading = self.shading_normals_at(triangle, weights)
         flat = self.normal[triangle]
         cosine = dot(shading, flat)
         steep = np.flatnonzero(cosine < np.cos(MAX_TILT))

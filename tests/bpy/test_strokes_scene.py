@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 
 import bpy
@@ -105,7 +106,7 @@ def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
 
 
 def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
-    result = draw_strokes(scene, kind="CURVES", style=PLAIN, pen=BLACK)
+    result = draw_strokes(scene, kind="CURVES", style=replace(PLAIN, spacing=6), pen=BLACK)
     data, strokes = result.obj.data, result.drawing.strokes
     assert result.obj.type == "CURVES" and len(data.curves) == len(strokes)
     attributes = {name: data.attributes[name] for name in data.attributes.keys()}  # noqa: SIM118
@@ -138,7 +139,7 @@ def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
     camera_view = view(scene)
     assert (
         np.einsum("ni,ni->n", np.array(camera.location) - points, normal)[has_member] > 0
-    ).mean() > 0.93
+    ).mean() > 0.95
     first = np.array([curve.first_point_index for curve in data.curves])
     positions, _ = project_to_pixels(points[first].astype(float), camera_view)
     np.testing.assert_allclose(

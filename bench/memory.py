@@ -82,35 +82,27 @@ def measure(runs: int) -> Iterator[Case]:
     """Measure each case once, because memory does not vary between runs."""
     for name in CASES:
         (peak,) = _run("--draw", name)
-        ratio = peak / ALLOWED
-        case = Case(
-            name=f"peak memory / {ALLOWED:g} GB, {name}",
-            ratio=ratio,
-            low=ratio,
-            high=ratio,
-            target=1.0,
-            higher_is_better=False,
-            amounts=(peak, ALLOWED),
-            unit="GB",
-        )
-        print(case.line(), flush=True)
-        yield case
-
+        yield _case(f"peak memory / {ALLOWED:g} GB, {name}", (peak, ALLOWED), "GB", 1.0)
     for name in ESTIMATED if Path("/proc/self/clear_refs").exists() else ():
         estimate, peak = _run("--estimate", name)
-        ratio = estimate / peak
-        case = Case(
-            name=f"estimated / taken memory, {name}",
-            ratio=ratio,
-            low=ratio,
-            high=ratio,
-            target=None,
-            higher_is_better=False,
-            amounts=(1000 * estimate, 1000 * peak),
-            unit="MB",
-        )
-        print(case.line(), flush=True)
-        yield case
+        yield _case(f"estimated / taken memory, {name}", (1000 * estimate, 1000 * peak), "MB", None)
+
+
+def _case(name: str, amounts: tuple[float, float], unit: str, target: float | None) -> Case:
+    """Return the case of the ratio of two amounts, and print its line."""
+    ratio = amounts[0] / amounts[1]
+    case = Case(
+        name=name,
+        ratio=ratio,
+        low=ratio,
+        high=ratio,
+        target=target,
+        higher_is_better=False,
+        amounts=amounts,
+        unit=unit,
+    )
+    print(case.line(), flush=True)
+    return case
 
 
 def _run(*options: str) -> list[float]:

@@ -72,6 +72,18 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         raise RosyError(f"{path}: cannot be read: {os_error_text(error)}") from error
 
 
+def check_readable(path: str | os.PathLike[str]) -> None:
+    """Check that a file can be read, before something that would wait for a pipe opens it.
+
+    Raises
+    ------
+    RosyError
+        As `open_file`.
+    """
+    with open_file(path):
+        pass
+
+
 def check_parsing_memory(path: str | os.PathLike[str], binary_memory: float) -> None:
     """Check that a file of numbers can take the memory that it needs, by its size.
 

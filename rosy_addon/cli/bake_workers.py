@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from ..errors import RosyError
-from ..file_io import open_file
+from ..file_io import check_readable
 from ..frame_workers import parse_frames, run_dask, run_local, worker_command
 from ..presets.store import SHIPPED_FOLDER, find_preset_file
 from .presets import user_presets_folder
@@ -31,8 +31,7 @@ def run_workers(options: argparse.Namespace) -> None:
                 "--jobs and --scheduler need a saved file: save it, or give SCENE.blend"
             )
         scene = Path(blend_data.filepath)
-    with open_file(scene):
-        pass
+    check_readable(scene)
     command = worker_command(blender_path, Path(os.path.realpath(scene))) + _forwarded_args(options)
     frames = parse_frames(options.frames)
     if options.scheduler is not None:

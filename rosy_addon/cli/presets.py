@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
-from ..presets.store import default_user_folder, preset_files, read_preset, user_preset_files
+from ..presets.store import default_user_folder, merge_preset_files, read_preset, user_preset_files
 from .options import add_subcommand, print_note
 from .streams import print_line
 
@@ -23,8 +23,7 @@ def add_presets_command(subparsers: Any) -> None:
 def run_presets(options: argparse.Namespace) -> None:
     """List the presets of RoSy and your own, with their descriptions."""
     folder, records = user_presets_folder(), []
-    user_preset_files(folder)  # raises an error if they cannot be read
-    for key, path in preset_files(folder).items():
+    for key, path in merge_preset_files(user_preset_files(folder)).items():
         try:
             preset = read_preset(path)
         except RosyError as error:

@@ -37,7 +37,6 @@ WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUF
 #: Degree of files that do not state one, if the caller gives none.
 DEFAULT_DEGREE = 4
 
-
 #: Bytes of memory that a byte of an .npy file takes until its field is made.
 NPY_MEMORY = 4
 

@@ -86,15 +86,22 @@ def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
     Returns
     -------
     dict of str to Path
-        Files by their keys (see `preset_key`): the default, then the other shipped presets, then
-        the user's own, both in alphabetical order.
+        Files by their keys; see `merge_preset_files`.
+    """
+    with suppress(RosyError):
+        return merge_preset_files(user_preset_files(user_folder))
+    return merge_preset_files({})
+
+
+def merge_preset_files(user_files: dict[str, Path]) -> dict[str, Path]:
+    """Return the files of all presets by their keys (see `preset_key`).
+
+    The default comes first, then the other shipped presets, then `user_files`, which replace
+    shipped presets with the same key. Both are in alphabetical order.
     """
     shipped = {path.stem: path for path in sorted(SHIPPED_FOLDER.glob("*.json"))}
     files = {DEFAULT_KEY: shipped.pop(DEFAULT_KEY), **shipped}
-    with suppress(RosyError):
-        user_files = user_preset_files(user_folder)
-        files = {key: path for key, path in files.items() if key not in user_files} | user_files
-    return files
+    return {key: path for key, path in files.items() if key not in user_files} | user_files
 
 
 def user_preset_files(user_folder: Path | None) -> dict[str, Path]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..errors import RosyError
-from ..file_io import open_file
+from ..file_io import check_readable
 
 
 def open_blend(path: Path) -> None:
@@ -19,8 +19,7 @@ def open_blend(path: Path) -> None:
     RosyError
         If the file is missing or cannot be read.
     """
-    with open_file(path):
-        pass
+    check_readable(path)
     try:
         bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
     except RuntimeError as reason:

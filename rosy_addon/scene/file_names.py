@@ -17,9 +17,9 @@ def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
 
     Characters that file systems do not allow become underscores, and long names are cut. If cameras
-    or scenes would then have the same file, also where file systems ignore case, one of them has the plain name, and the
-    stems of the others end in a hash. Which one depends only on the names in the .blend file, so
-    several processes agree.
+    or scenes would then have the same file, also where file systems ignore case, one of them has
+    the plain name, and the stems of the others end in a hash. Which one depends only on the names
+    in the .blend file, so several processes agree.
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}

@@ -16,7 +16,7 @@ from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
 from ..field.surface import Surface
-from ..file_io import open_file
+from ..file_io import check_readable
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties
@@ -252,8 +252,7 @@ def load_luminance(path: Path) -> np.ndarray:
     RosyError
         If Blender cannot read the file, or it is not a regular file.
     """
-    with open_file(path):  # Blender would wait for a pipe
-        pass
+    check_readable(path)
     try:
         image = bpy.data.images.load(str(path), check_existing=False)
     except RuntimeError as reason:

@@ -55,7 +55,7 @@ def assign_fields(
     for mesh, field in fields.items():
         _check_storable(mesh, field, names[mesh], form)
     for mesh, field in fields.items():
-        write_mesh_field(mesh, field, names[mesh], form)
+        _store(mesh, field, names[mesh], form)
 
 
 def _default_name(mesh: bpy.types.Mesh, form: str) -> str:
@@ -102,6 +102,11 @@ def write_mesh_field(
     """
     name = name or DEFAULT_FIELD_NAME
     _check_storable(mesh, field, name, form)
+    return _store(mesh, field, name, form)
+
+
+def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.types.Attribute:
+    """Store a field that `_check_storable` has checked. Return the attribute, or the first."""
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":

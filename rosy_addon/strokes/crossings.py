@@ -116,12 +116,11 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
     extent = np.maximum.reduceat(middle, group_start) - low
     # The two axes along which the segments of a triangle spread most.
     row = np.arange(len(size))
-    along, across = np.argsort(extent, axis=1)[:, 2], np.argsort(extent, axis=1)[:, 1]
+    _, across, along = np.argsort(extent, axis=1).T
     strip_width = np.maximum(reach, extent[row, across] / size)
     strip_width[strip_width == 0] = 1
-    strip_count = (extent[row, across] / strip_width).astype(
-        np.int64
-    ) + 2  # an empty one at the end
+    # One more than are used, so that the last strip of a triangle is empty.
+    strip_count = 2 + (extent[row, across] / strip_width).astype(np.int64)
     scale = np.maximum(extent[row, along], reach)
     scale[scale == 0] = 1
     first_strip = np.cumsum(strip_count) - strip_count

@@ -14,7 +14,7 @@ from ..presets.store import (
     SHIPPED_FOLDER,
     Preset,
     find_preset_file,
-    preset_files,
+    merge_preset_files,
     preview_path,
     read_preset,
     user_preset_files,
@@ -63,22 +63,23 @@ class _PresetLibrary:
         if folder_keys == self.folder_keys and time.monotonic() < self.checked_at + REFRESH_SECONDS:
             return
         self.folder_keys, self.checked_at = folder_keys, time.monotonic()
-        paths = preset_files(user_folder)
+        load_errors = []
+        try:
+            user_files = user_preset_files(user_folder)
+        except RosyError as error:
+            user_files, load_errors = {}, [str(error)]
+        paths = merge_preset_files(user_files)
         file_keys = {
             path: (_stat_key(path), _stat_key(preview_path(path))) for path in paths.values()
         }
         if file_keys == self.file_keys:
             return
-        self.file_keys, self.entries, self.load_errors = file_keys, {}, []
+        self.file_keys, self.entries, self.load_errors = file_keys, {}, load_errors
         for key, path in paths.items():
             try:
                 self.entries[key] = PresetEntry(path, read_preset(path), path.parent == user_folder)
             except RosyError as error:
                 self.load_errors.append(str(error))
-        try:
-            user_preset_files(user_folder)
-        except RosyError as error:
-            self.load_errors.append(str(error))
         self._load_previews()
 
     def _load_previews(self) -> None:

@@ -7,8 +7,8 @@
 With `--which stable|latest`, the path is that of a `real-blender` script.
 
 Each seed runs in a Blender of its own, with empty preferences and the zip installed. The actions
-are the functions of monkey_blender.py and monkey_rosy.py; what is checked after each of them is in monkey_state.py and
-monkey_loop.py. If a check fails, a Python traceback is printed, or Blender crashes or hangs, the
+are the functions of monkey_blender.py and monkey_rosy.py; what is checked after each of them is in
+monkey_state.py and monkey_loop.py. If a check fails, a Python traceback is printed, or Blender crashes or hangs, the
 seed and the last actions are printed. `--seed N` repeats them. `--blender-only` leaves out
 everything of RoSy's, to see whether Blender alone does the same. The exit status is 0 only if all
 seeds passed.

@@ -75,7 +75,10 @@ def _torus(rng: Generator) -> Polygons:
     u, v = u * 2 * np.pi / columns, v * 2 * np.pi / rows
     ring = 1 + rng.uniform(0.1, 1.2) * np.cos(v)
     points = np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=1)
-    at = lambda i, j: (i % columns) * rows + j % rows  # noqa: E731
+
+    def at(i: int, j: int) -> int:
+        return (i % columns) * rows + j % rows
+
     faces = [
         (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1))
         for i in range(columns)

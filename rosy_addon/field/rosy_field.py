@@ -51,8 +51,9 @@ class RosyField:
         Number of line families that the stored member distinguishes: 1 if it may be on any line,
         otherwise the number of lines. A tensor field has 2: the major and the minor directions.
     source_directions : (F, N, 3) float64 ndarray or None
-        The unmodified input directions in their original order, if the field was made from
-        directions. Writers use them to reproduce the input.
+        The input directions in their original order, if the field was made from directions: those
+        of faces with values that are not finite are zero, all others unmodified. Writers use them
+        to reproduce the input.
 
     See Also
     --------

@@ -145,14 +145,14 @@ def validated_directions(
     directions = np.array(directions, dtype=np.float64)
     count, degree = directions.shape[:2]
     domain = infer_domain(surface, count) if domain is None else domain
-    source_directions = directions.copy() if domain == "face" else None
     unusable = ~has_finite_square(directions).all(axis=(1, 2))
+    usable_directions = np.where(unusable[:, None, None], 0.0, directions)
+    source_directions = usable_directions if domain == "face" else None
     directions[unusable] = np.nan
     count_matches = domain is not None and count == _element_count(surface, domain)
     if count_matches:
         normal = tangent_normals(surface, domain)
         x, y = tangent_frame(normal)
-        usable_directions = np.where(unusable[:, None, None], 0.0, directions)
         w = dot(usable_directions, x[:, None]) + 1j * dot(usable_directions, y[:, None])
     if not count_matches or is_rosy(w):
         vectors = directions[:, 0].copy()

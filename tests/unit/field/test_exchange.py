@@ -134,6 +134,22 @@ def test_singularities_round_trip(tmp_path, error_of):
     assert "singularities, but contains 1" in error_of(read_sings, tmp_path / "c.sings")
 
 
+@pytest.mark.parametrize("degree", [2, 4])
+@pytest.mark.parametrize("rosy", [True, False])
+def test_faces_that_are_not_finite_are_written_as_zero(degree, rosy, tmp_path):
+    field = axis_field(BALL, degree, (0.3, -0.2, 1.0))
+    stored = field_directions(BALL, field) if rosy else free_directions(degree)
+    stored[3, 1, 2] = np.nan
+    stored[5] = -np.inf
+    np.save(tmp_path / "first.npy", stored)
+    write_field(
+        tmp_path / "a.rawfield", read_field(tmp_path / "first.npy", BALL, None, "zero"), BALL
+    )
+    again = read_field(tmp_path / "a.rawfield", BALL)
+    stored[[3, 5]] = 0
+    assert np.array_equal(again.source_directions, stored)
+
+
 def test_tensors_are_distinguished_from_three_directions(tmp_path):
     random = np.random.default_rng(0)
     matrices = random.standard_normal((BALL.face_count, 3, 3))

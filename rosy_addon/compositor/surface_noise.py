@@ -40,6 +40,9 @@ OCTAVES = 3
 #: Range of the ratio of the size of cells to `grain` in which the contrast is corrected for it.
 CONTRAST_SCALE_RANGE = (0.25, 4.0)
 
+#: Number of bits of the largest index of a cell.
+MAX_CELL_BITS = 28
+
 #: Added to octave indices, so that positive integers are hashed.
 OCTAVE_OFFSET = 64
 
@@ -156,6 +159,9 @@ def _accumulate_octaves(
     seed, density
         As for `surface_noise`.
     """
+    # Finer cells than float32 can tell apart would have indices too large for integers.
+    farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
+    level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
     finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
     for index in range(OCTAVES):
         octave = finest + np.float32(index)

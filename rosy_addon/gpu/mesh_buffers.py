@@ -17,6 +17,7 @@ from ..projection.corner_field import CornerField, corner_field_task
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.mip_map import MipMap
+from ..projection.rest_coordinates import rest_positions
 from ..projection.surface_tone import SurfaceTone
 
 #: Texels in a row of the record texture: a power of two, with its exponent.
@@ -153,8 +154,7 @@ def build_mesh_buffers(
         matrix = np.eye(4)
         matrix[:3, :3] = linear
         corner_field = run_to_completion(corner_field_task(surface, matrix, field, display))
-        rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
-        rest = rest.take(surface.triangle_vertex, axis=0)
+        rest = rest_positions(surface).take(surface.triangle_vertex, axis=0)
         tone_values = None if tone is None else tone.values[surface.triangles]
         records = _triangle_records(
             corners, rest, corner_field, field.degree, channels, tone_values

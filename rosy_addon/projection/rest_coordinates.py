@@ -10,10 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.frames import transform_components
+from ..field.surface import Surface, box_corners
 from .gbuffer import GBuffer, MeshInstance
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
 BLOCK_PIXELS = 1 << 14
+
+#: Distance of a mesh from its object's origin, in multiples of its size, beyond which positions are
+#: taken relative to the mesh: float32 would be too coarse for them.
+FAR_RATIO = 1000
 
 #: Range to which barycentric coordinates are clamped. On a triangle that is seen edge-on, a pixel
 #: can reach far beyond the triangle.
@@ -30,7 +35,7 @@ class RestCoordinates:
         Homogeneous barycentric coordinates at the pixel center, and their change to the next pixel
         on the right and above, in the plane of the triangle.
     rest_corners : 3 (3, P) float32 ndarrays
-        The corners of the triangle in the rest shape, object space.
+        The corners of the triangle in the rest shape; see `rest_positions`.
     pixel_size : (P,) float32 ndarray
         Width of a pixel at the depth of the surface, parallel to the picture, in units of object
         space.
@@ -81,8 +86,6 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     Returns
     -------
     RestCoordinates
-        In object space. The rest shape is `Surface.rest_vertices`, or the vertices if there are
-        none.
     """
     count = len(gbuffer.pixel)
     coordinates = RestCoordinates(
@@ -93,17 +96,46 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
         pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
         instance = gbuffer.instances[instance_id]
+        rest = rest_positions(instance.surface)
         for start in range(0, len(pixels), BLOCK_PIXELS):
-            _fill_pixels(coordinates, gbuffer, instance, pixels[start : start + BLOCK_PIXELS])
+            block = pixels[start : start + BLOCK_PIXELS]
+            _fill_pixels(coordinates, gbuffer, instance, rest, block)
     return coordinates
 
 
-def _fill_pixels(
-    coordinates: RestCoordinates, gbuffer: GBuffer, instance: MeshInstance, pixels: np.ndarray
-) -> None:
-    """Compute the coordinates at some pixels of one mesh instance, in place."""
-    camera, surface = gbuffer.camera, instance.surface
+def rest_positions(surface: Surface) -> np.ndarray:
+    """Return the positions of the vertices in the rest shape.
+
+    The rest shape is `Surface.rest_vertices`, or the vertices if there are none.
+
+    Returns
+    -------
+    (V, 3) float64 ndarray
+        In object space. If the mesh is farther than `FAR_RATIO` times its size from the origin,
+        relative to a point at the mesh.
+    """
     rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    corners = box_corners(rest[surface.used_vertices])
+    size = np.ptp(corners, axis=0).max()
+    if np.abs(corners).max() <= FAR_RATIO * size:
+        return rest
+    # On a grid, so that slight changes of the mesh do not move the point.
+    spacing = np.exp2(np.ceil(np.log2(max(size, np.finfo(np.float64).tiny))))
+    return rest - np.round(corners.mean(axis=0) / spacing) * spacing
+
+
+def _fill_pixels(
+    coordinates: RestCoordinates,
+    gbuffer: GBuffer,
+    instance: MeshInstance,
+    rest: np.ndarray,
+    pixels: np.ndarray,
+) -> None:
+    """Compute the coordinates at some pixels of one mesh instance, in place.
+
+    (V, 3) `rest` are the `rest_positions` of its surface.
+    """
+    camera, surface = gbuffer.camera, instance.surface
     vertices = surface.triangle_vertex.take(gbuffer.triangle[pixels], axis=0).T
     clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
     row, column = np.divmod(gbuffer.pixel[pixels], camera.width)

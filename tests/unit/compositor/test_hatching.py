@@ -711,6 +711,21 @@ def test_statistics_of_surface_noise(high_pass, distance):
     assert np.abs(channels[np.triu_indices(3, 1)]).max() < 0.03
 
 
+@pytest.mark.parametrize("offset", [2.0**22, 2.0**30])
+def test_noise_of_a_mesh_far_from_its_origin_is_as_fine(offset):
+    surface = tube()
+    points = np.round(surface.vertices * 2**16) / 2**16  # exact after the offset, in float64
+    camera, noises = make_camera(distance=4), []
+    for moved_by in (0.0, offset):
+        matrix = np.eye(4)
+        matrix[:3, 3] = -moved_by
+        far = build_surface(points + moved_by, surface.corner_vertex, surface.face_start)
+        gbuffer = project([make_instance(far, matrix=matrix)], camera)
+        noises.append(surface_noise(gbuffer, 2.0, 0, 1, density=0.3, high_pass=0.0))
+    correlation = np.corrcoef(noises[0].T, noises[1].T)[0, 1]
+    assert correlation > 0.99
+
+
 def test_instances_have_different_noise():
     names = ["a", "b", "a", "a", "c"]
     assert len(set(instance_hashes(names).tolist())) == 5

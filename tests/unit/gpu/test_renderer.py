@@ -175,7 +175,11 @@ def test_records_hold_the_values_of_numpy_at_the_corners(surface, degree, displa
     records = buffers.triangle_records.reshape(-1, 4)[: 9 * count].reshape(count, 9, 4)
     assert not buffers.triangle_records.reshape(-1, 4)[9 * count :].any()
     rest = [records[:, 0:3, 3], records[:, 3:6, 3], records[:, 8, :3]]
-    np.testing.assert_allclose(np.stack(rest, axis=2), corner_points, rtol=1e-6)
+    # Equal to the vertices, but for one translation of meshes that are far from the origin.
+    offset = np.stack(rest, axis=2) - corner_points
+    if np.abs(corner_points).max() < 900 * extent:
+        assert np.abs(offset).max() <= 1e-6 * np.abs(corner_points).max()
+    assert np.ptp(offset.reshape(-1, 3), axis=0).max() <= 2e-3 * extent
     np.testing.assert_array_equal(records[:, :3, :3], corners[..., :3])
     np.testing.assert_allclose(np.linalg.norm(records[:, 3:6, :3], axis=2), 1, atol=1e-5)
     z = records[:, 6:8].reshape(count, 4, 2)[:, :3]

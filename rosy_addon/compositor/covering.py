@@ -36,6 +36,9 @@ BLOCK_PIXELS = 1 << 14
 #: The largest integer in `Covering.state_table`.
 INT16_MAX = 32767
 
+#: Squares of lengths between these bounds are neither rounded to 0 or infinity nor denormal.
+MIN_SQUARE, MAX_SQUARE = np.float32(1e-30), np.float32(1e30)
+
 #: `PixelField.neighbor_mask` of a pixel that is linked to all neighbors.
 ALL_NEIGHBORS = 0b111_111_111
 
@@ -292,12 +295,22 @@ def _nearest_member(
     angle = vector_angle(x, y)
     angle /= np.float32(degree)
     if degree == 1:
-        norm = np.sqrt(x * x + y * y)
+        norm = _length(x, y)
         norm[norm == 0] = 1
         return angle, x / norm, y / norm
     cosine, sine = cos_sin(angle)
     defined = z != 0
     return angle, cosine * defined, sine * defined
+
+
+def _length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Lengths of vectors, given by components. Their squares may overflow or underflow."""
+    with np.errstate(over="ignore"):
+        square = x * x + y * y
+    length = np.sqrt(square)
+    extreme = ~((square > MIN_SQUARE) & (square < MAX_SQUARE))
+    length[extreme] = np.hypot(x[extreme], y[extreme])
+    return length
 
 
 def _rotate(x: np.ndarray, y: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:

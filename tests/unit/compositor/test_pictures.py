@@ -244,6 +244,19 @@ def test_magnitudes_of_any_scale(magnitude_range):
     assert np.isfinite(compose(gbuffer, look).rgba).all()
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("degree", [1, 4])
+def test_lines_do_not_depend_on_the_scale_of_magnitudes(degree):
+    surface = plane(4, 4)
+    rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]
+    look = plain(display="flat", supersampling=1)
+    pictures = [
+        compose(project_surface(surface, RosyField(degree, length * [1.0, 0, 0]), 32), look).rgba
+        for length in (rho, np.ones_like(rho))
+    ]
+    np.testing.assert_allclose(*pictures, atol=1e-5)
+
+
 def test_display_curve_is_its_own_inverse():
     values = np.linspace(0, 1, 1001, dtype=np.float32)
     assert np.allclose(to_display(to_linear(values)), values, atol=1e-5)

@@ -68,6 +68,8 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
                 {"INFO"},
                 f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
             )
+        for warning in dict.fromkeys(text for sequence in result for text in sequence.warnings):
+            self.report({"WARNING"}, warning)
 
 
 CLASSES = (ROSY_OT_bake_animation,)

@@ -10,6 +10,7 @@ from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes_task
 from ..rosy_addon.errors import counted
 from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import CameraSource
+from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.scene.stroke_objects import remove_strokes, stroke_objects, target_objects
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from .bake import view_camera
@@ -56,7 +57,7 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
         )
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return target_objects(context.scene, context.view_layer)
+        return field_objects(context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: StrokeResult) -> None:
         destination = f"'{result.obj.name}'" if result.path is None else str(result.path)

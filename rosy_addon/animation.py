@@ -61,12 +61,15 @@ class SequenceResult:
     rendered, skipped : tuple of int
         Frames that were drawn, and frames that were up to date.
     sequence : ImageSequence
+    warnings : tuple of str
+        Messages for the user.
     """
 
     camera: str
     rendered: tuple[int, ...]
     skipped: tuple[int, ...]
     sequence: ImageSequence
+    warnings: tuple[str, ...] = ()
 
 
 def bake_animation_task(
@@ -119,6 +122,7 @@ def bake_animation_task(
     sequence_cameras: dict[str, Camera] = {}
     start_time, rendered_count = time.monotonic(), 0
     scene_data = None
+    warnings: dict[str, None] = {}
     # `_frame_task` evicts the entries that a frame has not used.
     exit_stack, cache = ExitStack(), Cache()
     try:
@@ -127,7 +131,13 @@ def bake_animation_task(
         if show:
             check_targets(targets, settings)
         exit_stack.enter_context(
-            temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache)
+            temp_attributes(
+                depsgraph,
+                targets,
+                nonfinite_policy(scene),
+                cache,
+                {} if objects is None else None,
+            )
         )
         for index, frame in enumerate(frames):
             start, stop = index / len(frames), (index + 1) / len(frames)
@@ -139,6 +149,7 @@ def bake_animation_task(
                 scene_data, results = yield from subtask(task, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
+            warnings |= dict.fromkeys(scene_data.warnings)
             for name, (camera, up_to_date) in results.items():
                 (skipped_frames if up_to_date else rendered_frames).setdefault(name, []).append(
                     frame
@@ -155,7 +166,7 @@ def bake_animation_task(
             if show:
                 apply_sequence(scene, scene_data, sequence, camera, settings)
             frame_lists = tuple(rendered_frames.get(name, ())), tuple(skipped_frames.get(name, ()))
-            sequence_results.append(SequenceResult(name, *frame_lists, sequence))
+            sequence_results.append(SequenceResult(name, *frame_lists, sequence, tuple(warnings)))
         return sequence_results
     finally:
         exit_stack.close()

@@ -124,9 +124,11 @@ def draw_strokes_task(
     yield Progress(0.97, "storing the strokes")
     if kind == "SVG":
         write_svg(path, drawing.strokes, view, pen)
-        return StrokeResult(view.name, drawing, path=path)
+        return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
     obj = store_strokes(scene, kind, drawing, view, pen, _parent_object(scene_data))
-    return StrokeResult(view.name, drawing, obj, notes=tuple(_notes(scene, obj, style)))
+    return StrokeResult(
+        view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
+    )
 
 
 def draw_strokes(

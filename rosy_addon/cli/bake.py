@@ -16,8 +16,8 @@ from ..progress import Task
 from .bake_workers import run_workers, uses_workers
 from .look import add_look_options, requested_look
 from .options import add_object_option, add_subcommand, parse_size
-from .scene import open_scene, requested_cameras
-from .streams import print_error, print_line
+from .scene import open_scene, print_warnings, requested_cameras, requested_objects
+from .streams import print_line
 
 
 def add_bake_command(subparsers: Any) -> None:
@@ -83,7 +83,6 @@ def run_bake(options: argparse.Namespace) -> None:
     from ..scene.blend_files import save_blend
     from ..scene.look_properties import read_look
     from ..scene.pictures import is_beside_blend, read_output_settings
-    from ..scene.scene_reader import field_objects
 
     out = None if options.out is None else Path(os.path.realpath(options.out))
     settings = read_output_settings(scene, out)
@@ -99,14 +98,13 @@ def run_bake(options: argparse.Namespace) -> None:
         return
     results = bake_scene(
         scene,
-        objects=field_objects(bpy.context.view_layer, options.object),
+        objects=requested_objects(options),
         cameras=requested_cameras(scene, options),
         look=requested_look(options, read_look(scene.rosy)),
         size=options.size,
         settings=settings,
     )
-    for note in dict.fromkeys(note for result in results for note in result.warnings):
-        print_error(note)
+    print_warnings(warning for result in results for warning in result.warnings)
     for result in results:
         location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
         print_line(f"{result.camera}: {location}")
@@ -128,12 +126,10 @@ def _check_bake_options(options: argparse.Namespace) -> None:
 
 def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> None:
     """Draw the frames in this process, and print what was written."""
-    import bpy
 
     from ..animation import bake_animation_task
     from ..scene.blend_files import save_blend
     from ..scene.look_properties import read_look
-    from ..scene.scene_reader import field_objects
 
     frames = parse_frames(options.frames)
     if uses_workers(options):
@@ -143,14 +139,16 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
     task = bake_animation_task(
         scene,
         frames,
-        objects=field_objects(bpy.context.view_layer, options.object),
+        objects=requested_objects(options),
         cameras=requested_cameras(scene, options),
         look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
         size=options.size,
         settings=settings,
         show=options.save,
     )
-    for result in _run_with_log(task):
+    results = _run_with_log(task)
+    print_warnings(warning for result in results for warning in result.warnings)
+    for result in results:
         if result.skipped:
             print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
         print_line(f"{result.camera}: {result.sequence.path}")

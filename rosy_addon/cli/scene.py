@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
+from .streams import print_error
 
 
 def open_scene(command: str, path: Path | None) -> Any:
@@ -40,6 +42,21 @@ def requested_cameras(scene: Any, options: argparse.Namespace) -> list[Any] | No
     if options.all_cameras:
         return scene_cameras(scene)
     return None if options.camera is None else [find_camera(scene, options.camera)]
+
+
+def requested_objects(options: argparse.Namespace) -> list[Any] | None:
+    """Return the objects that the options name; None for all whose fields can be drawn."""
+    import bpy
+
+    from ..scene.scene_reader import field_objects
+
+    return None if options.object is None else field_objects(bpy.context.view_layer, options.object)
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print each of several warnings once."""
+    for warning in dict.fromkeys(warnings):
+        print_error(warning)
 
 
 def find_camera(scene: Any, name: str) -> Any:

@@ -19,7 +19,7 @@ from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen, write_svg
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_object_option, add_subcommand, check_output
-from .scene import find_camera, open_scene
+from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
 from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
 from .view import DEFAULT_VIEW, add_view_options, requested_size, up_axis
@@ -108,7 +108,6 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
 
     from ..draw_strokes import draw_strokes
     from ..scene.cameras import frame_camera
-    from ..scene.scene_reader import field_objects
     from ..scene.stroke_objects import read_pen, read_stroke_style, target_objects
 
     if options.camera is not None:
@@ -116,17 +115,18 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     else:
         camera = None if options.frames is None else frame_camera(scene, scene.frame_current)
     settings, layer = scene.rosy.strokes, bpy.context.view_layer
-    has_names = options.object is not None
+    objects = requested_objects(options) or target_objects(scene, layer)
     result = draw_strokes(
         scene,
         kind="SVG",
         path=Path(os.path.realpath(path)),
-        objects=field_objects(layer, options.object) if has_names else target_objects(scene, layer),
+        objects=objects,
         camera=camera,
         style=stroke_style_of(options, read_stroke_style(settings)),
         pen=pen_of(options, read_pen(settings)),
         size=options.size,
     )
+    print_warnings(result.notes)
     print_line(f"{result.camera}: {result.path}")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -67,6 +67,12 @@ class Surface:
     def face_count(self) -> int:
         """F, the number of faces."""
         return len(self.face_start) - 1
+
+    def in_rest_shape(self) -> Surface:
+        """Return the surface before deformation, to which field vectors refer."""
+        if self.rest_vertices is None:
+            return self
+        return replace(self, vertices=self.rest_vertices, rest_vertices=None)
 
     @cached_property
     def extent(self) -> float:

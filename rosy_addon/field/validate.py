@@ -110,7 +110,7 @@ def validated_field(
             degree, project_to_tangent(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
         )
     vectors = project_to_tangent(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
-    return RosyField(degree, _average_to_faces(_rest_surface(surface), vectors, normal, degree))
+    return RosyField(degree, _average_to_faces(surface.in_rest_shape(), vectors, normal, degree))
 
 
 def validated_directions(
@@ -159,7 +159,7 @@ def validated_directions(
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
         field = validated_field(surface, vectors, degree, source, nonfinite, domain)
         return replace(
-            detect_families(_rest_surface(surface), field), source_directions=source_directions
+            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
         )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
     tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
@@ -167,7 +167,7 @@ def validated_directions(
     directions = project_to_tangent(
         flat_directions, normals, tolerance_deg, source, domain
     ).reshape(count, degree, 3)
-    surface = _rest_surface(surface)
+    surface = surface.in_rest_shape()
     if domain == "face":
         return replace(
             field_from_directions(surface, directions), source_directions=source_directions
@@ -228,7 +228,7 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
         Unit normals; see `Surface.face_normal` and `vertex_normals`. Zero on faces without area and
         on vertices without a face.
     """
-    surface = _rest_surface(surface)
+    surface = surface.in_rest_shape()
     return surface.face_normal if domain == "face" else vertex_normals(surface)
 
 
@@ -284,7 +284,7 @@ def project_to_tangent(
         raise RosyError(
             f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
             f"are more than {tolerance_deg:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
-            "degrees. Does the field belong to another mesh, or was a transform applied?"
+            "degrees. It belongs to another mesh or another shape of it: make or import it again"
         )
     # The projection of a vector parallel to the normal is only rounding error.
     tangent = np.where(
@@ -356,10 +356,3 @@ def _average_to_faces(
     rotation = corner_rotations(surface.face_normal, x, surface.corner_face, corner_normal)
     mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)
     return from_representation(mean, x, y, degree)
-
-
-def _rest_surface(surface: Surface) -> Surface:
-    """The surface in its rest shape, to which field vectors refer."""
-    if surface.rest_vertices is None:
-        return surface
-    return replace(surface, vertices=surface.rest_vertices, rest_vertices=None)

@@ -19,6 +19,7 @@ from ..field.validate import (
 )
 from .field_attributes import VECTOR_TYPE, cached_field, field_values
 from .meshes import read_attribute
+from .rest_shape import follow_mesh
 
 #: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
 #: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
@@ -110,6 +111,7 @@ def read_evaluated_field(
     """
     source = f"{label}, attribute '{layout.name}'"
     values = field_values(mesh.attributes[layout.name], source, mesh)
+    values = follow_mesh(mesh, layout.name, values, surface)
     original_normals = read_attribute(mesh, FACE_NORMAL_ATTRIBUTE, np.float32, 3)
     deviation_pairs = [
         read_attribute(mesh, name, np.float32, 2) for name in layout.attribute_names[1:]

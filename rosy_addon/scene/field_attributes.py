@@ -89,6 +89,43 @@ def describe_type(attribute: bpy.types.Attribute) -> str:
     return f"{attribute.data_type} on {attribute.domain}"
 
 
+def check_attribute_type(
+    mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
+) -> None:
+    """Raise an error if an attribute exists and is not of the given type and domain."""
+    attribute = mesh.attributes.get(name)
+    if attribute is not None and (attribute.domain, attribute.data_type) != (domain, data_type):
+        raise RosyError(
+            f"mesh '{mesh.name}' already has an attribute '{name}' of another type "
+            f"({describe_type(attribute)}): remove it, or choose another name for the field"
+        )
+
+
+def get_or_create_attribute(
+    mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
+) -> bpy.types.Attribute:
+    """Return the attribute of a name, type and domain, and create it if it is missing.
+
+    Raises
+    ------
+    RosyError
+        If there is one of another type or domain, or Blender does not allow the name.
+    """
+    check_attribute_type(mesh, name, data_type, domain)
+    attribute = mesh.attributes.get(name)
+    if attribute is None:
+        old_names = set(mesh.attributes.keys())
+        attribute = mesh.attributes.new(name, data_type, domain)
+        if attribute is None or attribute.name != name:
+            # Blender may have made one of another name, and not say so.
+            for new_name in set(mesh.attributes.keys()) - old_names:
+                mesh.attributes.remove(mesh.attributes[new_name])
+            raise RosyError(
+                f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose another one"
+            )
+    return attribute
+
+
 def cached_field(
     cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
 ) -> RosyField:

@@ -266,7 +266,7 @@ def apply_picture(
         material,
         tuple(objects),
         rendered_view.picture,
-        tuple(_display_warnings(scene)),
+        (*scene_data.warnings, *_display_warnings(scene)),
     )
 
 

@@ -26,8 +26,10 @@ from .field_attributes import (
     describe_type,
     field_degree,
     field_values,
+    is_face_vector_field,
 )
 from .meshes import flush_edit_mode, mesh_surface
+from .rest_shape import follow_mesh
 
 #: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
 #: to the smooth surface rather than to the face.
@@ -87,6 +89,8 @@ def read_mesh_field(
         )
     source = f"{label}, attribute '{field_name}'"
     values = field_values(attribute, source, mesh)
+    if is_face_vector_field(mesh, field_name):
+        values = follow_mesh(mesh, field_name, values, surface)
 
     def build_field() -> RosyField:
         if attribute.data_type == ANGLE_TYPE:
@@ -128,16 +132,17 @@ def _field_from_directions(
                 f"found {describe_type(attribute)}"
             )
         directions.append(field_values(attribute, source, mesh))
+    directions = np.stack(directions, axis=1)
+    if first_attribute.domain == "FACE":
+        directions = follow_mesh(mesh, "dir0", directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
     domain = {"FACE": "face", "POINT": "vertex"}[first_attribute.domain]
 
     def build_field() -> RosyField:
-        return validated_directions(
-            surface, np.stack(directions, axis=1), source, nonfinite, domain
-        )
+        return validated_directions(surface, directions, source, nonfinite, domain)
 
     return cached_field(
-        cache, surface, build_field, "directions", *directions, source, nonfinite, domain
+        cache, surface, build_field, "directions", directions, source, nonfinite, domain
     )
 
 
@@ -175,6 +180,8 @@ def _attribute_hint(mesh: bpy.types.Mesh) -> str:
     names = [
         f"'{other.name}'"
         for other in mesh.attributes
-        if other.data_type == VECTOR_TYPE and other.name not in ("position", "rest_position")
+        if other.data_type == VECTOR_TYPE
+        and other.name not in ("position", "rest_position")
+        and not other.name.startswith(".")
     ]
     return f": choose {' or '.join(names)}" if names else ": make or import a field"

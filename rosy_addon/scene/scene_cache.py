@@ -254,7 +254,13 @@ class SceneCache:
                 return _MeshState(surface, field_in_edit_mode, tone)
             original_surface = mesh_surface(original, label, cache=self._cache)
             if _has_same_topology(surface, original_surface):
-                field = self._original_field(original, original_surface, nonfinite, label)
+                field = read_mesh_field(
+                    original,
+                    nonfinite=nonfinite,
+                    label=label,
+                    surface=original_surface,
+                    cache=self._cache,
+                )
                 deformed = bool(user_modifiers(owner) or original.shape_keys)
                 rest_surface = (
                     _with_rest(surface, original_surface.vertices) if deformed else surface
@@ -265,17 +271,6 @@ class SceneCache:
             self._unresolved.add(owner.name)
             return None
         return _MeshState(_with_rest(surface, entry.rest), entry.field, tone)
-
-    def _original_field(
-        self, mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str
-    ) -> RosyField:
-        """Return the field of an original mesh. The mesh may have been edited since it was made."""
-        if is_face_vector_field(mesh):
-            layout = FieldLayout(attribute_name(mesh), field_degree(mesh))
-            return read_evaluated_field(mesh, layout, surface, nonfinite, label, self._cache)
-        return read_mesh_field(
-            mesh, nonfinite=nonfinite, label=label, surface=surface, cache=self._cache
-        )
 
     def _edit_mode_field(
         self,

@@ -45,10 +45,13 @@ class SceneData:
         World space. Instances with a field come first, then occluders.
     objects : list of bpy.types.Object
         The original object of each instance with a field, in the same order.
+    warnings : tuple of str
+        For each object that was left out because its field cannot be drawn: which one, and why.
     """
 
     instances: list[MeshInstance]
     objects: list[bpy.types.Object]
+    warnings: tuple[str, ...] = ()
 
 
 def field_objects(
@@ -108,7 +111,7 @@ def read_scene(
         The evaluated depsgraph of a view layer.
     objects : sequence of bpy.types.Object, optional
         Original objects whose fields are drawn. All other objects only occlude. By default all of
-        `field_objects`.
+        `field_objects` whose fields can be drawn.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     cache : Cache, optional
@@ -119,30 +122,37 @@ def read_scene(
     Raises
     ------
     RosyError
-        If no object has a field, one of the objects is hidden, its field cannot be read or is lost
-        in its modifiers, or no object has the requested tone.
+        If no object has a field that can be drawn, or no object has the requested tone. If one of
+        the given objects is hidden, or its field cannot be read or is lost in its modifiers.
     """
     view_layer = depsgraph.view_layer
+    errors: Errors | None = {} if objects is None else None
     objects = field_objects(view_layer) if objects is None else list(objects)
     if not objects:
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")
     visible_objects = set(_visible_objects(view_layer))
     cache = Cache() if cache is None else cache
-    with temp_attributes(depsgraph, objects, nonfinite, cache) as layouts:
-        reader = _SceneReader(layouts, nonfinite, cache, tone_request)
+    with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
+        reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors)
         for instance in depsgraph.object_instances:
             if _is_rendered(instance, visible_objects):
                 reader.add(instance)
     reader.check_complete(objects)
+    if errors and not reader.field_instances:
+        raise next(iter(errors.values()))
     check_tones(
         tone_request, [(instance.tone, owner) for instance, owner in reader.field_instances]
     )
     return SceneData(
         [instance for instance, _ in reader.field_instances] + reader.occluders,
         [owner for _, owner in reader.field_instances],
+        tuple(f"{error}. It was left out" for error in (errors or {}).values()),
     )
 
+
+#: Why the fields of objects cannot be drawn.
+Errors = dict[bpy.types.Object, RosyError]
 
 #: A surface, its field and its tone. Occluders have neither field nor tone.
 _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None]
@@ -168,8 +178,10 @@ class _SceneReader:
         nonfinite: str,
         cache: Cache,
         tone_request: ToneRequest | None,
+        errors: Errors | None,
     ) -> None:
         self.layouts = layouts
+        self.errors = errors
         self.nonfinite = nonfinite
         self.cache = cache
         self.tone_request = tone_request
@@ -184,7 +196,11 @@ class _SceneReader:
         layout = self.layouts.get(original)
         mesh_key = (obj.data.as_pointer(), original if layout else None)
         if mesh_key not in self.mesh_data:
-            self.mesh_data[mesh_key] = self._read_mesh(obj, layout)
+            try:
+                self.mesh_data[mesh_key] = self._read_mesh(obj, layout)
+            except RosyError as error:
+                record_error(self.errors, original, error)
+                self.mesh_data[mesh_key] = self._read_mesh(obj, None)
         if self.mesh_data[mesh_key] is None:
             return
         surface, field, tone = self.mesh_data[mesh_key]
@@ -218,23 +234,23 @@ class _SceneReader:
             return surface, field, tone
 
     def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:
-        """Raise an error if an object's field was not read."""
+        """Record or raise an error for each object whose field was not read."""
         drawn_objects = {owner for _, owner in self.field_instances}
-        read_objects = {key[1] for key in self.mesh_data}
         for obj in objects:
-            if obj in drawn_objects:
-                continue
-            if obj not in read_objects:
-                raise RosyError(
-                    f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or switch off its drawing"
-                )
-            faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
-            problem = "has no faces" if faceless else f"has no attribute '{self.layouts[obj].name}'"
-            raise RosyError(
-                f"object '{obj.name}': after its modifiers "
-                f"({', '.join(modifier.name for modifier in user_modifiers(obj)) or 'none'}) "
-                f"the mesh {problem}"
+            if obj not in drawn_objects and obj not in (self.errors or ()):
+                record_error(self.errors, obj, RosyError(self._reason(obj)))
+
+    def _reason(self, obj: bpy.types.Object) -> str:
+        """Return why an object's field was not read."""
+        if obj not in {key[1] for key in self.mesh_data}:
+            return (
+                f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or "
+                "switch off its drawing"
             )
+        faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
+        problem = "has no faces" if faceless else f"has no attribute '{self.layouts[obj].name}'"
+        modifiers = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
+        return f"object '{obj.name}': after its modifiers ({modifiers}) the mesh {problem}"
 
 
 @contextmanager
@@ -243,6 +259,7 @@ def temp_attributes(
     objects: Sequence[bpy.types.Object],
     nonfinite: str,
     cache: Cache,
+    errors: Errors | None = None,
 ) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
     """Add temporary attributes that modifiers copy to evaluated meshes, and remove them at exit.
 
@@ -252,6 +269,11 @@ def temp_attributes(
     If a context that is already open covers the same objects, nothing is added again. For many
     calls of `read_scene`, keep one context open around them.
 
+    Parameters
+    ----------
+    errors : dict of bpy.types.Object to RosyError, optional
+        Gets the errors of the fields that cannot be read; these objects are left out.
+
     Yields
     ------
     dict of bpy.types.Object to FieldLayout
@@ -260,7 +282,7 @@ def temp_attributes(
     Raises
     ------
     RosyError
-        If a field cannot be read.
+        If a field cannot be read, and there is no `errors`.
     """
     layouts: dict[bpy.types.Object, FieldLayout] = {}
     rest_enabled: list[bpy.types.Object] = []
@@ -268,7 +290,11 @@ def temp_attributes(
     try:
         for obj in objects:
             mesh = obj.data
-            layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+            try:
+                layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+            except RosyError as error:
+                record_error(errors, obj, error)
+                continue
             deforms = bool(user_modifiers(obj) or mesh.shape_keys)
             if deforms and is_editable(obj) and not obj.add_rest_position_attribute:
                 obj.add_rest_position_attribute = True
@@ -294,6 +320,13 @@ def temp_attributes(
             mesh.update_tag()
         if rest_enabled or temp_meshes:
             depsgraph.update()
+
+
+def record_error(errors: Errors | None, obj: bpy.types.Object, error: RosyError) -> None:
+    """Note why an object's field cannot be drawn, or raise the error if there is no dict for it."""
+    if errors is None:
+        raise error
+    errors[obj] = error
 
 
 def _prepare_field(

@@ -52,18 +52,17 @@ def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
 
 def target_objects(
     scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer
-) -> list[bpy.types.Object]:
-    """Return the objects to draw strokes on: all with a field, or the selected ones among them.
+) -> list[bpy.types.Object] | None:
+    """Return the objects to draw strokes on: the selected ones with a field, or None for all.
 
     Raises
     ------
     RosyError
         If only selected objects are to be drawn, and none of them has a field.
     """
-    objects = field_objects(view_layer)
     if not scene.rosy.strokes.selected:
-        return objects
-    selected = [obj for obj in objects if obj.select_get(view_layer=view_layer)]
+        return None
+    selected = [obj for obj in field_objects(view_layer) if obj.select_get(view_layer=view_layer)]
     if not selected:
         raise RosyError(
             "no selected object has a field: select one with a field, or switch off Selected Only"

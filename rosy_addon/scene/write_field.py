@@ -16,10 +16,12 @@ from .field_attributes import (
     DEFAULT_FIELD_NAME,
     VECTOR_TYPE,
     attribute_name,
-    describe_type,
+    check_attribute_type,
+    get_or_create_attribute,
     is_face_vector_field,
 )
 from .meshes import mesh_surface
+from .rest_shape import store_rest_shape
 
 #: Name of the attribute of a field that is stored as angles.
 DEFAULT_ANGLE_NAME = "rosy_angle"
@@ -110,14 +112,18 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
     if form == "DIRECTIONS" or field.direction_ratios is not None:
         attribute = _write_directions(mesh, field, name)
     elif form == "ANGLE":
-        attribute = _get_or_create_attribute(mesh, name, ANGLE_TYPE)
+        attribute = get_or_create_attribute(mesh, name, ANGLE_TYPE)
         x, y = face_frames(mesh_surface(mesh))
         angle = np.arctan2(dot(field.vectors, y), dot(field.vectors, x))
         angle[~field.vectors.any(axis=1)] = np.nan
         attribute.data.foreach_set("value", angle.astype(np.float32))
     else:
-        attribute = _get_or_create_attribute(mesh, name, VECTOR_TYPE)
+        attribute = get_or_create_attribute(mesh, name, VECTOR_TYPE)
         attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
+    if attribute.data_type == VECTOR_TYPE:
+        attribute_name = attribute.name
+        store_rest_shape(mesh, attribute_name)
+        attribute = mesh.attributes[attribute_name]  # new attributes may have moved it
     if has_rosy_properties():
         mesh.rosy.degree = field.degree
         if attribute.name == name:
@@ -141,13 +147,13 @@ def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str
             "store them"
         )
     if has_free_directions and name in mesh.attributes:
-        _check_attribute_type(mesh, name, VECTOR_TYPE)
+        check_attribute_type(mesh, name, VECTOR_TYPE)
     names = [name]
     if form == "DIRECTIONS" or has_free_directions:
         names = [f"dir{index}" for index in range(field.degree)]
     for new_name in names:
         is_new = new_name not in mesh.attributes
-        attribute = _get_or_create_attribute(
+        attribute = get_or_create_attribute(
             mesh, new_name, ANGLE_TYPE if form == "ANGLE" else VECTOR_TYPE
         )
         if is_new:
@@ -170,38 +176,9 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
         mesh.attributes.remove(mesh.attributes[f"dir{extra_index}"])
         extra_index += 1
     for direction_name, vectors in zip(names, directions.swapaxes(0, 1), strict=True):
-        attribute = _get_or_create_attribute(mesh, direction_name, VECTOR_TYPE)
+        attribute = get_or_create_attribute(mesh, direction_name, VECTOR_TYPE)
         attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
     return mesh.attributes["dir0"]
-
-
-def _check_attribute_type(mesh: bpy.types.Mesh, name: str, data_type: str) -> None:
-    """Raise an error if an attribute exists and is not of the given type on faces."""
-    attribute = mesh.attributes.get(name)
-    if attribute is not None and (attribute.domain, attribute.data_type) != ("FACE", data_type):
-        raise RosyError(
-            f"mesh '{mesh.name}' already has an attribute '{name}' of another type "
-            f"({describe_type(attribute)}): remove it, or choose another name for the field"
-        )
-
-
-def _get_or_create_attribute(
-    mesh: bpy.types.Mesh, name: str, data_type: str
-) -> bpy.types.Attribute:
-    """Return the attribute of a name and type on faces, and create it if it is missing."""
-    _check_attribute_type(mesh, name, data_type)
-    attribute = mesh.attributes.get(name)
-    if attribute is None:
-        old_names = set(mesh.attributes.keys())
-        attribute = mesh.attributes.new(name, data_type, "FACE")
-        if attribute is None or attribute.name != name:
-            # Blender may have made one of another name, and not say so.
-            for new_name in set(mesh.attributes.keys()) - old_names:
-                mesh.attributes.remove(mesh.attributes[new_name])
-            raise RosyError(
-                f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose another one"
-            )
-    return attribute
 
 
 def _check_writable(mesh: bpy.types.Mesh) -> None:

@@ -1,0 +1,76 @@
+"""Carry the vectors of faces along when a mesh is moved, turned or deformed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .frames import dot, normalize, tangent_frame
+from .representation import complex_bincount
+from .surface import Surface, mean_per_face
+
+#: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
+#: vectors are not tangent to the face and stay as they are.
+MAX_SINE = 0.87
+
+#: Changes of a vector below this fraction of its length are rounding errors and are not made.
+ROUNDING = 3e-6
+
+
+def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Rotate the vectors of faces as the faces were rotated.
+
+    The rotation of a face is the one that takes its corners closest to their new positions, in the
+    plane of the face (least squares). Lengths are kept.
+
+    Parameters
+    ----------
+    surface : Surface
+        The mesh after the motion.
+    rest_vertices : (V, 3) array_like
+        The positions of its vertices before.
+    vectors : (F, 3) or (F, N, 3) ndarray
+        Tangent vectors before the motion.
+
+    Returns
+    -------
+    ndarray
+        float64, in the shape of `vectors`. Vectors of faces that have not moved, or have no area
+        before or after, are the same as before.
+    """
+    result = np.array(vectors, dtype=np.float64)
+    rest_vertices = np.asarray(rest_vertices, dtype=np.float64)
+    moved_corner = (rest_vertices != surface.vertices).any(axis=1)[surface.corner_vertex]
+    moved = np.logical_or.reduceat(moved_corner, surface.face_start[:-1])
+    rest = replace(surface, vertices=rest_vertices, rest_vertices=None)
+    old_frame, old_offset = _planar_corners(rest)
+    new_frame, new_offset = _planar_corners(surface)
+    covariance = complex_bincount(
+        surface.corner_face, new_offset * old_offset.conj(), surface.face_count
+    )
+    has_area = rest.face_normal.any(axis=1) & surface.face_normal.any(axis=1)
+    face = np.flatnonzero(moved & has_area & (covariance != 0))
+    rotation = covariance[face] / np.abs(covariance[face])
+    before = result.reshape(surface.face_count, -1, 3)[face]
+    (old_x, old_y), (new_x, new_y) = (
+        [axis[face, None] for axis in frame] for frame in (old_frame, new_frame)
+    )
+    with np.errstate(invalid="ignore", over="ignore"):  # vectors that are not finite stay
+        z = (dot(before, old_x) + 1j * dot(before, old_y)) * rotation[:, None]
+        length = np.sqrt(dot(before, before))
+        after = normalize(z.real[..., None] * new_x + z.imag[..., None] * new_y) * length[..., None]
+        change = np.sqrt(dot(after - before, after - before))
+        tangent = np.abs(z) >= np.sqrt(1 - MAX_SINE**2) * length
+        carried = np.isfinite(length) & tangent & (change > ROUNDING * length)
+    result.reshape(surface.face_count, -1, 3)[face] = np.where(carried[..., None], after, before)
+    return result
+
+
+def _planar_corners(surface: Surface) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """The tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
+    x, y = tangent_frame(surface.face_normal)
+    face = surface.corner_face
+    points = surface.vertices[surface.corner_vertex]
+    points = points - mean_per_face(points, surface.face_start)[face]
+    return (x, y), dot(points, x[face]) + 1j * dot(points, y[face])

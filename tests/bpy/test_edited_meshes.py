@@ -1,0 +1,187 @@
+"""Fields on meshes that were turned, joined, edited, or had modifiers applied, since they were made."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.projection.project import project
+from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.read_field import read_mesh_field
+from rosy.rosy_addon.scene.scene_cache import SceneCache
+from rosy.rosy_addon.scene.scene_reader import read_instances
+from rosy.rosy_addon.scene.write_field import write_mesh_field
+from scenes import add_field, add_monkey, add_plane, aim, member_vectors, set_vectors
+
+#: Turned about all axes, so that no symmetry of the objects hides a mistake.
+ANGLES = (0.5, -0.3, 1.1)
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def projected(camera, instances=None):
+    instances = read_instances(depsgraph()) if instances is None else instances
+    return project(instances, camera_of_object(bpy.context.scene, depsgraph(), camera))
+
+
+def live_instances():
+    cache, graph = SceneCache(), depsgraph()
+    cache.read(graph)
+    cache.resolve_topologies(graph)
+    return [state.instance for state in cache.read(graph)], cache.errors
+
+
+def assert_same_directions(first, second, degrees=0.5, percentile=99.0):
+    """Most directions of two G-buffers are the same."""
+    same = np.intersect1d(first.pixel, second.pixel, return_indices=True)[1:]
+    assert len(same[0]) > 0.99 * len(first.pixel)
+    z, w = first.representation[same[0]], second.representation[same[1]]
+    usable = np.abs(z) > 1e-3 * np.abs(z).max()
+    error = np.degrees(np.abs(np.angle(z * w.conj()))) / 4
+    assert np.percentile(error[usable], percentile) < degrees
+
+
+def select_only(*objects):
+    bpy.ops.object.select_all(action="DESELECT")
+    for obj in objects:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def apply_transform(obj):
+    select_only(obj)
+    bpy.ops.object.transform_apply(location=True, rotation=True, scale=True)
+
+
+def apply_modifiers(obj):
+    select_only(obj)
+    for modifier in list(obj.modifiers):
+        bpy.ops.object.modifier_apply(modifier=modifier.name)
+
+
+@pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (0.7, 0.7, 0.7)])
+def test_applied_transforms(scene, camera, monkey, form, scale):
+    write_mesh_field(monkey.data, read_mesh_field(monkey.data), "field", form)
+    monkey.data.attributes.remove(monkey.data.attributes["rosy"])
+    monkey.rotation_euler, monkey.scale, monkey.location = ANGLES, scale, (0.2, 0.0, -0.1)
+    before = projected(camera)
+    apply_transform(monkey)
+    after = projected(camera)
+    assert_same_directions(before, after, degrees=0.1)
+    instances, errors = live_instances()
+    assert not errors
+    assert_same_directions(after, projected(camera, instances), degrees=1e-3)
+
+
+def test_joined_objects(scene, camera, monkey):
+    other = add_field(add_monkey((0.9, 0.3, 0.4)))
+    other.rotation_euler, other.scale = ANGLES, (0.6, 0.6, 0.6)
+    before = projected(camera)
+    select_only(monkey, other)
+    bpy.ops.object.join()
+    assert_same_directions(before, projected(camera), degrees=0.1)
+
+
+@pytest.mark.parametrize(
+    "modifiers", [["SUBSURF"], ["MIRROR"], ["MIRROR", "SUBSURF"], ["SIMPLE_DEFORM"], ["ARRAY"]]
+)
+def test_applied_modifiers(scene, camera, monkey, modifiers):
+    for kind in modifiers:
+        modifier = monkey.modifiers.new(kind, kind)
+        if kind == "MIRROR":
+            modifier.use_axis = (False, True, False)
+            monkey.location.z = -0.5
+        if kind == "SIMPLE_DEFORM":
+            modifier.angle = 0.5
+    aim(camera, (-3.0, -5.0, 2.0))
+    before = projected(camera)
+    apply_modifiers(monkey)
+    assert not monkey.modifiers
+    # The twist and the smoothing also shear the faces, which only the modifiers themselves show.
+    assert_same_directions(before, projected(camera), degrees=3.0, percentile=90)
+    monkey.rotation_euler = ANGLES
+    before = projected(camera)
+    apply_transform(monkey)
+    assert_same_directions(before, projected(camera), degrees=0.1)
+
+
+def test_faces_that_are_turned_in_edit_mode(scene, camera, monkey):
+    before = projected(camera)
+    select_only(monkey)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.rotate(value=0.4, orient_axis="Y")
+    in_edit_mode = projected(camera)
+    in_edit_mode_live = projected(camera, live_instances()[0])
+    bpy.ops.object.mode_set(mode="OBJECT")
+    after = projected(camera)
+    assert_same_directions(after, in_edit_mode, degrees=1e-3)
+    assert_same_directions(after, in_edit_mode_live, degrees=1e-3)
+    assert len(np.setdiff1d(before.pixel, after.pixel))  # the mesh did turn
+
+
+def test_vectors_that_were_stored_later_are_not_turned(scene):
+    """A script turns a plane within itself, and then stores vectors for it as it is now."""
+    plane = add_field(add_plane(), kind="axis", degree=1, axis=(1.0, 0.0, 0.0))
+    plane.rotation_euler = (0.0, 0.5, 0.0)
+    apply_transform(plane)
+    turned = read_mesh_field(plane.data).vectors
+    np.testing.assert_allclose(turned, [[np.cos(0.5), 0, -np.sin(0.5)]], atol=1e-6)
+    set_vectors(plane.data, [[0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(read_mesh_field(plane.data).vectors, [[0, 0, 1]], atol=1e-6)
+
+
+def test_an_unchanged_mesh_reads_what_was_stored(scene, monkey):
+    stored = member_vectors(monkey.data)
+    np.testing.assert_array_equal(read_mesh_field(monkey.data).vectors.astype("f4"), stored)
+    hidden = [a.name for a in monkey.data.attributes if a.name.startswith(".rosy")]
+    assert hidden == [".rosy_rest", ".rosy_check"]
+
+
+@pytest.fixture
+def broken(scene, monkey):
+    """A monkey whose field has lost its frame, and cannot be repaired, beside a good one."""
+    other = add_monkey((2.5, 0.0, 0.0))
+    other.name = "Broken"
+    vectors = np.roll(member_vectors(add_field(other).data), 1, axis=1)
+    for name in [a.name for a in other.data.attributes if "rosy" in a.name]:
+        other.data.attributes.remove(other.data.attributes[name])
+    set_vectors(other.data, vectors)
+    return other
+
+
+def test_one_bad_object_is_left_out_by_name(scene, camera, monkey, broken):
+    (result,) = bake(scene)
+    assert result.objects == (monkey,)
+    (warning,) = (text for text in result.warnings if "Broken" in text)
+    assert "object 'Broken'" in warning and "left out" in warning and "again" in warning
+    instances, errors = live_instances()
+    assert [instance.field is not None for instance in instances] == [True]
+    assert list(errors) == ["Broken"]
+    assert errors["Broken"] in warning
+
+
+def test_a_bad_object_that_was_asked_for_is_an_error(scene, camera, monkey, broken):
+    with pytest.raises(RosyError, match=r"'Broken'.*not tangent"):
+        bake(scene, objects=[monkey, broken])
+    monkey.rosy.include = False
+    with pytest.raises(RosyError, match=r"'Broken'.*not tangent"):
+        bake(scene)
+
+
+@pytest.mark.parametrize("modifier", ["REMESH", "MASK"])
+def test_an_object_whose_modifiers_lose_the_field_is_left_out(scene, camera, monkey, modifier):
+    other = add_field(add_monkey((2.5, 0.0, 0.0)))
+    other.modifiers.new("Loses", modifier)
+    if modifier == "MASK":
+        other.modifiers[0].vertex_group = other.vertex_groups.new(name="none").name
+    (result,) = bake(scene)
+    assert result.objects == (monkey,)
+    assert any(f"'{other.name}'" in warning and "Loses" in warning for warning in result.warnings)
+    assert mesh_surface(other.data).face_count

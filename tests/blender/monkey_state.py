@@ -298,7 +298,8 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
 }
 
 #: Names of attributes that hold fields.
-FIELD_NAMES = ("rosy", "rosy_angle", "dir[0-9]", "dir[0-9][0-9]")
+_FORMS = ("rosy", "rosy_angle", "dir[0-9]", "dir[0-9][0-9]")
+FIELD_NAMES = (*_FORMS, ".*_rest", ".*_check")
 
 
 def allowed_changes(operator: str, attribute: str | None = None) -> list[str]:

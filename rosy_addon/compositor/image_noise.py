@@ -27,6 +27,9 @@ TILE_PIXELS = 256
 #: Maximum number of pixels of a noise image that is cached for the next picture.
 MAX_CACHED_PIXELS = 1 << 22
 
+#: Rows or columns that are blurred together. Their sums fit the caches of the processor.
+BLUR_LINES = 32
+
 #: Sample points along each side of a pixel. Noise is averaged over their square grid.
 TAPS_PER_SIDE = 3
 
@@ -212,7 +215,12 @@ def gaussian_blur(
     """
     radius = box_radius(sigma)
     for axis in (0, 1, 0, 1, 0, 1):
-        image = _box_filter(image, radius, axis, outside)
+        blurred = np.empty(image.shape, dtype=np.float32)
+        for start in range(0, image.shape[1 - axis], BLUR_LINES):
+            lines = [slice(None), slice(None)]
+            lines[1 - axis] = slice(start, start + BLUR_LINES)
+            blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)
+        image = blurred
     return image
 
 
@@ -229,7 +237,7 @@ def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.n
     )
     mean = after - before
     mean /= window
-    return mean.astype(np.float32)
+    return mean
 
 
 @lru_cache(maxsize=64)

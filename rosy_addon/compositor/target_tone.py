@@ -135,7 +135,7 @@ def check_tone(
     Parameters
     ----------
     look : Look
-    body_tones : sequence of SurfaceTone or None
+    instance_tones : sequence of SurfaceTone or None
         Tones of the mesh instances.
     reference : ReferenceRender or None
 

@@ -11,7 +11,7 @@ from ..progress import Task, run_to_completion
 from .connection import build_connection, laplacian
 from .directional_field import field_matching
 from .frames import normalize
-from .generate import compute_magnitude
+from .generate import MIN_SMOOTHING_LENGTH, compute_magnitude
 from .guided import conjugate_gradient_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
@@ -67,7 +67,7 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
         field = change_degree(surface, field, conversion.degree)
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
-    if conversion.smoothing_length:
+    if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
         time = (conversion.smoothing_length * surface.extent) ** 2
         field = yield from diffuse_task(surface, field, max(time, np.finfo(np.float64).tiny))
     magnitude = conversion.magnitude

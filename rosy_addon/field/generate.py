@@ -33,6 +33,9 @@ from .surface import Surface, build_surface, sum_per_face
 #: The smallest number whose inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
 
+#: Smallest distance of smoothing, relative to `Surface.extent`. Shorter ones change nothing.
+MIN_SMOOTHING_LENGTH = 1e-6
+
 #: Kinds of generated fields, with the descriptions shown in the interface.
 GENERATORS = {
     "smoothest": "The smoothest field, with few singularities",
@@ -98,6 +101,10 @@ class GeneratorSettings:
     axis_guides: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
     uv: np.ndarray | None = None
     vectors: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.smoothing_length < MIN_SMOOTHING_LENGTH:
+            object.__setattr__(self, "smoothing_length", 0.0)
 
 
 def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -> RosyField:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from shapes import cylinder, from_quads, from_triangles, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
+from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.generate import (
@@ -233,6 +234,21 @@ def test_the_length_of_an_axis_does_not_count(length):
     surface = icosphere(1)
     vectors = axis_field(surface, 4, (length, 0, -length)).vectors
     np.testing.assert_array_equal(vectors, axis_field(surface, 4, (1, 0, -1)).vectors)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("length", [1e-320, 1e-160, 1e-9])
+def test_smoothing_over_no_distance_changes_nothing(length):
+    surface = torus()
+    settings = GeneratorSettings("curvature", smoothing_length=length)
+    vectors = generate(surface, settings, 4).vectors
+    np.testing.assert_array_equal(vectors, curvature_field(surface, 4).vectors)
+    guides = GeneratorSettings("guided", smoothing_length=length, vectors=vectors)
+    exact = GeneratorSettings("guided", vectors=vectors)
+    expected = generate(surface, exact, 4).vectors
+    np.testing.assert_array_equal(generate(surface, guides, 4).vectors, expected)
+    again = convert(surface, RosyField(4, vectors), Conversion(smoothing_length=length))
+    np.testing.assert_array_equal(again.vectors, vectors)
 
 
 def test_faces_perpendicular_to_an_axis_are_undefined():

@@ -88,8 +88,8 @@ def compose_task(
     layers = []
     degrees = np.unique(np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]).tolist()
     for layer_index, degree in enumerate(degrees):
-        field = stages.pixel_field(degree, pixel_look)
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
+        field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
         images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
         layer = _build_layer(field, pixel_look, images)
         entries = field.gbuffer_index
@@ -169,7 +169,7 @@ def _line_modulation_task(
     if has_breaks(look):
         break_images = yield from stages.lic_task(field, replace(look, length=break_steps(look)))
     if has_paper_grain(look):
-        paper_grain = _paper_grain(stages, field, look)
+        paper_grain = yield from _paper_grain_task(stages, field, look)
     if has_overshoot(look):
         line_tones = yield from _tone_along_lines_task(field, look, tone)
     outline = stages.outline(field, look) if has_outline(look) else None
@@ -191,7 +191,7 @@ def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> T
     return np.clip(means, 0, 1)
 
 
-def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.ndarray:
+def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> Task[np.ndarray]:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
@@ -199,7 +199,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
         return picture_paper_grain(
             field.pixel, field.width, grain, look.seed, subpixels, field.line_count
         )
-    heights = stages.surface_paper_grain(field, look) - np.float32(NOISE_MEAN)
+    heights = (yield from stages.surface_paper_grain_task(field, look)) - np.float32(NOISE_MEAN)
     heights /= np.float32(look_streak_statistics(look).paper_grain_std)
     return heights.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion
+
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
 
@@ -199,6 +201,13 @@ def box_radius(sigma: float) -> int:
 def gaussian_blur(
     image: np.ndarray, sigma: float, outside: Literal["edge", "mean"] = "edge"
 ) -> np.ndarray:
+    """Blur an image, without progress reports; see `gaussian_blur_task`."""
+    return run_to_completion(gaussian_blur_task(image, sigma, outside))
+
+
+def gaussian_blur_task(
+    image: np.ndarray, sigma: float, outside: Literal["edge", "mean"] = "edge"
+) -> Task[np.ndarray]:
     """Approximate a Gaussian blur by three box filters.
 
     Parameters
@@ -214,9 +223,10 @@ def gaussian_blur(
     (H, W) float32 ndarray
     """
     radius = box_radius(sigma)
-    for axis in (0, 1, 0, 1, 0, 1):
+    for index, axis in enumerate((0, 1, 0, 1, 0, 1)):
         blurred = np.empty(image.shape, dtype=np.float32)
         for start in range(0, image.shape[1 - axis], BLUR_LINES):
+            yield Progress((index + start / image.shape[1 - axis]) / 6, "making noise")
             lines = [slice(None), slice(None)]
             lines[1 - axis] = slice(start, start + BLUR_LINES)
             blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)

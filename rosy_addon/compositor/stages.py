@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..cache import Cache
-from ..progress import Task
+from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
 from .lic import lic_task, noise_args
 from .lic_images import LicImages
@@ -16,8 +16,11 @@ from .look_units import cell_size_args
 from .outline import outline_coverage
 from .paper_grain import surface_paper_grain_args
 from .pixel_field import PixelField, surface_pixel_field
-from .surface_noise import surface_noise
-from .wobble import has_wobble, rotate_pixel_field, wobble_angle
+from .surface_noise import surface_noise_task
+from .wobble import has_wobble, rotate_pixel_field, wobble_angle_task
+
+#: Share of the progress of LIC that the noise takes.
+NOISE_SHARE = 0.3
 
 
 class ComposeStages:
@@ -37,7 +40,7 @@ class ComposeStages:
         self._gbuffer = gbuffer
         self._cache = cache
 
-    def pixel_field(self, degree: int, look: Look) -> PixelField:
+    def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
         """Pixel field of one degree, rotated by the wobble of the look."""
         settings = look.crease_angle, look.cross_creases
         field = self._cache.get_or_create(
@@ -46,17 +49,18 @@ class ComposeStages:
         )
         if not has_wobble(look):
             return field
-        angle = self._wobble_angle(look)[field.gbuffer_index]
-        return rotate_pixel_field(field, np.float32(look.wobble) * angle)
+        angle = yield from self._wobble_angle_task(look)
+        return rotate_pixel_field(field, np.float32(look.wobble) * angle[field.gbuffer_index])
 
     def lic_task(self, field: PixelField, look: Look) -> Task[LicImages]:
         """Compute the LIC images of the members of a field, or find them in the cache."""
-        return (
-            yield from self._cache.get_or_create_task(
-                ("LIC images", self._gbuffer, field.degree, lic_key(look)),
-                lambda: lic_task(field, look, self._noise(field, look)),
-            )
-        )
+
+        def compute_task() -> Task[LicImages]:
+            noise = yield from subtask(self._noise_task(field, look), 0.0, NOISE_SHARE)
+            return (yield from subtask(lic_task(field, look, noise), NOISE_SHARE, 1.0))
+
+        key = "LIC images", self._gbuffer, field.degree, lic_key(look)
+        return (yield from self._cache.get_or_create_task(key, compute_task))
 
     def outline(self, field: PixelField, look: Look) -> np.ndarray:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
@@ -66,30 +70,30 @@ class ComposeStages:
         )
         return coverage[field.gbuffer_index]
 
-    def surface_paper_grain(self, field: PixelField, look: Look) -> np.ndarray:
+    def surface_paper_grain_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
         """(P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
 
         They are not normalized: the mean is `NOISE_MEAN`.
         """
-        return self._surface_noise(field, surface_paper_grain_args(look) | cell_size_args(look))
+        args = surface_paper_grain_args(look) | cell_size_args(look)
+        return self._surface_noise_task(field, args)
 
-    def _noise(self, field: PixelField, look: Look) -> np.ndarray | None:
+    def _noise_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:
         """(P, K) float32 noise anchored to the surface. None if the look uses image-space noise."""
         if look.anchor == "picture":
             return None
-        return self._surface_noise(field, noise_args(look) | cell_size_args(look))
+        args = noise_args(look) | cell_size_args(look)
+        return (yield from self._surface_noise_task(field, args))
 
-    def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
-        """(P, K) float32 noise at the pixels of a field; see `surface_noise`."""
-        noise = self._cache.get_or_create(
+    def _surface_noise_task(self, field: PixelField, args: dict[str, Any]) -> Task[np.ndarray]:
+        """(P, K) float32 noise at the pixels of a field; see `surface_noise_task`."""
+        noise = yield from self._cache.get_or_create_task(
             ("surface noise", self._gbuffer, *sorted(args.items())),
-            lambda: surface_noise(self._gbuffer, **args),
+            lambda: surface_noise_task(self._gbuffer, **args),
         )
         return noise[field.gbuffer_index]
 
-    def _wobble_angle(self, look: Look) -> np.ndarray:
-        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
-        return self._cache.get_or_create(
-            ("wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()),
-            lambda: wobble_angle(self._gbuffer, look),
-        )
+    def _wobble_angle_task(self, look: Look) -> Task[np.ndarray]:
+        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle_task`."""
+        key = "wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()
+        return self._cache.get_or_create_task(key, lambda: wobble_angle_task(self._gbuffer, look))

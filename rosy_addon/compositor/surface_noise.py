@@ -13,12 +13,21 @@ from __future__ import annotations
 import zlib
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.rest_coordinates import matrix_scale, rest_coordinates
-from .image_noise import BLUR_FACTOR, NOISE_MEAN, NOISE_STD, box_radius, gaussian_blur, hash_bits_nd
+from ..projection.rest_coordinates import matrix_scale, rest_coordinates_task
+from .image_noise import (
+    BLUR_FACTOR,
+    NOISE_MEAN,
+    NOISE_STD,
+    box_radius,
+    gaussian_blur_task,
+    hash_bits_nd,
+)
 from .per_pixel_lic import pixel_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
@@ -47,7 +56,12 @@ MAX_CELL_BITS = 28
 OCTAVE_OFFSET = 64
 
 
-def surface_noise(
+def surface_noise(gbuffer: GBuffer, *args: Any, **settings: Any) -> np.ndarray:
+    """Make noise, without progress reports; see `surface_noise_task`."""
+    return run_to_completion(surface_noise_task(gbuffer, *args, **settings))
+
+
+def surface_noise_task(
     gbuffer: GBuffer,
     grain: float,
     seed: int,
@@ -57,7 +71,7 @@ def surface_noise(
     high_pass: float,
     pixel: float = 0.0,
     smallest: float = 0.0,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Make noise that is anchored to the surfaces of a G-buffer.
 
     Parameters
@@ -84,29 +98,29 @@ def surface_noise(
     (P, channels) float32 ndarray
         With the mean `NOISE_MEAN`, as for `image_noise`.
     """
-    rest = rest_coordinates(gbuffer)
-    scale = cell_scale(gbuffer, rest.pixel_size, pixel, smallest / grain)
-    level = np.log2(np.maximum(rest.pixel_size * scale, 1e-30) * np.float32(grain * LATTICE_SCALE))
-    instance_hash = instance_hashes(gbuffer.instance_names)[gbuffer.instance_id]
-    total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
-    for block in pixel_blocks(len(gbuffer.pixel)):
-        block_rest = rest.block(block)
-        lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
-        _accumulate_octaves(
-            total[:, block], lattice, level[block], instance_hash[block], seed, density
-        )
+    rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.3)
+    instance_hash = instance_hashes(gbuffer.instance_names)
     # The variance of a mean along a streamline is proportional to the size of cells. The factor
     # keeps it at that of cells of the size `grain`.
     normalization = np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
-    total *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
+    total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
+    for block in pixel_blocks(len(gbuffer.pixel)):
+        yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), "making noise")
+        block_rest = rest.block(block)
+        scale = cell_scale(gbuffer, block, block_rest.pixel_size, pixel, smallest / grain)
+        size = np.maximum(block_rest.pixel_size * scale, 1e-30)
+        level = np.log2(size * np.float32(grain * LATTICE_SCALE))
+        lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+        block_hash = instance_hash[gbuffer.instance_id[block]]
+        _accumulate_octaves(total[:, block], lattice, level, block_hash, seed, density)
+        total[:, block] *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     if high_pass:
-        for channel_noise in total:
-            channel_noise -= _low_frequencies(gbuffer, channel_noise, BLUR_FACTOR * high_pass)
+        yield from subtask(_high_pass_task(gbuffer, total, BLUR_FACTOR * high_pass), 0.6, 1.0)
     return np.ascontiguousarray(total.T) + np.float32(NOISE_MEAN)
 
 
 def cell_scale(
-    gbuffer: GBuffer, size: np.ndarray, pixel_size: float, min_scale: float
+    gbuffer: GBuffer, pixels: slice, size: np.ndarray, pixel_size: float, min_scale: float
 ) -> np.ndarray | np.float32:
     """Compute the factor by which lengths on screen differ from their values in pixels.
 
@@ -114,8 +128,10 @@ def cell_scale(
     ----------
     gbuffer : GBuffer
         With its mesh instances.
-    size : (P,) float32 ndarray
-        `RestCoordinates.pixel_size`.
+    pixels : slice
+        The n pixels to compute it for.
+    size : (n,) float32 ndarray
+        `RestCoordinates.pixel_size` of these pixels.
     pixel_size : float
         Size in Blender units that replaces a pixel as the unit of lengths. 0 keeps pixels.
     min_scale : float
@@ -123,7 +139,7 @@ def cell_scale(
 
     Returns
     -------
-    (P,) float32 ndarray, or 1 if `pixel_size` is 0
+    (n,) float32 ndarray, or 1 if `pixel_size` is 0
     """
     if not pixel_size:
         return np.float32(1)
@@ -132,7 +148,7 @@ def cell_scale(
         dtype=np.float32,
     )
     return np.maximum(
-        instance_scale[gbuffer.instance_id] / np.maximum(size, 1e-30), np.float32(min_scale)
+        instance_scale[gbuffer.instance_id[pixels]] / np.maximum(size, 1e-30), np.float32(min_scale)
     )
 
 
@@ -216,15 +232,23 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
 
 
-def _low_frequencies(gbuffer: GBuffer, values: np.ndarray, sigma: float) -> np.ndarray:
-    """(P,) values after a Gaussian blur that ignores pixels outside the G-buffer."""
+def _high_pass_task(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> Task[None]:
+    """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
     row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
     # The empty margin is as wide as the support of the blur.
     margin = 3 * box_radius(sigma)
     bottom, left = int(row[0]) - margin, int(column.min()) - margin
     shape = int(row[-1]) - bottom + 1 + margin, int(column.max()) - left + 1 + margin
     index = (row - bottom) * np.int32(shape[1]) + (column - left)
-    sums, weights = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
-    sums.reshape(-1)[index], weights.reshape(-1)[index] = values, 1
-    sums, weights = gaussian_blur(sums, sigma), gaussian_blur(weights, sigma)
-    return sums.reshape(-1).take(index) / np.maximum(weights.reshape(-1).take(index), 1e-3)
+
+    def blurred_task(values: np.ndarray | int, part: int) -> Task[np.ndarray]:
+        """(P,) blurred values of the pixels, 0 outside."""
+        image = np.zeros(shape, dtype=np.float32)
+        image.reshape(-1)[index] = values
+        start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
+        image = yield from subtask(gaussian_blur_task(image, sigma), start, stop)
+        return image.reshape(-1).take(index)
+
+    weight = np.maximum((yield from blurred_task(1, 0)), 1e-3)
+    for part, channel in enumerate(channels, start=1):
+        channel -= (yield from blurred_task(channel, part)) / weight

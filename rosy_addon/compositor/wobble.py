@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..deterministic_trig import cos_sin, unit_phasor
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.rest_coordinates import rest_coordinates
+from ..projection.rest_coordinates import RestCoordinates, rest_coordinates_task
 from .look import Look, is_hatched
 from .look_units import cell_size_args
 from .pixel_field import PixelField
@@ -61,6 +62,11 @@ def wave_table() -> np.ndarray:
 
 
 def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
+    """Compute the wobble, without progress reports; see `wobble_angle_task`."""
+    return run_to_completion(wobble_angle_task(gbuffer, look))
+
+
+def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     """Compute the angle between lines and field at `Look.wobble` 1.
 
     Parameters
@@ -75,22 +81,34 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
     (P,) float32 ndarray
         Radians, with a mean of about 0 and a standard deviation of about `WOBBLE_STD`.
     """
+    count = len(gbuffer.pixel)
+    wavelength = np.float32(look.grain * MEAN_WAVELENGTH_GRAINS)
+    rest = None
     if look.anchor == "surface":
-        rest = rest_coordinates(gbuffer)
-        cell_size = cell_size_args(look)
-        min_scale = cell_size["smallest"] / look.grain
-        scale = cell_scale(gbuffer, rest.pixel_size, cell_size["pixel"], min_scale)
-        position, size = rest.at_offset(0, 0), rest.pixel_size * scale
-    else:
-        row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
-        position = np.stack([column, row, 0 * row]).astype(np.float32)
-        size = np.ones(len(row), dtype=np.float32)
-    level = np.log2(np.maximum(size, 1e-30) * np.float32(look.grain * MEAN_WAVELENGTH_GRAINS))
-    angle = np.empty(len(level), dtype=np.float32)
-    for start in range(0, len(level), BLOCK_PIXELS):
+        rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.5)
+    angle = np.empty(count, dtype=np.float32)
+    for start in range(0, count, BLOCK_PIXELS):
+        yield Progress(0.5 + 0.5 * start / count, "bending lines")
         block = slice(start, start + BLOCK_PIXELS)
-        angle[block] = _wave_sum(position[:, block], level[block])
+        if rest is None:
+            row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
+            position = np.stack([column, row, 0 * row]).astype(np.float32)
+            size = np.ones(len(row), dtype=np.float32)
+        else:
+            position, size = _rest_position(gbuffer, block, rest.block(block), look)
+        level = np.log2(np.maximum(size, 1e-30) * wavelength)
+        angle[block] = _wave_sum(position, level)
     return np.float32(WOBBLE_STD) * angle
+
+
+def _rest_position(
+    gbuffer: GBuffer, pixels: slice, rest: RestCoordinates, look: Look
+) -> tuple[np.ndarray, np.ndarray]:
+    """(3, n) float32 positions of n pixels on the rest shapes, and (n,) sizes of pixels there."""
+    cell_size = cell_size_args(look)
+    min_scale = cell_size["smallest"] / look.grain
+    scale = cell_scale(gbuffer, pixels, rest.pixel_size, cell_size["pixel"], min_scale)
+    return rest.at_offset(0, 0), rest.pixel_size * scale
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
+from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer, MeshInstance
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
@@ -76,6 +77,11 @@ class RestCoordinates:
 
 
 def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
+    """Compute rest coordinates, without progress reports; see `rest_coordinates_task`."""
+    return run_to_completion(rest_coordinates_task(gbuffer))
+
+
+def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
     """Compute the positions of the pixels of a G-buffer on the rest shapes.
 
     Parameters
@@ -93,13 +99,16 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
         rest_corners=tuple(np.empty((3, count), dtype=np.float32) for _ in range(3)),
         pixel_size=np.empty(count, dtype=np.float32),
     )
+    done = 0
     for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
         pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
         for start in range(0, len(pixels), BLOCK_PIXELS):
             block = pixels[start : start + BLOCK_PIXELS]
+            yield Progress((done + start) / count, "finding points on the surface")
             _fill_pixels(coordinates, gbuffer, instance, rest, block)
+        done += len(pixels)
     return coordinates
 
 

@@ -64,6 +64,13 @@ class Case:
     kill_when_writing: bool = False
     own_process: bool = False
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the run ends at a moment that differs from one run to the next."""
+        return (
+            self.interrupt_after is not None or self.kill_after is not None
+        ) or self.kill_when_writing
+
     def may_write(self, name: str) -> bool:
         """Whether the run may write a file."""
         folders = (output for output in self.outputs if output.endswith("/"))

@@ -115,7 +115,8 @@ def _run_case(arguments: tuple[str, int, Path]) -> Outcome:
         case = make_case(category, seed, folder)
         run = execute(case, folder)
         verdict, reason = judge(case, run, folder)
-        if verdict is Verdict.DONE and seed % round(1 / REPEATED_SHARE) == 0:
+        is_repeated = seed % round(1 / REPEATED_SHARE) == 0 and not case.is_stopped
+        if verdict is Verdict.DONE and is_repeated:
             again = Path(parent) / "again"
             again.mkdir()
             repeated = execute(make_case(category, seed, again), again)

@@ -52,10 +52,9 @@ DEPTH_BUFFER_BYTES, FRAGMENT_BYTES = 18, 30
 #: Bytes of a triangle: while its corners are computed, and of its connectivity, which is kept.
 TRIANGLE_BYTES, KEPT_TRIANGLE_BYTES = 145, 35
 
-#: Bytes of a visible sample while noise is made that is anchored to the surface: with lengths in
-#: pixels, and in Blender units. Bytes of a sample of the rectangle around the visible samples while
-#: noise is made that is anchored to the picture.
-SURFACE_NOISE_BYTES, WORLD_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 225, 34
+#: Bytes of a visible sample while noise is made that is anchored to the surface, and of a sample of
+#: the rectangle around the visible samples while noise is made that is anchored to the picture.
+SURFACE_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 34
 
 #: Bytes of a visible sample with the methods "members" and "brute", and of each of its lines or
 #: directions there.
@@ -215,8 +214,7 @@ def _lic_bytes(
     frame = camera.width * camera.height
     visible = frame * coverage.visible
     if look.anchor == "surface":
-        each = SURFACE_NOISE_BYTES if look.unit == "pixels" else WORLD_NOISE_BYTES
-        noise = each * visible
+        noise = SURFACE_NOISE_BYTES * visible
     else:
         window = frame * coverage.columns * coverage.rows
         noise = IMAGE_NOISE_BYTES * window + (12 + 4 * noise_channels) * visible

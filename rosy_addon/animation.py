@@ -29,10 +29,12 @@ from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
 from .render.renderer import Renderer
 from .render.view_input import ViewInput
+from .scene.bake_records import DrawnFrom
 from .scene.blender_images import frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.look_properties import read_look
+from .scene.picture_state import PictureState, read_picture_states
 from .scene.pictures import (
     ImageSequence,
     OutputSettings,
@@ -117,9 +119,7 @@ def bake_animation_task(
     frames = list(frames)
     original_frame = scene.frame_current + scene.frame_subframe
     original_camera = scene.camera
-    rendered_frames: dict[str, list[int]] = {}
-    skipped_frames: dict[str, list[int]] = {}
-    sequence_cameras: dict[str, Camera] = {}
+    frame_results: dict[str, list[_FrameResult]] = {}
     start_time, rendered_count = time.monotonic(), 0
     scene_data = None
     warnings: dict[str, None] = {}
@@ -150,23 +150,31 @@ def bake_animation_task(
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
             warnings |= dict.fromkeys(scene_data.warnings)
-            for name, (camera, up_to_date) in results.items():
-                (skipped_frames if up_to_date else rendered_frames).setdefault(name, []).append(
-                    frame
-                )
-                sequence_cameras[name] = camera
+            for result in results:
+                frame_results.setdefault(result.name, []).append(result)
             # Frames that are up to date take almost no time and do not count.
-            rendered_count += not all(up_to_date for _, up_to_date in results.values())
+            rendered_count += not all(result.up_to_date for result in results)
             if not rendered_count:
                 start_time = time.monotonic()
         sequence_results = []
-        for name, camera in sequence_cameras.items():
+        for index, (name, results) in enumerate(frame_results.items()):
             path = _path_of_frame(settings, name, cameras, frames[0])
+            camera = results[-1].camera
             sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
             if show:
-                apply_sequence(scene, scene_data, sequence, camera, settings)
-            frame_lists = tuple(rendered_frames.get(name, ())), tuple(skipped_frames.get(name, ()))
-            sequence_results.append(SequenceResult(name, *frame_lists, sequence, tuple(warnings)))
+                drawn_from = DrawnFrom(
+                    None if cameras is None else cameras[index],
+                    {result.frame: result.state for result in results},
+                    results[-1].device,
+                )
+                apply_sequence(scene, scene_data, sequence, camera, settings, drawn_from)
+            rendered, skipped = (
+                tuple(result.frame for result in results if result.up_to_date == up_to_date)
+                for up_to_date in (False, True)
+            )
+            sequence_results.append(
+                SequenceResult(name, rendered, skipped, sequence, tuple(warnings))
+            )
         return sequence_results
     finally:
         exit_stack.close()
@@ -184,6 +192,30 @@ def bake_animation(
     return run_to_completion(bake_animation_task(scene, frames, **options))
 
 
+@dataclass(frozen=True, eq=False)
+class _FrameResult:
+    """One frame of a sequence.
+
+    Attributes
+    ----------
+    name : str
+        Of the sequence.
+    frame : int
+    camera : Camera
+    up_to_date : bool
+        Whether the picture existed already.
+    state : PictureState
+    device : {"cpu", "gpu"}
+    """
+
+    name: str
+    frame: int
+    camera: Camera
+    up_to_date: bool
+    state: PictureState
+    device: str
+
+
 def _frame_task(
     scene: bpy.types.Scene,
     frame: int,
@@ -193,15 +225,8 @@ def _frame_task(
     size: tuple[int, int] | None,
     settings: OutputSettings,
     cache: Cache,
-) -> Task[tuple[SceneData, dict]]:
-    """Draw one frame from all cameras.
-
-    Returns
-    -------
-    scene_data : SceneData
-    results : dict of str to (Camera, bool)
-        By the name of the sequence: the camera, and whether the picture was up to date.
-    """
+) -> Task[tuple[SceneData, list[_FrameResult]]]:
+    """Draw one frame from all cameras."""
     look = read_look(scene.rosy) if look is None else look
     # The look may be animated, and its method decides which renderer can draw it.
     renderer = cache.get_or_create(
@@ -209,9 +234,10 @@ def _frame_task(
         lambda: select_renderer(settings.device, look, cache, keep_gbuffers=False),
     )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
+    depsgraph = scene_depsgraph(scene)
     scene_views = read_views(
         scene,
-        scene_depsgraph(scene),
+        depsgraph,
         sources,
         look,
         objects=objects,
@@ -219,7 +245,8 @@ def _frame_task(
         reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
         cache=cache,
     )
-    results = {}
+    states = read_picture_states(scene, depsgraph, sources)
+    results = []
     for index, view in enumerate(scene_views.views):
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
@@ -238,7 +265,9 @@ def _frame_task(
             sidecar.unlink(missing_ok=True)
             write_frame(path, picture, settings.as_float)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
-        results[name] = view.camera, up_to_date
+        results.append(
+            _FrameResult(name, frame, view.camera, up_to_date, states[index], renderer.device_name)
+        )
     cache.evict_unused()
     return scene_views.scene_data, results
 

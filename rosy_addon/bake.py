@@ -10,8 +10,10 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
-from .scene.cameras import CameraSource, find_camera_object, render_camera
+from .scene.bake_records import DrawnFrom
+from .scene.cameras import CameraSource, render_camera
 from .scene.look_properties import read_look
+from .scene.picture_state import read_picture_states
 from .scene.pictures import (
     BakeResult,
     OutputSettings,
@@ -81,13 +83,14 @@ def bake_task(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
     check_targets(scene_views.scene_data.objects, settings)
+    states = read_picture_states(scene, depsgraph, sources)
     renderer = select_renderer(settings.device, look, BAKE_CACHE)
     rendered_views = []
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
         start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
         picture = yield from subtask(renderer.render_task(view), start, stop)
-        camera_object = find_camera_object(scene, source)
-        rendered_views.append(RenderedView(picture, view.camera, camera_object))
+        drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
+        rendered_views.append(RenderedView(picture, view.camera, drawn_from))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.97, "applying the pictures")
     return [

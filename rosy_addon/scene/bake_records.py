@@ -1,20 +1,40 @@
 """Records of baked pictures in ``scene.rosy.bakes``: store, list and remove them.
 
-A record holds the image, the material, the objects, and the states that the picture was drawn from.
+A record holds the image, the material, the camera, and the state that the picture was drawn from. A
+picture may also have no record in a scene, as on objects that were appended from another file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
-from .look_properties import read_look
+from ..errors import RosyError
+from ..projection.camera import Camera
+from .cameras import CameraSource, frame_camera
 from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
-from .picture_nodes import material_of_group, remove_picture_modifiers
-from .staleness import camera_state, find_stale_reason, look_state, object_state
+from .picture_nodes import (
+    applied_materials,
+    has_applied_picture,
+    image_of_material,
+    material_of_group,
+    projections_of_group,
+    remove_applied_picture,
+    remove_picture_modifiers,
+)
+from .picture_state import PictureState, SceneState
+from .read_view import scene_depsgraph
+from .staleness import MESH_STATES, difference
+
+#: Prefix of the names of RoSy's images and materials. The name of the camera follows.
+NAME_PREFIX = "RoSy "
+
+#: In place of the view of a record: its frames are from the cameras that render them.
+FRAME_CAMERAS = "frame cameras"
 
 
 @dataclass(frozen=True)
@@ -29,11 +49,13 @@ class BakeInfo:
         Pixels.
     image : bpy.types.Image
     stale_reason : str
-        Why the picture is out of date. Empty if it is up to date.
+        Why the picture is out of date. Empty if it is up to date, as far as is known.
     is_shown : bool
         Whether any object shows the picture.
     frame_range : str
         First and last frame of a sequence. Empty for a single picture.
+    unknown_reason : str
+        Why it is not known whether the picture is up to date. Empty if it is known.
     """
 
     camera: str
@@ -43,6 +65,7 @@ class BakeInfo:
     stale_reason: str
     is_shown: bool
     frame_range: str = ""
+    unknown_reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,18 +86,35 @@ class RemovalCounts:
     node_groups: int = 0
 
 
+@dataclass(frozen=True)
+class DrawnFrom:
+    """What a picture or a sequence was drawn from, for its record.
+
+    Attributes
+    ----------
+    source : bpy.types.Object, Camera or None
+        None for a sequence from the cameras that render the frames.
+    states : dict of int or None to PictureState
+        By frame; for a single picture the only key is None.
+    device : {"cpu", "gpu"}
+    """
+
+    source: CameraSource | None
+    states: Mapping[int | None, PictureState]
+    device: str
+
+
 def store_record(
     scene: bpy.types.Scene,
     name: str,
     image: bpy.types.Image,
     material: bpy.types.Material,
-    matrices: dict[bpy.types.Object, np.ndarray | None],
+    drawn_from: DrawnFrom,
     *,
     size: tuple[int, int],
-    camera: bpy.types.Object | None = None,
     frame_range: str = "",
 ) -> None:
-    """Store the record of a picture or sequence. An older picture of the same name is deleted.
+    """Store the record of a picture or sequence. An older picture of the same camera is deleted.
 
     Parameters
     ----------
@@ -83,49 +123,78 @@ def store_record(
         Name of the camera, or of the scene for a sequence from several cameras.
     image : bpy.types.Image
     material : bpy.types.Material
-    matrices : dict of bpy.types.Object to (4, 4) ndarray or None
-        The objects that show the picture, and the object-to-clip matrices by which it is mapped.
+    drawn_from : DrawnFrom
     size : (int, int)
         Width and height in pixels.
-    camera : bpy.types.Object, optional
-        The picture is out of date if this camera changes.
     frame_range : str
-        First and last frame of a sequence. The objects' states are then not stored, because the
-        sidecar files of the frames record them.
+        First and last frame of a sequence.
     """
-    record = _update_record(scene, name, image, material)
+    record = _find_or_add_record(scene, name, drawn_from.source)
+    _replace_datablocks(record, image, material)
     record.frames = frame_range
     record.width, record.height = size
-    record.look = look_state(read_look(scene.rosy))
-    record.camera_state = "" if camera is None else camera_state(scene, camera)
-    record.objects.clear()
-    for obj, matrix in matrices.items():
-        entry = record.objects.add()
-        entry.name = obj.name
-        if not frame_range:
-            entry.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
-            entry.state = object_state(obj, recompute=True)
+    record.device = drawn_from.device
+    record.state = ""
+    record.frame_states.clear()
+    for frame, state in drawn_from.states.items():
+        if frame is None:
+            record.state = state.to_json()
+        else:
+            entry = record.frame_states.add()
+            entry.name, entry.state = str(frame), state.to_json()
 
 
-def _update_record(
-    scene: bpy.types.Scene, name: str, image: bpy.types.Image, material: bpy.types.Material
+def _find_or_add_record(
+    scene: bpy.types.Scene, name: str, source: CameraSource | None
 ) -> bpy.types.PropertyGroup:
-    """Return the record of a name with a new image and material.
+    """Return the record of a camera, or of the scene if there is no camera, with its present name."""
+    records = scene.rosy.bakes
+    if source is None:
+        camera, view = None, FRAME_CAMERAS
+        record = next((entry for entry in records if entry.view == view), None)
+    elif isinstance(source, Camera):
+        camera, view, record = None, _view_to_json(source), None
+    else:
+        camera, view = source, ""
+        record = next((entry for entry in records if entry.camera == camera), None)
+    record = record or records.get(name) or records.add()
+    record.name, record.camera, record.view = name, camera, view
+    return record
 
-    The older ones are deleted, unless another scene shows them.
-    """
-    record = scene.rosy.bakes.get(name)
-    if record is None:
-        record = scene.rosy.bakes.add()
-        record.name = name
+
+def _replace_datablocks(
+    record: bpy.types.PropertyGroup, image: bpy.types.Image, material: bpy.types.Material
+) -> None:
+    """Give a record a new image and material. Delete the older ones, unless a record has them."""
     old_datablocks = (record.material, record.image)
     record.image, record.material = image, material
     for old_datablock, new_datablock in zip(old_datablocks, (material, image), strict=True):
         if old_datablock is not None and not _is_recorded(old_datablock):
             old_datablock.user_remap(new_datablock)
             delete_owned(old_datablock)
-            new_datablock.name = f"RoSy {name}"
-    return record
+            new_datablock.name = f"{NAME_PREFIX}{record.name}"
+
+
+def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | None:
+    """Return the record of a camera, given its present name; None if there is none."""
+    return next((record for record in scene.rosy.bakes if camera_name(record) == name), None)
+
+
+def camera_name(record: bpy.types.PropertyGroup) -> str:
+    """Return the present name of the camera of a record, or of the scene if it has several."""
+    if record.view == FRAME_CAMERAS:
+        return record.id_data.name
+    return record.name if record.camera is None else record.camera.name
+
+
+def _view_to_json(camera: Camera) -> str:
+    values = camera.view.tolist(), camera.projection.tolist(), camera.width, camera.height
+    return json.dumps([*values, camera.name])
+
+
+def _view_from_json(text: str) -> Camera:
+    view, projection, *others = json.loads(text)
+    return Camera(np.array(view), np.array(projection), *others)
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
@@ -137,34 +206,93 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
     )
 
 
-def list_bakes(scene: bpy.types.Scene) -> list[BakeInfo]:
-    """Return the baked pictures of a scene, sorted by camera name, and whether they are up to date.
+def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeInfo]:
+    """Return the pictures on the objects of a scene, sorted by camera name.
 
-    Fast enough for every redraw of a panel: the state of a mesh is cached for `STATE_TTL_SECONDS`.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    for_panel : bool
+        Do not read a large scene again if nothing has changed, or if it was read a moment ago; see
+        `SceneStateCache`.
     """
+    recorded = [record for record in scene.rosy.bakes if record.image is not None]
+    shown_materials = {
+        material for obj in baked_objects(scene) for material in _shown_materials(obj)
+    }
+    reasons = _PresentReasons(scene, for_panel) if recorded else None
     infos = []
-    for record in scene.rosy.bakes:
-        if record.image is None:
-            continue
-        stale_reason, is_shown = find_stale_reason(scene, record), _is_shown(record)
-        size = record.width, record.height
-        infos.append(
-            BakeInfo(record.name, *size, record.image, stale_reason, is_shown, record.frames)
+    for record in recorded:
+        info = BakeInfo(
+            camera_name(record),
+            record.width,
+            record.height,
+            record.image,
+            "",
+            record.material in shown_materials,
+            record.frames,
         )
+        infos.append(replace(info, **reasons.find(record)))
+    for material in shown_materials - {record.material for record in scene.rosy.bakes}:
+        image = image_of_material(material)
+        if image is not None:
+            name = material.name.removeprefix(NAME_PREFIX)
+            note = "baked in another file or scene"
+            infos.append(BakeInfo(name, *image.size, image, "", True, unknown_reason=note))
     return sorted(infos, key=lambda info: info.camera)
 
 
-def _is_shown(record: bpy.types.PropertyGroup) -> bool:
-    """Whether any object shows the picture of a record."""
-    objects = (bpy.data.objects.get(entry.name) for entry in record.objects)
-    node_groups = (
-        modifier.node_group
-        for obj in objects
-        if obj is not None
-        for modifier in obj.modifiers
-        if is_rosy_modifier(modifier)
-    )
-    return any(material_of_group(node_group) == record.material for node_group in node_groups)
+class _PresentReasons:
+    """Compares records with the present state of a scene, which is read once for all of them."""
+
+    def __init__(self, scene: bpy.types.Scene, for_panel: bool) -> None:
+        self.scene = scene
+        self.depsgraph = scene_depsgraph(scene)
+        self.scene_state = (
+            MESH_STATES.get(scene, self.depsgraph)
+            if for_panel
+            else SceneState(scene, self.depsgraph)
+        )
+
+    def find(self, record: bpy.types.PropertyGroup) -> dict[str, str]:
+        """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one."""
+        text = record.state
+        if record.frames and record.frame_states:
+            frame = self.scene.frame_current
+            entry = record.frame_states.get(str(frame))
+            if entry is None or self.scene.frame_subframe:
+                return {"unknown_reason": f"frame {frame} was not drawn"}
+            text = entry.state
+        recorded = PictureState.from_json(text)
+        if recorded is None:
+            return {"unknown_reason": "baked with another version of RoSy"}
+        name = camera_name(record)
+        try:
+            source = self._source(record)
+        except RosyError as error:  # there is no camera at all
+            return {"stale_reason": str(error)}
+        if source is None:
+            return {"stale_reason": f"camera '{name}' was deleted"}
+        present = self.scene_state.picture_state(self.scene, self.depsgraph, source)
+        if record.frames:
+            del present.output["placement"]  # frames always fill the frame of the camera
+        return {"stale_reason": difference(recorded, present, source.name, record.device)}
+
+    def _source(self, record: bpy.types.PropertyGroup) -> CameraSource | None:
+        """Return the camera that a picture would be drawn from; None if it was deleted."""
+        if record.view == FRAME_CAMERAS:
+            return frame_camera(self.scene, self.scene.frame_current)
+        if record.view:
+            return _view_from_json(record.view)
+        camera = record.camera
+        return camera if camera is not None and camera.users_collection else None
+
+
+def _shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
+    """Return the materials of the pictures that an object shows."""
+    modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    materials = {material_of_group(modifier.node_group) for modifier in modifiers}
+    return (materials | set(applied_materials(obj))) - {None}
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
@@ -173,22 +301,37 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
     A picture may have no record, as on appended objects, and a record no image, if the user deleted
     it.
     """
-    return bool(scene.rosy.bakes or _baked_objects(scene))
+    return bool(scene.rosy.bakes or baked_objects(scene))
 
 
-def _baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects of a scene, and of the collections that it instances, with pictures."""
-    reached: dict[bpy.types.Object, None] = {}
+def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the objects of a scene with pictures, and those that are in no scene.
+
+    Objects of collections that the scene instances are included.
+    """
+    own = _reached_objects(scene)
+    others = {obj for other in bpy.data.scenes if other != scene for obj in _reached_objects(other)}
+    return [
+        obj
+        for obj in bpy.data.objects
+        if (obj in own or obj not in others)
+        and (removable_modifiers(obj) or has_applied_picture(obj))
+    ]
+
+
+def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
+    """Return the objects of a scene, and of the collections that it instances."""
+    reached: set[bpy.types.Object] = set()
 
     def add_objects(collection: bpy.types.Collection) -> None:
         for obj in collection.all_objects:
             if obj not in reached:
-                reached[obj] = None
+                reached.add(obj)
                 if obj.instance_collection is not None:
                     add_objects(obj.instance_collection)
 
     add_objects(scene.collection)
-    return [obj for obj in reached if removable_modifiers(obj)]
+    return reached
 
 
 def remove_bakes(
@@ -203,22 +346,40 @@ def remove_bakes(
         Remove the pictures from these objects only. An image and its material are deleted when no
         object is left. By default all pictures are removed.
     """
-    records = scene.rosy.bakes
-    baked_objects = _baked_objects(scene)
-    targets = baked_objects if objects is None else [obj for obj in objects if obj in baked_objects]
+    found = baked_objects(scene)
+    targets = found if objects is None else [obj for obj in objects if obj in found]
     node_groups = 0
     for obj in targets:
         node_groups += remove_picture_modifiers(obj)
-    for record in records:
-        for index in reversed(range(len(record.objects))):
-            if record.objects[index].name in {obj.name for obj in targets}:
-                record.objects.remove(index)
+        remove_applied_picture(obj)
+    needed = set() if objects is None else _needed_materials(set(found) - set(targets))
     images = materials = 0
+    records = scene.rosy.bakes
     for index in reversed(range(len(records))):
-        if objects is None or not records[index].objects:
-            image, material = records[index].image, records[index].material
+        if records[index].material not in needed:
+            image, material, camera = (
+                getattr(records[index], name) for name in ("image", "material", "camera")
+            )
             records.remove(index)
             materials += 0 if _is_recorded(material) else delete_owned(material)
             images += 0 if _is_recorded(image) else delete_owned(image)
-    delete_unused()
-    return RemovalCounts(len(targets), images, materials, node_groups)
+            if camera is not None and not camera.users:  # the user had deleted it
+                bpy.data.objects.remove(camera)
+    unused = delete_unused()
+    return RemovalCounts(
+        len(targets),
+        images + unused["images"],
+        materials + unused["materials"],
+        node_groups + unused["node_groups"],
+    )
+
+
+def _needed_materials(objects: set[bpy.types.Object]) -> set[bpy.types.Material]:
+    """Return the materials of all pictures that some objects show or can show."""
+    needed: set[bpy.types.Material] = set()
+    for obj in objects:
+        needed |= _shown_materials(obj)
+        for modifier in obj.modifiers:
+            if is_rosy_modifier(modifier):
+                needed |= projections_of_group(modifier.node_group).keys()
+    return needed

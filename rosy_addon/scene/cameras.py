@@ -161,14 +161,6 @@ def resolve_camera(
     return camera_of_object(scene, depsgraph, source, *check_size(*size))
 
 
-def find_camera_object(scene: bpy.types.Scene, source: CameraSource) -> bpy.types.Object | None:
-    """Return the camera object that a picture was drawn from, or None if it was a 3D view."""
-    if not isinstance(source, Camera):
-        return source
-    obj = scene.objects.get(source.name)
-    return obj if obj is not None and obj.type == "CAMERA" else None
-
-
 def camera_of_view(
     region: bpy.types.Region,
     region_3d: bpy.types.RegionView3D,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 import numpy as np
 
@@ -25,14 +27,19 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
     -------
     list of Light
     """
-    lights = []
+    return [light for light, _ in rendered_lights(depsgraph, view_matrix)]
+
+
+def rendered_lights(
+    depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray
+) -> Iterator[tuple[Light, bpy.types.Object]]:
+    """Yield the lights of `read_lights`, each with its original object."""
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type != "LIGHT" or obj.original.hide_render or not instance.show_self:
             continue
         matrix = view_matrix @ np.array(instance.matrix_world)
-        lights.append(_convert_light(obj.data, matrix))
-    return lights
+        yield _convert_light(obj.data, matrix), obj.original
 
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:

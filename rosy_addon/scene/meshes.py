@@ -62,7 +62,7 @@ def mesh_surface(
         content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
         raise RosyError(f"{name}: the mesh has no faces, {content}")
     arguments = {
-        "vertices": _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3),
+        "vertices": vertex_positions(mesh),
         "corner_vertex": _attribute_or_collection(
             mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
         ),
@@ -93,6 +93,31 @@ def mesh_surface(
         )
     # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
     return cache.get_or_create(("surface", content_hash(*arguments.values())), build)
+
+
+def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
+    """Return a digest of everything that `mesh_surface` reads, apart from the rest positions.
+
+    Much faster than reading the surface: normals are left out where they follow from the rest.
+    """
+    flush_edit_mode(mesh)
+    parts = [
+        vertex_positions(mesh),
+        _attribute_or_collection(mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32),
+        _face_starts(mesh),
+    ]
+    if not occluder_only:
+        sharp_faces = read_attribute(mesh, "sharp_face", bool, 1)
+        is_smooth = sharp_faces is None or not sharp_faces.any()
+        parts += [_sharp_edges(mesh), None if is_smooth else sharp_faces]
+        if mesh.has_custom_normals:
+            parts.append(_read_collection(mesh.corner_normals, "vector", np.float32, 3))
+    return content_hash(*parts)
+
+
+def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the positions of the vertices in object space, (V, 3) float32."""
+    return _attribute_or_collection(mesh, "position", mesh.vertices, "co", np.float32, 3)
 
 
 @contextmanager

@@ -59,9 +59,22 @@ def delete_owned(datablock: bpy.types.ID | None) -> int:
     return 1
 
 
-def delete_unused() -> None:
-    """Delete the node groups, materials and images that RoSy created and that nothing uses."""
+def delete_unused() -> dict[str, int]:
+    """Delete the node groups, materials and images that RoSy created and that nothing uses.
+
+    Returns
+    -------
+    dict of str to int
+        The numbers of deleted datablocks, by "node_groups", "materials" and "images".
+    """
+    counts = {}
     # A group uses its material, and that its image.
-    for collection in (bpy.data.node_groups, bpy.data.materials, bpy.data.images):
-        unused = [block for block in collection if block.get(OWNED_TAG) and not block.users]
+    for name in ("node_groups", "materials", "images"):
+        unused = [
+            block
+            for block in getattr(bpy.data, name)
+            if block.get(OWNED_TAG) and not block.users and block.library is None
+        ]
         bpy.data.batch_remove(unused)
+        counts[name] = len(unused)
+    return counts

@@ -1,4 +1,7 @@
-"""Nodes that show a picture: a material per camera, a node group and a modifier per object."""
+"""Nodes that show a picture: a material per camera, a node group and a modifier per object.
+
+The user may have applied the modifier. Then the data of the object have the material and attribute.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,8 @@ import bpy
 import numpy as np
 
 from .blender_images import NEUTRAL_GRAY
-from .compat import has_nodes_by_default
-from .owned_data import delete_owned, is_rosy_modifier, removable_modifiers
+from .compat import has_nodes_by_default, is_editable
+from .owned_data import OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
 
 #: Name of the modifier that shows a picture.
 MODIFIER_NAME = "RoSy"
@@ -150,7 +153,37 @@ def new_group(
         group.links.new(clip_position, value_socket)
         geometry = store.outputs["Geometry"]
     group.links.new(geometry, build("NodeGroupOutput").inputs["Geometry"])
+    _add_projection(group, material, matrix)
     return group
+
+
+def _add_projection(
+    group: bpy.types.NodeTree, material: bpy.types.Material, matrix: np.ndarray | None
+) -> None:
+    """Store how an object shows a picture, for `projections_of_group`."""
+    projection = group.rosy.projections.add()
+    projection.material = material
+    projection.matrix = (np.zeros(16) if matrix is None else matrix.ravel()).tolist()
+
+
+def projections_of_group(
+    group: bpy.types.NodeTree,
+) -> dict[bpy.types.Material, np.ndarray | None]:
+    """Return the pictures that an object can show, by their materials.
+
+    The values are the object-to-clip matrices, (4, 4); None for objects with several instances.
+    """
+    projections = {}
+    for projection in group.rosy.projections:
+        matrix = np.array(projection.matrix).reshape(4, 4)
+        projections[projection.material] = matrix if matrix.any() else None
+    # The user may have deleted a material, and groups of earlier versions have no projections.
+    shown_material = material_of_group(group)
+    return {
+        material: matrix
+        for material, matrix in ({shown_material: None} | projections).items()
+        if material is not None
+    }
 
 
 def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
@@ -159,6 +192,12 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
         if node.bl_idname == "GeometryNodeSetMaterial":
             return node.inputs["Material"].default_value
     return None
+
+
+def image_of_material(material: bpy.types.Material) -> bpy.types.Image | None:
+    """Return the image that a material of `new_material` shows; None if it shows none."""
+    nodes = material.node_tree.nodes if material.node_tree is not None else ()
+    return next((node.image for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
 
 def _clip_rows(matrix: np.ndarray) -> np.ndarray:
@@ -219,7 +258,10 @@ class _NodeBuilder:
 
 
 def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) -> None:
-    """Set the node group of RoSy's modifier, and move it to the end of the object's stack."""
+    """Set the node group of RoSy's modifier, and move it to the end of the object's stack.
+
+    The new group keeps the projections of the object's other pictures.
+    """
     existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
     modifier.show_expanded = False
@@ -228,8 +270,13 @@ def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) 
         obj.modifiers.remove(extra)
     last = len(obj.modifiers) - 1
     obj.modifiers.move(obj.modifiers.find(modifier.name), last)
-    if old_group is not None and old_group != node_group and not old_group.users:
-        bpy.data.node_groups.remove(old_group)
+    if old_group is not None and old_group != node_group:
+        shown_material = material_of_group(node_group)
+        for material, matrix in projections_of_group(old_group).items():
+            if material != shown_material:
+                _add_projection(node_group, material, matrix)
+        if not old_group.users:
+            bpy.data.node_groups.remove(old_group)
     node_group.name = f"RoSy {obj.name}"
 
 
@@ -240,3 +287,46 @@ def remove_picture_modifiers(obj: bpy.types.Object) -> int:
     for modifier in existing:
         obj.modifiers.remove(modifier)
     return sum(delete_owned(node_group) for node_group in node_groups if not node_group.users)
+
+
+def applied_materials(obj: bpy.types.Object) -> list[bpy.types.Material]:
+    """Return the pictures in the material slots of an object whose modifier was applied.
+
+    Empty if its data are linked from a library.
+    """
+    if obj.data is None or not is_editable(obj.data):
+        return []
+    materials = getattr(obj.data, "materials", ())
+    return [material for material in materials if _is_picture(material)]
+
+
+def _is_picture(material: bpy.types.Material | None) -> bool:
+    """Whether RoSy created a material for a picture, and not for strokes."""
+    return (
+        material is not None
+        and bool(material.get(OWNED_TAG))
+        and material.node_tree is not None
+        and any(node.bl_idname == "ShaderNodeTexImage" for node in material.node_tree.nodes)
+    )
+
+
+def has_applied_picture(obj: bpy.types.Object) -> bool:
+    """Whether RoSy's modifier was applied to an object: its data have the results of `new_group`."""
+    return bool(applied_materials(obj) or _applied_attribute(obj))
+
+
+def remove_applied_picture(obj: bpy.types.Object) -> None:
+    """Remove what the applied modifier has left in the data of an object."""
+    for index in reversed(range(len(getattr(obj.data, "materials", ())))):
+        if _is_picture(obj.data.materials[index]):
+            obj.data.materials.pop(index=index)
+    attribute = _applied_attribute(obj)
+    if attribute is not None:
+        obj.data.attributes.remove(attribute)
+
+
+def _applied_attribute(obj: bpy.types.Object) -> bpy.types.Attribute | None:
+    """Return the attribute `CLIP_ATTRIBUTE` of the data of an object; None if there is none."""
+    if obj.type != "MESH" or not is_editable(obj.data):
+        return None
+    return obj.data.attributes.get(CLIP_ATTRIBUTE)

@@ -23,12 +23,18 @@ from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_folder
 from ..projection.camera import Camera
-from .bake_records import store_record
+from .bake_records import DrawnFrom, baked_objects, camera_name, find_record, store_record
 from .blender_images import load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
-from .owned_data import OWNED_TAG, rollback_on_error
-from .picture_nodes import new_group, new_material, set_picture_modifier, set_sequence_frames
+from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
+from .picture_nodes import (
+    new_group,
+    new_material,
+    projections_of_group,
+    set_picture_modifier,
+    set_sequence_frames,
+)
 from .scene_reader import SceneData
 
 #: View transforms that do not change the colors of a picture.
@@ -69,13 +75,12 @@ class RenderedView:
     ----------
     picture : Picture
     camera : Camera
-    camera_object : bpy.types.Object or None
-        None for a 3D view.
+    drawn_from : DrawnFrom
     """
 
     picture: Picture
     camera: Camera
-    camera_object: bpy.types.Object | None = None
+    drawn_from: DrawnFrom
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,10 +261,10 @@ def apply_picture(
         name,
         image,
         material,
-        matrices,
+        rendered_view.drawn_from,
         size=(width, height),
-        camera=rendered_view.camera_object,
     )
+    delete_unused()
     return BakeResult(
         name,
         image,
@@ -276,6 +281,7 @@ def apply_sequence(
     sequence: ImageSequence,
     camera: Camera,
     settings: OutputSettings,
+    drawn_from: DrawnFrom,
 ) -> None:
     """Apply an image sequence to the objects of a scene. An older one of the same name is replaced.
 
@@ -306,10 +312,11 @@ def apply_sequence(
         sequence.name,
         image,
         material,
-        dict.fromkeys(objects),
+        drawn_from,
         size=(sequence.width, sequence.height),
         frame_range=f"{sequence.first} to {sequence.last}",
     )
+    delete_unused()
 
 
 def show_bake(scene: bpy.types.Scene, camera: str) -> None:
@@ -326,20 +333,19 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
     RosyError
         If no picture was baked from this camera.
     """
-    record = scene.rosy.bakes.get(camera)
+    record = find_record(scene, camera)
     if record is None:
-        names = ", ".join(f"'{other.name}'" for other in scene.rosy.bakes) or "none"
+        names = ", ".join(f"'{camera_name(other)}'" for other in scene.rosy.bakes) or "none"
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
-    for entry in record.objects:
-        obj = scene.objects.get(entry.name) or bpy.data.objects.get(entry.name)
-        if obj is None or not is_editable(obj):
-            continue
-        matrix = np.array(entry.matrix).reshape(4, 4)
-        node_group = new_group(
-            f"RoSy {obj.name}", record.material, matrix if matrix.any() else None
-        )
-        node_group[OWNED_TAG] = True
-        set_picture_modifier(obj, node_group)
+    for obj in baked_objects(scene):
+        projections = {}
+        for modifier in removable_modifiers(obj):
+            projections |= projections_of_group(modifier.node_group)
+        if record.material in projections and is_editable(obj):
+            matrix = projections[record.material]
+            node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
+            node_group[OWNED_TAG] = True
+            set_picture_modifier(obj, node_group)
 
 
 def _object_to_clip_matrices(

@@ -131,13 +131,11 @@ def read_scene(
     if not objects:
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")
-    visible_objects = set(_visible_objects(view_layer))
     cache = Cache() if cache is None else cache
     with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
         reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors)
-        for instance in depsgraph.object_instances:
-            if _is_rendered(instance, visible_objects):
-                reader.add(instance)
+        for instance in rendered_instances(depsgraph):
+            reader.add(instance)
     reader.check_complete(objects)
     if errors and not reader.field_instances:
         raise next(iter(errors.values()))
@@ -356,6 +354,16 @@ def _prepare_field(
 def _can_modify(mesh: bpy.types.Mesh) -> bool:
     """Whether attributes can be added to a mesh."""
     return is_editable(mesh) and not mesh.is_editmode
+
+
+def rendered_instances(
+    depsgraph: bpy.types.Depsgraph,
+) -> Iterator[bpy.types.DepsgraphObjectInstance]:
+    """Yield the instances of meshes that are visible in renders, each valid until the next one."""
+    visible_objects = set(_visible_objects(depsgraph.view_layer))
+    for instance in depsgraph.object_instances:
+        if _is_rendered(instance, visible_objects):
+            yield instance
 
 
 def _is_rendered(

@@ -1,143 +1,193 @@
-"""Whether a baked picture is out of date: states of looks, cameras, objects and meshes.
-
-The record of a bake stores the states at that time as text. They are compared with the current ones.
-"""
+"""Whether a baked picture is out of date: the state that it was drawn from and the present one."""
 
 from __future__ import annotations
 
-import json
 import time
-import zlib
-from collections.abc import Iterable
-from dataclasses import asdict
+from collections.abc import Mapping
+from typing import Any
 
 import bpy
-import numpy as np
 
-from ..compositor.look import Look
-from .field_attributes import attribute_name, field_degree
-from .look_properties import read_look
+from .picture_state import MeshStates, PictureState, SceneState
 
-#: Seconds for which the cached state of a mesh is used before it is computed again.
+#: Number of faces in a scene above which a panel does not read it at every redraw, but only after
+#: Blender has reported a change.
+MAX_UNWATCHED_FACES = 20_000
+
+#: Seconds for which a panel uses the state of such a scene although something has changed since, so
+#: that playback and sculpting stay fluent.
 STATE_TTL_SECONDS = 1.0
 
-#: Number of checksums above which the cache is cleared, as the pointers of removed meshes stay in it.
-MAX_CACHED_STATES = 256
+#: The same as a multiple of the time that reading the state has taken.
+TTL_READINGS = 10.0
 
-#: Camera settings that change the picture.
-_CAMERA_PROPERTIES = (
-    "type",
-    "lens",
-    "sensor_fit",
-    "sensor_width",
-    "sensor_height",
-    "ortho_scale",
-    "shift_x",
-    "shift_y",
-    "clip_start",
-    "clip_end",
-)
+#: Lists of `bpy.app.handlers` that are called when objects may have changed.
+_WATCHED_EVENTS = ("depsgraph_update_post", "frame_change_post", "undo_post", "redo_post")
+
+#: How reasons call the properties of the output.
+_OUTPUT_LABELS = {"store": "storage", "directory": "folder", "image_format": "format"}
 
 
-def find_stale_reason(scene: bpy.types.Scene, record: bpy.types.PropertyGroup) -> str:
-    """Return why a picture is out of date; empty if it is up to date."""
-    if record.frames:
-        return ""  # sidecar files of the frames record their state
-    if record.look != look_state(read_look(scene.rosy)):
+class SceneStateCache:
+    """The present states of scenes, for panels, which ask at every redraw.
+
+    For a scene with many faces, handlers note which objects change, and only their meshes are read
+    again. The handlers exist from the first time that a panel shows such a scene with pictures until
+    it shows another one, a file is loaded, or `clear` is called.
+    """
+
+    def __init__(self) -> None:
+        self._mesh_states: MeshStates = {}
+        self._scene_state: SceneState | None = None
+        self._key: tuple[int, str] | None = None
+        self._is_outdated = True
+        self._next_reading = 0.0
+
+    def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
+        """Return the present state of the depsgraph's view layer, or that of a moment ago."""
+        key = scene.session_uid, depsgraph.view_layer.name
+        if key != self._key or not self._is_watching():
+            self.clear()
+            self._key = key
+        if self._scene_state is None or (
+            self._is_outdated and time.monotonic() >= self._next_reading
+        ):
+            start = time.monotonic()
+            self._scene_state = SceneState(scene, depsgraph, self._mesh_states)
+            self._is_outdated = False
+            end = time.monotonic()
+            self._next_reading = end + max(STATE_TTL_SECONDS, TTL_READINGS * (end - start))
+            if self._scene_state.face_count > MAX_UNWATCHED_FACES and not self._is_watching():
+                for name in _WATCHED_EVENTS:
+                    getattr(bpy.app.handlers, name).append(_note_changes)
+        return self._scene_state
+
+    def seconds_to_wait(self) -> float:
+        """Return after how many seconds to ask again, because something has changed; 0: not."""
+        is_behind = self._is_watching() and self._is_outdated
+        return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
+
+    def note_changes(self, depsgraph: bpy.types.Depsgraph | None) -> None:
+        """Forget the meshes that have changed. If there is no depsgraph, all may have changed."""
+        self._is_outdated = True
+        if depsgraph is None:
+            self._mesh_states.clear()
+            return
+        for update in depsgraph.updates:
+            if isinstance(update.id, bpy.types.Image):
+                self._mesh_states.clear()  # it may be the tone of any of them
+            elif update.is_updated_geometry:
+                changed = update.id.original.session_uid
+                for key in [key for key in self._mesh_states if key[0] == changed]:
+                    del self._mesh_states[key]
+
+    def clear(self) -> None:
+        """Forget everything, and remove the handlers."""
+        self._mesh_states.clear()
+        self._scene_state, self._key, self._is_outdated = None, None, True
+        if self._is_watching():
+            for name in _WATCHED_EVENTS:
+                getattr(bpy.app.handlers, name).remove(_note_changes)
+
+    @staticmethod
+    def _is_watching() -> bool:
+        """Whether the handlers exist. Blender drops them when it loads a file."""
+        return _note_changes in bpy.app.handlers.depsgraph_update_post
+
+
+#: The cache of the panels of one Blender process. Cleared by `unregister`.
+MESH_STATES = SceneStateCache()
+
+
+def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """Handler of `_WATCHED_EVENTS`. After an undo there is no depsgraph."""
+    MESH_STATES.note_changes(depsgraph)
+
+
+def difference(recorded: PictureState, present: PictureState, camera: str, device: str) -> str:
+    """Return why a picture is out of date; empty if it is up to date.
+
+    Parameters
+    ----------
+    recorded : PictureState
+        What the picture was drawn from.
+    present : PictureState
+        What it would be drawn from now.
+    camera : str
+        Name of the camera.
+    device : str
+        What drew the picture: "cpu" or "gpu".
+    """
+    if recorded.look != present.look:
         return "the look was changed"
-    if record.camera_state:
-        camera = scene.objects.get(record.name)
-        if camera is None or camera.type != "CAMERA":
-            return f"camera '{record.name}' was deleted"
-        if record.camera_state != camera_state(scene, camera):
-            return f"camera '{record.name}' was changed"
-    for entry in record.objects:
-        obj = bpy.data.objects.get(entry.name)
-        if obj is None:
-            return f"object '{entry.name}' was deleted"
-        transform_hash, mesh_state = entry.state.split(" ")
-        current_transform_hash, current_mesh_state = object_state(obj).split(" ")
-        if transform_hash != current_transform_hash:
-            return f"'{entry.name}' was moved"
-        if mesh_state != current_mesh_state:
-            return f"the mesh or field of '{entry.name}' was changed"
+    if recorded.size != present.size and present.size:
+        return f"the size was changed to {present.size[0]} x {present.size[1]}"
+    if recorded.camera != present.camera:
+        return f"camera '{camera}' was changed"
+    return (
+        _object_difference(recorded.objects, present.objects, "the mesh or field of ")
+        or _object_difference(recorded.occluders, present.occluders)
+        or _light_difference(recorded.lights, present.lights)
+        or ("the picture of the tone was changed" * (recorded.reference != present.reference))
+        or _output_difference(recorded.output, present.output)
+        or ("the device was changed" * (present.device not in ("auto", device)))
+    )
+
+
+def _output_difference(recorded: Mapping[str, Any], present: Mapping[str, Any]) -> str:
+    """Return which property of the output has changed; empty if none has."""
+    for name, value in present.items():
+        if recorded.get(name) != value:
+            return f"the {_OUTPUT_LABELS.get(name, name)} was changed"
     return ""
 
 
-def look_state(look: Look) -> str:
-    """Return a look as text."""
-    return json.dumps(asdict(look))
+def _object_difference(
+    recorded: Mapping[str, list[str]], present: Mapping[str, list[str]], of_mesh: str = ""
+) -> str:
+    """Return how objects have changed; empty if they have not. Their names do not matter."""
+    if sorted(recorded.values()) == sorted(present.values()):
+        return ""
+    before, after = _without_renamed(recorded, present)
+    for name in before.keys() & after.keys():
+        if before[name][1] != after[name][1]:
+            return f"{of_mesh}'{name}' was changed"
+        if before[name][0] != after[name][0]:
+            return f"'{name}' was moved"
+    return _presence_difference(before, after)
 
 
-def camera_state(scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
-    """Return the transform and settings of a camera as text."""
-    data, render = camera.data, scene.render
-    values = [
-        round(value, 5) if isinstance(value, float) else value
-        for value in (getattr(data, name) for name in _CAMERA_PROPERTIES)
-    ]
-    aspect = (render.resolution_x * render.pixel_aspect_x) / (
-        render.resolution_y * render.pixel_aspect_y
-    )
-    return json.dumps([_rounded_entries(camera.matrix_world), values, round(aspect, 5)])
+def _light_difference(recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]) -> str:
+    """Return how lights have changed; empty if they have not. Their names do not matter."""
+    if sorted(recorded.values()) == sorted(present.values()):
+        return ""
+    before, after = _without_renamed(recorded, present)
+    for name in before.keys() & after.keys():
+        if before[name] != after[name]:
+            return f"light '{name}' was changed"
+    return _presence_difference(before, after, "light ")
 
 
-def object_state(obj: bpy.types.Object, recompute: bool = False) -> str:
-    """Return two checksums as text: of an object's transform, and of its mesh and field."""
-    transform_hash = zlib.crc32(json.dumps(_rounded_entries(obj.matrix_world)).encode())
-    return f"{transform_hash:08x} {MESH_STATES.get(obj.data, recompute)}"
+def _without_renamed(
+    recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
+) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    """Return both with the present name of each object that was only renamed, or hardly changed."""
+    before, after = dict(recorded), dict(present)
+    for name in recorded.keys() - present.keys():
+        for new_name in after.keys() - before.keys():
+            if set(before[name]) & set(after[new_name]):
+                before[new_name] = before.pop(name)
+                break
+    return before, after
 
 
-class MeshStateCache:
-    """Checksums of meshes and their fields, each valid for `STATE_TTL_SECONDS`."""
-
-    def __init__(self) -> None:
-        # By the pointer of a mesh: when the checksum was computed, in seconds, and the checksum.
-        self._states: dict[int, tuple[float, str]] = {}
-
-    def get(self, mesh: bpy.types.Mesh, recompute: bool = False) -> str:
-        """Return the checksum of a mesh and its field as text. Compute it if it is too old."""
-        key = mesh.as_pointer()
-        now = time.monotonic()
-        if not recompute and key in self._states and now - self._states[key][0] < STATE_TTL_SECONDS:
-            return self._states[key][1]
-        if len(self._states) > MAX_CACHED_STATES:
-            self._states.clear()
-        state = _mesh_state(mesh)
-        self._states[key] = (now, state)
-        return state
-
-    def clear(self) -> None:
-        """Drop all checksums."""
-        self._states.clear()
-
-
-#: The cache that panels and bakes of one Blender process share, so that a bake is up to date in the
-#: panel at once. Cleared by `unregister`.
-MESH_STATES = MeshStateCache()
-
-
-def _mesh_state(mesh: bpy.types.Mesh) -> str:
-    """Compute the checksum of a mesh and its field as text."""
-    if mesh.is_editmode:
-        return "editing"
-    name = attribute_name(mesh)
-    checksum = zlib.crc32(f"{name} {field_degree(mesh)}".encode())
-    for attribute in (mesh.attributes.get("position"), mesh.attributes.get(name)):
-        checksum = zlib.crc32(_attribute_bytes(attribute), checksum)
-    return f"{checksum:08x}"
-
-
-def _rounded_entries(matrix: Iterable[Iterable[float]]) -> list[float]:
-    """Return the entries of a matrix by rows, rounded to 5 decimals, without negative zeros."""
-    return [round(value, 5) + 0.0 for row in matrix for value in row]
-
-
-def _attribute_bytes(attribute: bpy.types.Attribute | None) -> bytes:
-    """Return the values of a float or vector attribute as bytes; empty for others."""
-    if attribute is None or attribute.data_type not in ("FLOAT_VECTOR", "FLOAT"):
-        return b""
-    is_vector = attribute.data_type == "FLOAT_VECTOR"
-    values = np.empty(len(attribute.data) * (3 if is_vector else 1), dtype=np.float32)
-    attribute.data.foreach_get("vector" if is_vector else "value", values)
-    return values.tobytes()
+def _presence_difference(
+    before: Mapping[str, list[str]], after: Mapping[str, list[str]], kind: str = ""
+) -> str:
+    """Return which object is missing or new; empty if none is."""
+    for name in sorted(before.keys() - after.keys()):
+        is_there = any(obj.name_full == name and obj.users_collection for obj in bpy.data.objects)
+        return f"{kind}'{name}' {'is not visible any more' if is_there else 'was deleted'}"
+    for name in sorted(after.keys() - before.keys()):
+        return f"{kind}'{name}' was added"
+    return ""

@@ -94,6 +94,27 @@ def read_tone(
     return cache.get_or_create(key, lambda: SurfaceTone(values, image))
 
 
+def tone_source_digest(
+    mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
+) -> bytes:
+    """Return a digest of what `read_tone` reads. It is that of the error if it cannot be read."""
+    if tone_request is None:
+        return b""
+    try:
+        if tone_request.kind == "attribute":
+            attribute = _tone_attribute(mesh, tone_request.attribute)
+            if attribute is None:
+                return b""
+            return content_hash(attribute.domain, scalar_values(attribute, attribute.name))
+        image = owner.rosy.tone_image if has_rosy_properties() else None
+        if image is None:
+            return b""
+        uvs = _tone_uvs(mesh, owner.rosy.tone_uv_map, owner.name)
+        return content_hash(uvs, image_luminance(image))
+    except RosyError as error:
+        return content_hash(str(error))
+
+
 def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
     """Return a cache key for the tone image and the UV map that are chosen on an object."""
     if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
@@ -142,11 +163,10 @@ def _corner_scalars(
     mesh: bpy.types.Mesh, surface: Surface, name: str, label: str
 ) -> np.ndarray | None:
     """Return an attribute at the corners, (C, 1) float32; None if it is missing or unreadable."""
-    name = name or mesh.color_attributes.active_color_name
-    attribute = mesh.attributes.get(name)
-    if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
+    attribute = _tone_attribute(mesh, name)
+    if attribute is None:
         return None
-    source = f"{label}, attribute '{name}'"
+    source = f"{label}, attribute '{attribute.name}'"
     values = scalar_values(attribute, source)
     if not np.isfinite(values).all():
         raise RosyError(f"{source}: has values that are not finite")
@@ -155,6 +175,13 @@ def _corner_scalars(
     elif attribute.domain == "FACE":
         values = values[surface.corner_face]
     return values[:, None].astype(np.float32)
+
+
+def _tone_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """Return an attribute, by default the active color; None if it is missing or unreadable."""
+    attribute = mesh.attributes.get(name or mesh.color_attributes.active_color_name)
+    # In edit mode, attributes are empty.
+    return attribute if attribute is not None and len(attribute.data) else None
 
 
 def _tone_uvs(mesh: bpy.types.Mesh, name: str, label: str) -> np.ndarray:

@@ -32,6 +32,7 @@ def register() -> None:
 def unregister() -> None:
     """Remove them, and clear the state of this room."""
     bpy.types.VIEW3D_PT_overlay.remove(main_panel.draw_overlay_popover)
+    main_panel.unregister()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

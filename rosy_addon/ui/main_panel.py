@@ -9,7 +9,9 @@ from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.scene_reader import field_objects
+from ..scene.staleness import MESH_STATES
 from ..viewport import session
+from ..viewport.view3d import redraw
 from . import job_status, overlay
 from .generator_settings import generator_setting_names
 from .sidebar import SidebarPanel, draw_progress, use_property_columns
@@ -115,7 +117,8 @@ def _draw_picture_section(
     if job_status.current is not None:
         draw_progress(layout)
         return
-    bake_infos = list_bakes(context.scene)
+    bake_infos = list_bakes(context.scene, for_panel=True)
+    _redraw_later(MESH_STATES.seconds_to_wait())
     for bake in bake_infos:
         _draw_bake_info(layout, bake, several=len(bake_infos) > 1)
     if objects:
@@ -168,8 +171,25 @@ def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -
     if bake.stale_reason:
         box.label(text="Out of date:", icon="ERROR")
         box.label(text=bake.stale_reason)
-    elif not bake.frame_range:
+    elif bake.unknown_reason:
+        box.label(text="Not known to be up to date:", icon="QUESTION")
+        box.label(text=bake.unknown_reason)
+    elif bake.frame_range:
+        box.label(text="Up to date at this frame", icon="CHECKMARK")
+    else:
         box.label(text="Up to date", icon="CHECKMARK")
+
+
+def _redraw_later(seconds: float) -> None:
+    """Redraw the 3D views after some seconds, if the panel shows a state that may be outdated."""
+    if seconds and not bpy.app.timers.is_registered(redraw):
+        bpy.app.timers.register(redraw, first_interval=seconds)
+
+
+def unregister() -> None:
+    """Stop the timer."""
+    if bpy.app.timers.is_registered(redraw):
+        bpy.app.timers.unregister(redraw)
 
 
 def _draw_view_hints(

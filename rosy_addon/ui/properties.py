@@ -1,4 +1,4 @@
-"""The properties of RoSy: `Scene.rosy`, `Mesh.rosy` and `Object.rosy`."""
+"""The properties of RoSy: `Scene.rosy`, `Mesh.rosy`, `Object.rosy` and `NodeTree.rosy`."""
 
 from __future__ import annotations
 
@@ -99,28 +99,47 @@ class RosyLook(bpy.types.PropertyGroup):
     __annotations__ = _setting_properties(Look)
 
 
-class RosyBakedObject(bpy.types.PropertyGroup):
-    """The state of an object when a picture of it was drawn. Its name is that of the object."""
+class RosyFrameState(bpy.types.PropertyGroup):
+    """What a frame of a sequence was drawn from. Its name is the number of the frame."""
 
-    matrix: bpy.props.FloatVectorProperty(size=16, description="Object to clip space, by rows")
-    state: bpy.props.StringProperty(description="Hash of transform, mesh and field")
+    state: bpy.props.StringProperty(description="State of the scene, as JSON")
 
 
 class RosyBake(bpy.types.PropertyGroup):
-    """A baked picture and what it was drawn from. Its name is that of the camera."""
+    """A baked picture and what it was drawn from. Its name is that of the camera at that time."""
 
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
+    camera: bpy.props.PointerProperty(
+        type=bpy.types.Object, description="Empty for a 3D view and for frames of several cameras"
+    )
+    view: bpy.props.StringProperty(description="Camera of a 3D view, as JSON")
     width: bpy.props.IntProperty()
     height: bpy.props.IntProperty()
     frames: bpy.props.StringProperty(
         description="Frame range of a sequence, empty for a single picture"
     )
-    look: bpy.props.StringProperty(
-        description="Look of the scene when the picture was drawn, as JSON"
+    device: bpy.props.StringProperty(description="Device that drew the picture: cpu or gpu")
+    state: bpy.props.StringProperty(
+        description="State of the scene when a single picture was drawn, as JSON"
     )
-    camera_state: bpy.props.StringProperty(description="Hash of the camera, empty for a 3D view")
-    objects: bpy.props.CollectionProperty(type=RosyBakedObject)
+    frame_states: bpy.props.CollectionProperty(type=RosyFrameState)
+
+
+class RosyProjection(bpy.types.PropertyGroup):
+    """How an object shows one of its pictures, by the material of the picture."""
+
+    material: bpy.props.PointerProperty(type=bpy.types.Material)
+    matrix: bpy.props.FloatVectorProperty(
+        size=16,
+        description="Object to clip space, by rows. Zero if the object has several instances",
+    )
+
+
+class RosyNodeTree(bpy.types.PropertyGroup):
+    """The pictures of an object. They belong to the node group of the modifier that shows one."""
+
+    projections: bpy.props.CollectionProperty(type=RosyProjection)
 
 
 class RosyStrokeObject(bpy.types.PropertyGroup):
@@ -312,8 +331,10 @@ class RosyObject(bpy.types.PropertyGroup):
 
 CLASSES = (
     RosyLook,
-    RosyBakedObject,
+    RosyFrameState,
     RosyBake,
+    RosyProjection,
+    RosyNodeTree,
     RosyStrokeObject,
     RosyStrokes,
     RosyScene,
@@ -324,6 +345,7 @@ POINTER_PROPERTIES = (
     (bpy.types.Scene, RosyScene),
     (bpy.types.Mesh, RosyMesh),
     (bpy.types.Object, RosyObject),
+    (bpy.types.NodeTree, RosyNodeTree),
 )
 
 

@@ -1,0 +1,395 @@
+"""What a picture of a scene is drawn from: a `PictureState`, which can be compared and stored.
+
+Nothing is changed in the file, so a state can be read while Blender draws a panel. Meshes are read as
+they are evaluated, without the temporary attributes of `scene_reader`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+
+import bpy
+import numpy as np
+
+from ..cache import content_hash
+from ..compositor.look import Look
+from ..errors import RosyError
+from ..field.rosy_field import MAX_DEGREE
+from ..file_io import read_bytes
+from ..projection.camera import Camera
+from ..settings import settings_of
+from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
+from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .lights import rendered_lights
+from .look_properties import read_look
+from .meshes import evaluated_mesh, shape_digest, vertex_positions
+from .owned_data import user_modifiers
+from .scene_reader import field_objects, rendered_instances
+from .tone_inputs import (
+    ToneRequest,
+    make_tone_request,
+    reference_path,
+    tone_source_digest,
+)
+
+#: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is
+#: drawn.
+OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
+
+
+@dataclass(frozen=True)
+class PictureState:
+    """Everything that a picture of a scene is drawn from, as values and digests.
+
+    Attributes
+    ----------
+    look : dict
+        The settings that apply, by name.
+    size : list of int
+        Width and height in pixels.
+    camera : str
+        Of the view and the projection. Empty if no picture can be drawn from the camera.
+    output : dict
+        Values of `OUTPUT_PROPERTIES`.
+    device : str
+        The device: "cpu", "gpu" or "auto".
+    objects, occluders, lights : dict of str to list of str
+        By the name of an object, the digests of the transforms of its instances and of what they
+        are instances of. Only the occluders and lights that may change the picture are in it.
+    reference : str
+        Of the reference render. Empty if the look uses none.
+    """
+
+    look: dict
+    size: list[int]
+    camera: str
+    output: dict
+    device: str
+    objects: dict[str, list[str]]
+    occluders: dict[str, list[str]]
+    lights: dict[str, list[str]]
+    reference: str
+
+    def to_json(self) -> str:
+        """Return the state as text."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def from_json(text: str) -> PictureState | None:
+        """Return the state that a text holds; None if it is not one of this version of RoSy."""
+        try:
+            return PictureState(**json.loads(text))
+        except (TypeError, ValueError):
+            return None
+
+
+@dataclass(eq=False)
+class _Instances:
+    """The instances of one object.
+
+    Attributes
+    ----------
+    digests : list of (str, str)
+        Of the transform and of the mesh of each instance.
+    corners : list of (8, 3) ndarray
+        The corners of the bounding box of each instance, in world space.
+    """
+
+    digests: list[tuple[str, str]] = field(default_factory=list)
+    corners: list[np.ndarray] = field(default_factory=list)
+
+    def digest_pair(self) -> list[str]:
+        """Return a digest of all transforms, and one of all meshes. Their order does not matter."""
+        return [_digest(*sorted(column)) for column in zip(*self.digests, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class MeshState:
+    """A digest of an evaluated mesh, with its field if that is drawn, and its bounding box.
+
+    Attributes
+    ----------
+    digest : str
+    bounds : (2, 3) float32 ndarray
+        Object space.
+    face_count : int
+    """
+
+    digest: str
+    bounds: np.ndarray
+    face_count: int
+
+
+#: What has been read of meshes, by the object, the evaluated mesh and, for fields, their sources.
+#: None: the mesh has no faces.
+MeshStates = dict[tuple, MeshState | None]
+
+
+@dataclass(frozen=True)
+class _Sources:
+    """What the settings of a scene ask of its objects.
+
+    Attributes
+    ----------
+    tone_request : ToneRequest or None
+    uses_lights : bool
+    ignores_bad_vectors : bool
+    """
+
+    tone_request: ToneRequest | None
+    uses_lights: bool
+    ignores_bad_vectors: bool
+
+
+class SceneState:
+    """The objects and lights of a view layer: what its pictures from all cameras have in common.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    depsgraph : bpy.types.Depsgraph
+        The evaluated depsgraph of a view layer.
+    mesh_states : dict, optional
+        States of meshes that have not changed since they were read. New ones are added.
+
+    Attributes
+    ----------
+    face_count : int
+        The number of faces in all meshes.
+    """
+
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+        mesh_states: MeshStates | None = None,
+    ) -> None:
+        self.face_count = 0
+        self._fields: dict[str, _Instances] = {}
+        self._occluders: dict[str, _Instances] = {}
+        self._lights: dict[str, list[str]] = {}
+        sources = _read_sources(scene)
+        self._read_meshes(depsgraph, sources, {} if mesh_states is None else mesh_states)
+        if sources.uses_lights:
+            self._read_lights(depsgraph)
+
+    def _read_meshes(
+        self, depsgraph: bpy.types.Depsgraph, sources: _Sources, mesh_states: MeshStates
+    ) -> None:
+        with_field = set(field_objects(depsgraph.view_layer))
+        for instance in rendered_instances(depsgraph):
+            obj, owner = instance.object, instance.object.original
+            draws_field = owner in with_field
+            key = owner.session_uid, obj.data.as_pointer(), sources if draws_field else None
+            if key not in mesh_states:
+                mesh_states[key] = (
+                    _field_mesh_state(obj, owner, sources) if draws_field else _occluder_state(obj)
+                )
+            mesh_state = mesh_states[key]
+            if mesh_state is None:
+                continue
+            self.face_count += mesh_state.face_count
+            matrix = np.array(instance.matrix_world)
+            group = self._fields if draws_field else self._occluders
+            instances = group.setdefault(owner.name_full, _Instances())
+            instances.digests.append((_digest(matrix + 0.0), mesh_state.digest))
+            instances.corners.append(_box_corners(mesh_state.bounds, matrix))
+
+    def _read_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
+        for light, owner in rendered_lights(depsgraph, np.eye(4)):
+            self._lights.setdefault(owner.name_full, []).append(_digest(*vars(light).values()))
+        for digests in self._lights.values():
+            digests.sort()
+
+    def picture_state(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
+    ) -> PictureState:
+        """Return the state of the picture from a camera."""
+        camera = _resolved_camera(scene, depsgraph, source)
+        settings = applied_settings(read_look(scene.rosy))
+        output = {name: getattr(scene.rosy, name) for name in OUTPUT_PROPERTIES}
+        if output["store"] == "PACKED":
+            del output["directory"]
+        occluders = self._relevant_occluders(camera, settings["shadows"])
+        return PictureState(
+            look=settings,
+            size=[] if camera is None else [camera.width, camera.height],
+            camera="" if camera is None else _digest(camera.view + 0.0, camera.projection + 0.0),
+            output=output,
+            device=scene.rosy.device.lower(),
+            objects={name: instances.digest_pair() for name, instances in self._fields.items()},
+            occluders={name: instances.digest_pair() for name, instances in occluders},
+            lights=self._lights,
+            reference=(
+                _reference_digest(scene, depsgraph) if settings["tone"] == "picture" else ""
+            ),
+        )
+
+    def _relevant_occluders(
+        self, camera: Camera | None, casts_shadows: bool
+    ) -> Iterator[tuple[str, _Instances]]:
+        """Yield the objects without a field that may change the picture.
+
+        They may cast shadows. Otherwise the bounding box of an instance must be at least partly in
+        front of that of a field.
+        """
+        if casts_shadows or camera is None:
+            yield from self._occluders.items()
+            return
+        fields = self._boxes(camera, self._fields.values())
+        for name, instances in self._occluders.items():
+            boxes = self._boxes(camera, [instances])
+            if any(_may_hide(box, other) for box in boxes for other in fields):
+                yield name, instances
+
+    @staticmethod
+    def _boxes(camera: Camera, objects: Iterable[_Instances]) -> list[np.ndarray]:
+        """Return the boxes of instances in a picture, without those outside it."""
+        boxes = (_picture_box(camera, corners) for obj in objects for corners in obj.corners)
+        return [box for box in boxes if box is not None]
+
+
+def read_picture_states(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, sources: Iterable[CameraSource]
+) -> list[PictureState]:
+    """Return the state of the picture from each camera."""
+    scene_state = SceneState(scene, depsgraph)
+    return [scene_state.picture_state(scene, depsgraph, source) for source in sources]
+
+
+def _read_sources(scene: bpy.types.Scene) -> _Sources:
+    """Return what the settings of a scene ask of its objects."""
+    look = read_look(scene.rosy)
+    uses_lights = applied_settings(look)["light"] == "scene"
+    return _Sources(make_tone_request(scene, look), uses_lights, scene.rosy.undefined)
+
+
+def applied_settings(look: Look) -> dict:
+    """Return the settings of a look by name. Those that do not apply have their defaults."""
+    return {
+        name: getattr(look, name) if setting.applies(look) else setting.default
+        for name, setting in settings_of(Look).items()
+    }
+
+
+def _resolved_camera(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
+) -> Camera | None:
+    """Return the camera of a picture; None if no picture can be drawn from it."""
+    try:
+        return resolve_camera(scene, depsgraph, source)
+    except RosyError:
+        return None
+
+
+# --- meshes ---------------------------------------------------------------------------------------
+
+
+def _field_mesh_state(
+    obj: bpy.types.Object, owner: bpy.types.Object, sources: _Sources
+) -> MeshState | None:
+    """Return the state of an evaluated object whose field is drawn; None if it has no faces."""
+    original = owner.data
+    with evaluated_mesh(obj) as mesh:
+        if mesh is None:
+            return None
+        parts = [shape_digest(mesh), *_field_parts(mesh, original)]
+        parts.append(tone_source_digest(mesh, owner, sources.tone_request))
+        bounds, face_count = _bounds(mesh), len(mesh.polygons)
+    if user_modifiers(owner) or original.shape_keys:
+        # The rest shape and its normals, from which the field is transported.
+        parts += [shape_digest(original), *_field_parts(original, original)]
+    if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
+        parts.append(sources.ignores_bad_vectors)
+    return MeshState(_digest(*parts), bounds, face_count)
+
+
+def _occluder_state(obj: bpy.types.Object) -> MeshState | None:
+    """Return the state of an evaluated object that only occludes; None if it has no faces."""
+    with evaluated_mesh(obj) as mesh:
+        if mesh is None:
+            return None
+        digest = _digest(shape_digest(mesh, occluder_only=True))
+        return MeshState(digest, _bounds(mesh), len(mesh.polygons))
+
+
+def _field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
+    """Return the domains and values of the attributes that hold a field, and its degree."""
+    name = attribute_name(original)
+    if name in original.attributes:
+        names, parts = [name], [field_degree(original)]
+    else:
+        names = [f"dir{index}" for index in range(MAX_DEGREE) if f"dir{index}" in mesh.attributes]
+        parts = []
+    for name in names:
+        attribute = mesh.attributes.get(name)
+        if attribute is None or attribute.data_type not in (VECTOR_TYPE, ANGLE_TYPE):
+            parts.append(None)
+            continue
+        is_vector = attribute.data_type == VECTOR_TYPE
+        values = np.empty(len(attribute.data) * (3 if is_vector else 1), dtype=np.float32)
+        attribute.data.foreach_get("vector" if is_vector else "value", values)
+        parts += [attribute.domain, values]
+    return parts
+
+
+def _bounds(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the lowest and the highest coordinates of a mesh, (2, 3) float32."""
+    positions = vertex_positions(mesh)
+    return np.stack([positions.min(axis=0), positions.max(axis=0)])
+
+
+def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
+    """Return a digest of the reference render of a scene: its file, and its camera."""
+    try:
+        path = reference_path(scene)
+        camera = camera_of_object(scene, depsgraph, render_camera(scene), *render_size(scene))
+        contents = np.frombuffer(read_bytes(path), dtype=np.uint8)
+    except (RosyError, OSError) as error:
+        return f"{error}"
+    return _digest(contents, camera.view + 0.0, camera.projection + 0.0)
+
+
+def _digest(*parts: object) -> str:
+    """Return a digest as text. It is short, as it is stored in .blend files."""
+    return content_hash(*parts).hex()[:16]
+
+
+# --- bounding boxes in a picture ------------------------------------------------------------------
+
+
+def _box_corners(bounds: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """Return the corners of a box, (8, 3), in world space."""
+    choice = np.indices((2, 2, 2)).reshape(3, 8).T
+    corners = np.take_along_axis(bounds.astype(np.float64), choice, axis=0)
+    return corners @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
+    """Return the box around some points in a picture; None if it is outside the picture.
+
+    Returns
+    -------
+    (2, 3) float64 ndarray or None
+        Lowest and highest x, y (normalized device coordinates) and depth.
+    """
+    points = corners @ camera.view[:3, :3].T + camera.view[:3, 3]
+    clip = np.column_stack([points, np.ones(len(points))]) @ camera.projection.T
+    depth = -points[:, 2]
+    low, high = np.full(3, -1.0), np.full(3, 1.0)
+    if clip[:, 3].min() > 0:  # otherwise a part of the box is behind the camera
+        position = clip[:, :2] / clip[:, 3:]
+        low[:2] = np.maximum(position.min(axis=0), -1.0)
+        high[:2] = np.minimum(position.max(axis=0), 1.0)
+    elif depth.max() <= 0:
+        return None
+    low[2], high[2] = depth.min(), depth.max()
+    return np.stack([low, high]) if (low[:2] < high[:2]).all() else None
+
+
+def _may_hide(box: np.ndarray, other: np.ndarray) -> bool:
+    """Whether something in a box of `_picture_box` may hide something in another."""
+    overlaps = (box[0, :2] < other[1, :2]).all() and (other[0, :2] < box[1, :2]).all()
+    return bool(overlaps and box[0, 2] < other[1, 2])

@@ -253,8 +253,6 @@ def apply_picture(
         for obj in objects:
             node_groups.append(new_group(f"RoSy {obj.name}", material, matrices[obj]))
             created.append(node_groups[-1])
-    for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group)
     height, width = rendered_view.picture.rgba.shape[:2]
     store_record(
         scene,
@@ -264,6 +262,9 @@ def apply_picture(
         rendered_view.drawn_from,
         size=(width, height),
     )
+    # Now the old groups refer to the new picture, and are replaced as a whole.
+    for obj, node_group in zip(objects, node_groups, strict=True):
+        set_picture_modifier(obj, node_group)
     delete_unused()
     return BakeResult(
         name,
@@ -305,8 +306,6 @@ def apply_sequence(
         objects = list(dict.fromkeys(scene_data.objects))
         node_groups = [new_group(f"RoSy {obj.name}", material, None) for obj in objects]
         created += node_groups
-    for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group)
     store_record(
         scene,
         sequence.name,
@@ -316,6 +315,9 @@ def apply_sequence(
         size=(sequence.width, sequence.height),
         frame_range=f"{sequence.first} to {sequence.last}",
     )
+    # Now the old groups refer to the new picture, and are replaced as a whole.
+    for obj, node_group in zip(objects, node_groups, strict=True):
+        set_picture_modifier(obj, node_group)
     delete_unused()
 
 

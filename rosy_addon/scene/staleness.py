@@ -149,7 +149,7 @@ def _object_difference(
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
     before, after = _without_renamed(recorded, present)
-    for name in before.keys() & after.keys():
+    for name in sorted(before.keys() & after.keys()):
         if before[name][1] != after[name][1]:
             return f"{of_mesh}'{name}' was changed"
         if before[name][0] != after[name][0]:
@@ -162,7 +162,7 @@ def _light_difference(recorded: Mapping[str, list[str]], present: Mapping[str, l
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
     before, after = _without_renamed(recorded, present)
-    for name in before.keys() & after.keys():
+    for name in sorted(before.keys() & after.keys()):
         if before[name] != after[name]:
             return f"light '{name}' was changed"
     return _presence_difference(before, after, "light ")

@@ -7,7 +7,8 @@ picture may also have no record in a scene, as on objects that were appended fro
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -206,6 +207,11 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
     )
 
 
+def recorded_materials() -> set[bpy.types.Material]:
+    """Return the materials of all records of all scenes."""
+    return {record.material for scene in bpy.data.scenes for record in scene.rosy.bakes}
+
+
 def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeInfo]:
     """Return the pictures on the objects of a scene, sorted by camera name.
 
@@ -220,6 +226,8 @@ def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeI
     shown_materials = {
         material for obj in baked_objects(scene) for material in _shown_materials(obj)
     }
+    if for_panel and not recorded:
+        MESH_STATES.clear()
     reasons = _PresentReasons(scene, for_panel) if recorded else None
     infos = []
     for record in recorded:
@@ -292,7 +300,7 @@ def _shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
     """Return the materials of the pictures that an object shows."""
     modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
     materials = {material_of_group(modifier.node_group) for modifier in modifiers}
-    return (materials | set(applied_materials(obj))) - {None}
+    return (materials | set(applied_materials(obj.data))) - {None}
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
@@ -315,7 +323,7 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
         obj
         for obj in bpy.data.objects
         if (obj in own or obj not in others)
-        and (removable_modifiers(obj) or has_applied_picture(obj))
+        and (removable_modifiers(obj) or has_applied_picture(obj.data))
     ]
 
 
@@ -349,22 +357,14 @@ def remove_bakes(
     found = baked_objects(scene)
     targets = found if objects is None else [obj for obj in objects if obj in found]
     node_groups = 0
-    for obj in targets:
-        node_groups += remove_picture_modifiers(obj)
-        remove_applied_picture(obj)
+    with _object_mode(targets):
+        for obj in targets:
+            node_groups += remove_picture_modifiers(obj)
+            remove_applied_picture(obj.data)
+    if objects is None:
+        _clean_unused_meshes()
     needed = set() if objects is None else _needed_materials(set(found) - set(targets))
-    images = materials = 0
-    records = scene.rosy.bakes
-    for index in reversed(range(len(records))):
-        if records[index].material not in needed:
-            image, material, camera = (
-                getattr(records[index], name) for name in ("image", "material", "camera")
-            )
-            records.remove(index)
-            materials += 0 if _is_recorded(material) else delete_owned(material)
-            images += 0 if _is_recorded(image) else delete_owned(image)
-            if camera is not None and not camera.users:  # the user had deleted it
-                bpy.data.objects.remove(camera)
+    images, materials = _remove_records(scene, needed)
     unused = delete_unused()
     return RemovalCounts(
         len(targets),
@@ -372,6 +372,45 @@ def remove_bakes(
         materials + unused["materials"],
         node_groups + unused["node_groups"],
     )
+
+
+def _clean_unused_meshes() -> None:
+    """Remove applied pictures from the meshes of deleted objects. They still use the materials."""
+    used_data = {obj.data for obj in bpy.data.objects}
+    for mesh in bpy.data.meshes:
+        if mesh not in used_data:
+            remove_applied_picture(mesh)
+
+
+def _remove_records(scene: bpy.types.Scene, needed: set[bpy.types.Material]) -> tuple[int, int]:
+    """Remove the records without a needed material. Return the deleted images and materials."""
+    images = materials = 0
+    records = scene.rosy.bakes
+    for index in reversed(range(len(records))):
+        if records[index].material in needed:
+            continue
+        image, material, camera = (
+            getattr(records[index], name) for name in ("image", "material", "camera")
+        )
+        records.remove(index)
+        materials += 0 if _is_recorded(material) else delete_owned(material)
+        images += 0 if _is_recorded(image) else delete_owned(image)
+        if camera is not None and not camera.users:  # only the record kept it after it was deleted
+            bpy.data.objects.remove(camera)
+    return images, materials
+
+
+@contextmanager
+def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Leave edit mode for a moment if the data of objects have to be changed."""
+    is_editing = bpy.context.mode == "EDIT_MESH" and any(
+        obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
+    )
+    if is_editing:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield
+    if is_editing:
+        bpy.ops.object.mode_set(mode="EDIT")
 
 
 def _needed_materials(objects: set[bpy.types.Object]) -> set[bpy.types.Material]:

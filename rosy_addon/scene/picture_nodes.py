@@ -5,6 +5,7 @@ The user may have applied the modifier. Then the data of the object have the mat
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Any
 
 import bpy
@@ -12,6 +13,7 @@ import numpy as np
 
 from .blender_images import NEUTRAL_GRAY
 from .compat import has_nodes_by_default, is_editable
+from .meshes import read_attribute
 from .owned_data import OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
 
 #: Name of the modifier that shows a picture.
@@ -19,6 +21,10 @@ MODIFIER_NAME = "RoSy"
 
 #: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
 CLIP_ATTRIBUTE = "rosy_projection"
+
+#: Face attribute: the material index that each face had. It matters only if the user applies the
+#: modifier.
+MATERIAL_ATTRIBUTE = "rosy_material"
 
 
 def new_material(
@@ -138,20 +144,18 @@ def new_group(
     group_input = build("NodeGroupInput")
     set_material = build("GeometryNodeSetMaterial")
     set_material.inputs["Material"].default_value = material
-    group.links.new(group_input.outputs["Geometry"], set_material.inputs["Geometry"])
+    material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
+    geometry = build.stored_attribute(
+        group_input.outputs["Geometry"], MATERIAL_ATTRIBUTE, "INT", "FACE", material_index
+    )
+    group.links.new(geometry, set_material.inputs["Geometry"])
     geometry = set_material.outputs["Geometry"]
     if matrix is not None:
-        clip_position = build.transformed(
-            build("GeometryNodeInputPosition").outputs[0], _clip_rows(matrix)
+        position = build("GeometryNodeInputPosition").outputs[0]
+        clip_position = build.transformed(position, _clip_rows(matrix))
+        geometry = build.stored_attribute(
+            geometry, CLIP_ATTRIBUTE, "FLOAT_VECTOR", "POINT", clip_position
         )
-        store = build("GeometryNodeStoreNamedAttribute", data_type="FLOAT_VECTOR", domain="POINT")
-        store.inputs["Name"].default_value = CLIP_ATTRIBUTE
-        group.links.new(geometry, store.inputs["Geometry"])
-        value_socket = next(
-            socket for socket in store.inputs if socket.name == "Value" and socket.enabled
-        )
-        group.links.new(clip_position, value_socket)
-        geometry = store.outputs["Geometry"]
     group.links.new(geometry, build("NodeGroupOutput").inputs["Geometry"])
     _add_projection(group, material, matrix)
     return group
@@ -245,6 +249,22 @@ class _NodeBuilder:
             self.connect(value, enabled[name])
         return next(socket for socket in node.outputs if socket.enabled)
 
+    def stored_attribute(
+        self,
+        geometry: bpy.types.NodeSocket,
+        name: str,
+        data_type: str,
+        domain: str,
+        value: bpy.types.NodeSocket,
+    ) -> bpy.types.NodeSocket:
+        """Add a node that stores a named attribute, and return the geometry with it."""
+        node = self("GeometryNodeStoreNamedAttribute", data_type=data_type, domain=domain)
+        node.inputs["Name"].default_value = name
+        self.tree.links.new(geometry, node.inputs["Geometry"])
+        enabled = (socket for socket in node.inputs if socket.name == "Value" and socket.enabled)
+        self.tree.links.new(value, next(enabled))
+        return node.outputs["Geometry"]
+
     def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
         """Add nodes that multiply a point by a (3, 4) matrix, and return the output."""
         combined = self("ShaderNodeCombineXYZ")
@@ -257,10 +277,14 @@ class _NodeBuilder:
         return combined.outputs[0]
 
 
-def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) -> None:
+def set_picture_modifier(
+    obj: bpy.types.Object,
+    node_group: bpy.types.NodeTree,
+    pictures: Container[bpy.types.Material] = (),
+) -> None:
     """Set the node group of RoSy's modifier, and move it to the end of the object's stack.
 
-    The new group keeps the projections of the object's other pictures.
+    The new group keeps how the object shows its other pictures, as far as they are in `pictures`.
     """
     existing = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
     modifier = existing[0] if existing else obj.modifiers.new(MODIFIER_NAME, "NODES")
@@ -273,7 +297,7 @@ def set_picture_modifier(obj: bpy.types.Object, node_group: bpy.types.NodeTree) 
     if old_group is not None and old_group != node_group:
         shown_material = material_of_group(node_group)
         for material, matrix in projections_of_group(old_group).items():
-            if material != shown_material:
+            if material != shown_material and material in pictures:
                 _add_projection(node_group, material, matrix)
         if not old_group.users:
             bpy.data.node_groups.remove(old_group)
@@ -289,15 +313,14 @@ def remove_picture_modifiers(obj: bpy.types.Object) -> int:
     return sum(delete_owned(node_group) for node_group in node_groups if not node_group.users)
 
 
-def applied_materials(obj: bpy.types.Object) -> list[bpy.types.Material]:
-    """Return the pictures in the material slots of an object whose modifier was applied.
+def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
+    """Return the pictures in the material slots of a mesh, or of other data of an object.
 
-    Empty if its data are linked from a library.
+    They are there if the modifier was applied. Empty if the data are linked from a library.
     """
-    if obj.data is None or not is_editable(obj.data):
+    if data is None or not is_editable(data):
         return []
-    materials = getattr(obj.data, "materials", ())
-    return [material for material in materials if _is_picture(material)]
+    return [material for material in getattr(data, "materials", ()) if _is_picture(material)]
 
 
 def _is_picture(material: bpy.types.Material | None) -> bool:
@@ -310,23 +333,41 @@ def _is_picture(material: bpy.types.Material | None) -> bool:
     )
 
 
-def has_applied_picture(obj: bpy.types.Object) -> bool:
-    """Whether RoSy's modifier was applied to an object: its data have the results of `new_group`."""
-    return bool(applied_materials(obj) or _applied_attribute(obj))
+def has_applied_picture(data: bpy.types.ID | None) -> bool:
+    """Whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
+    return bool(applied_materials(data) or _applied_attributes(data))
 
 
-def remove_applied_picture(obj: bpy.types.Object) -> None:
-    """Remove what the applied modifier has left in the data of an object."""
-    for index in reversed(range(len(getattr(obj.data, "materials", ())))):
-        if _is_picture(obj.data.materials[index]):
-            obj.data.materials.pop(index=index)
-    attribute = _applied_attribute(obj)
-    if attribute is not None:
-        obj.data.attributes.remove(attribute)
+def remove_applied_picture(data: bpy.types.ID | None) -> None:
+    """Remove what the applied modifier has left in a mesh or other data, not in edit mode."""
+    if not has_applied_picture(data):
+        return
+    if MATERIAL_ATTRIBUTE in _applied_attributes(data):
+        _restore_material_indices(data)
+    for index in reversed(range(len(getattr(data, "materials", ())))):
+        if _is_picture(data.materials[index]):
+            data.materials.pop(index=index)
+    for name in _applied_attributes(data):
+        data.attributes.remove(data.attributes[name])
 
 
-def _applied_attribute(obj: bpy.types.Object) -> bpy.types.Attribute | None:
-    """Return the attribute `CLIP_ATTRIBUTE` of the data of an object; None if there is none."""
-    if obj.type != "MESH" or not is_editable(obj.data):
-        return None
-    return obj.data.attributes.get(CLIP_ATTRIBUTE)
+def _applied_attributes(data: bpy.types.ID | None) -> list[str]:
+    """Return the names of the attributes of `new_group` that a mesh has."""
+    if not isinstance(data, bpy.types.Mesh) or not is_editable(data):
+        return []
+    return [name for name in (CLIP_ATTRIBUTE, MATERIAL_ATTRIBUTE) if name in data.attributes]
+
+
+def _restore_material_indices(mesh: bpy.types.Mesh) -> None:
+    """Give the faces that show a picture the material that they had before."""
+    shows_picture = np.array([_is_picture(material) for material in mesh.materials], dtype=bool)
+    index = read_attribute(mesh, "material_index", np.int32, 1)
+    earlier_index = read_attribute(mesh, MATERIAL_ATTRIBUTE, np.int32, 1)
+    if index is None or earlier_index is None or not shows_picture.any():
+        return
+    index = np.where(shows_picture[np.clip(index, 0, len(shows_picture) - 1)], earlier_index, index)
+    if index.any():
+        mesh.attributes["material_index"].data.foreach_set("value", index)
+    else:
+        mesh.attributes.remove(mesh.attributes["material_index"])
+    mesh.update()

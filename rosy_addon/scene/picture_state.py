@@ -266,6 +266,18 @@ def _read_sources(scene: bpy.types.Scene) -> _Sources:
     return _Sources(make_tone_request(scene, look), uses_lights, scene.rosy.undefined)
 
 
+def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple:
+    """Return the settings on which a `SceneState` depends. Blender reports only some changes."""
+    objects = []
+    for obj in field_objects(view_layer):
+        image = obj.rosy.tone_image
+        image_key = image and (image.session_uid, *image.size, image.is_dirty)
+        mesh = obj.data
+        tone_key = image_key, obj.rosy.tone_uv_map
+        objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))
+    return _read_sources(scene), tuple(objects)
+
+
 def applied_settings(look: Look) -> dict:
     """Return the settings of a look by name. Those that do not apply have their defaults."""
     return {

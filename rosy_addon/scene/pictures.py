@@ -23,7 +23,14 @@ from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_folder
 from ..projection.camera import Camera
-from .bake_records import DrawnFrom, baked_objects, camera_name, find_record, store_record
+from .bake_records import (
+    DrawnFrom,
+    baked_objects,
+    camera_name,
+    find_record,
+    recorded_materials,
+    store_record,
+)
 from .blender_images import load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
@@ -264,7 +271,7 @@ def apply_picture(
     )
     # Now the old groups refer to the new picture, and are replaced as a whole.
     for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group)
+        set_picture_modifier(obj, node_group, recorded_materials())
     delete_unused()
     return BakeResult(
         name,
@@ -317,7 +324,7 @@ def apply_sequence(
     )
     # Now the old groups refer to the new picture, and are replaced as a whole.
     for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group)
+        set_picture_modifier(obj, node_group, recorded_materials())
     delete_unused()
 
 
@@ -347,7 +354,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
             matrix = projections[record.material]
             node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
             node_group[OWNED_TAG] = True
-            set_picture_modifier(obj, node_group)
+            set_picture_modifier(obj, node_group, recorded_materials())
 
 
 def _object_to_clip_matrices(

@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from .picture_state import MeshStates, PictureState, SceneState
+from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
 #: Number of faces in a scene above which a panel does not read it at every redraw, but only after
 #: Blender has reported a change.
@@ -39,13 +39,14 @@ class SceneStateCache:
     def __init__(self) -> None:
         self._mesh_states: MeshStates = {}
         self._scene_state: SceneState | None = None
-        self._key: tuple[int, str] | None = None
+        self._key: tuple | None = None
         self._is_outdated = True
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
         """Return the present state of the depsgraph's view layer, or that of a moment ago."""
-        key = scene.session_uid, depsgraph.view_layer.name
+        view_layer = depsgraph.view_layer
+        key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():
             self.clear()
             self._key = key

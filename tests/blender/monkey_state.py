@@ -76,12 +76,15 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
     state: Fingerprint = {}
     for kind, datablock in all_datablocks():
         name = _full_name(datablock)
+        if _is_deleted_camera(datablock):
+            continue
         if is_owned(datablock):
             state[f"owned/{kind}/{name}"] = _pixels(datablock) if pixels else None
         else:
             state[f"{kind}/{name}/id"] = datablock.use_fake_user
     for obj in bpy.data.objects:
-        _add_object(state, obj)
+        if not _is_deleted_camera(obj):
+            _add_object(state, obj)
     for mesh in bpy.data.meshes:
         if not is_owned(mesh):
             _add_mesh(state, mesh)
@@ -100,6 +103,15 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
         ),
     )
     return state
+
+
+def _is_deleted_camera(datablock: bpy.types.ID) -> bool:
+    """Whether a datablock is a camera that the user has deleted, and that the record of a bake keeps."""
+    return (
+        isinstance(datablock, bpy.types.Object)
+        and datablock.type == "CAMERA"
+        and not datablock.users_collection
+    )
 
 
 def all_datablocks() -> Iterator[tuple[str, bpy.types.ID]]:
@@ -261,6 +273,14 @@ def _same(a: Any, b: Any) -> bool:
 #: the current scene. An operator that fails or is stopped may change nothing.
 _FIELD = ("meshes/SELECTED/attributes/FIELD", "meshes/SELECTED/rosy/*", "meshes/SELECTED/counts")
 _PICTURE = ("owned/images/*", "owned/materials/*", "owned/node_groups/*", "picture/*")
+#: What an applied modifier has left in a mesh.
+_APPLIED = (
+    "meshes/*/materials",
+    "meshes/*/attributes/rosy_projection",
+    "meshes/*/attributes/rosy_material",
+    "meshes/*/attributes/material_index",
+    "objects/*/slots",
+)
 _STROKES = (
     "owned/objects/*",
     "owned/materials/*",
@@ -283,7 +303,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     ),
     "bake": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
     "bake_animation": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
-    "remove": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
+    "remove": (*_PICTURE, "scenes/SCENE/rosy/bakes/*", *_APPLIED),
     "show": ("owned/node_groups/*", "picture/*"),
     "turntable": (),
     "viewport": (),
@@ -351,7 +371,9 @@ def leftovers() -> list[str]:
         left += [
             f"attribute '{attribute.name}' of '{mesh.name}'"
             for attribute in mesh.attributes
-            if attribute.name.startswith(("rosy_stand_in", "rosy_face_normal"))
+            if attribute.name.startswith(
+                ("rosy_stand_in", "rosy_face_normal", "rosy_projection", "rosy_material")
+            )
         ]
     return left
 

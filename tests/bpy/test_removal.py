@@ -1,0 +1,314 @@
+"""Whatever users do with objects that show pictures: Remove leaves nothing of RoSy's, and all of theirs."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
+from rosy.rosy_addon.scene.cameras import scene_cameras
+from scenes import add_camera, add_field, add_plane, contents, link
+
+
+def build(folder=None):
+    """Build a scene of two meshes with fields, materials and modifiers, and two cameras."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = 24
+    scene.camera = add_camera("Camera", (0.0, -5.0, 0.5))
+    add_camera("Second", (3.0, -4.0, 1.0))
+    own = [bpy.data.materials.new(name) for name in ("Own", "Other")]
+    for name, x in (("Sheet", -0.7), ("Plain", 0.7)):
+        obj = add_field(add_plane(name, size=0.6, cuts=2), kind="axis")
+        obj.location.x = x
+        for material in own:
+            obj.data.materials.append(material)
+        obj.data.attributes.new("mine", "FLOAT", "FACE")
+        obj.data.polygons[1].material_index = 1
+    bpy.data.objects["Sheet"].modifiers.new("Solid", "SOLIDIFY")
+    image = bpy.data.images.new("Painting", 4, 4)
+    image.use_fake_user = True
+    bpy.context.view_layer.update()
+    return scene
+
+
+def obj(name):
+    return bpy.data.objects[name]
+
+
+def select(*names):
+    for other in bpy.context.scene.objects:
+        other.select_set(other.name in names)
+    bpy.context.view_layer.objects.active = obj(names[-1])
+
+
+def nothing(tmp_path):
+    pass
+
+
+def duplicate(tmp_path):
+    select("Sheet", "Plain")
+    bpy.ops.object.duplicate()
+
+
+def duplicate_linked(tmp_path):
+    select("Sheet", "Plain")
+    bpy.ops.object.duplicate(linked=True)
+
+
+def join(tmp_path):
+    select("Plain", "Sheet")
+    bpy.ops.object.join()
+
+
+def delete(tmp_path):
+    select("Plain")
+    bpy.ops.object.delete()
+
+
+def delete_camera(tmp_path):
+    select("Second")
+    bpy.ops.object.delete()
+
+
+def rename(tmp_path):
+    for name in ("Sheet", "Plain", "Camera"):
+        obj(name).data.name, obj(name).name = f"My {name} Data", f"My {name}"
+    bpy.context.scene.name = "Shot"
+
+
+def apply(*names):
+    def change(tmp_path):
+        for name in names:
+            select(name)
+            for modifier in list(obj(name).modifiers):
+                bpy.ops.object.modifier_apply(modifier=modifier.name)
+
+    return change
+
+
+def apply_and_duplicate(tmp_path):
+    apply("Sheet", "Plain")(tmp_path)
+    duplicate(tmp_path)
+
+
+def apply_and_join(tmp_path):
+    apply("Plain")(tmp_path)
+    join(tmp_path)
+
+
+def apply_and_edit(tmp_path):
+    apply("Plain")(tmp_path)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+def apply_and_bake_again(tmp_path):
+    apply("Plain")(tmp_path)
+    bake(bpy.context.scene)
+
+
+def convert(tmp_path):
+    select("Plain")
+    bpy.ops.object.convert(target="MESH", keep_original=True)
+
+
+def hide(tmp_path):
+    obj("Plain").hide_render = obj("Plain").hide_viewport = True
+
+
+def exclude(tmp_path):
+    collection = bpy.data.collections.new("Away")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(obj("Plain"))
+    bpy.context.scene.collection.objects.unlink(obj("Plain"))
+    bpy.context.view_layer.layer_collection.children["Away"].exclude = True
+
+
+def unlink(tmp_path):
+    obj("Plain").use_fake_user = True
+    bpy.context.scene.collection.objects.unlink(obj("Plain"))
+
+
+def copy_modifier(tmp_path):
+    other = link(add_plane("Copy").copy())
+    other.modifiers.new("Picture", "NODES").node_group = obj("Plain").modifiers[-1].node_group
+
+
+def remove_modifier(tmp_path):
+    obj("Plain").modifiers.clear()
+
+
+def delete_record(tmp_path):
+    bpy.context.scene.rosy.bakes.clear()
+
+
+def save_and_open(tmp_path):
+    path = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+
+
+def bake_with_another_camera(tmp_path):
+    bpy.context.scene.camera = obj("Second")
+    bake(bpy.context.scene)
+
+
+ACTIONS = {
+    function.__name__ if name is None else name: function
+    for name, function in (
+        (None, nothing),
+        (None, duplicate),
+        (None, duplicate_linked),
+        (None, join),
+        (None, delete),
+        (None, delete_camera),
+        (None, rename),
+        ("apply", apply("Sheet", "Plain")),
+        ("apply one", apply("Plain")),
+        (None, apply_and_duplicate),
+        (None, apply_and_join),
+        (None, apply_and_edit),
+        (None, apply_and_bake_again),
+        (None, convert),
+        (None, hide),
+        (None, exclude),
+        (None, unlink),
+        (None, copy_modifier),
+        (None, remove_modifier),
+        (None, delete_record),
+        (None, save_and_open),
+        (None, bake_with_another_camera),
+    )
+}
+
+#: Actions on the modifiers of the user, or on RoSy's alone, without a picture.
+NEEDS_PICTURE = ("copy_modifier", "apply_and_bake_again", "bake_with_another_camera")
+
+
+def user_contents():
+    """Return the contents of the file, and the material of each face."""
+    if bpy.context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    indices = {
+        mesh.name: [polygon.material_index for polygon in mesh.polygons] for mesh in bpy.data.meshes
+    }
+    return contents() | indices
+
+
+@pytest.mark.parametrize("saved", [False, True], ids=["packed", "saved"])
+@pytest.mark.parametrize("name", ACTIONS)
+def test_remove_leaves_what_the_user_has_made(name, saved, tmp_path):
+    """The file is as if the same had been done to it without a picture."""
+    action = ACTIONS[name]
+    build()
+    if name not in NEEDS_PICTURE:
+        action(tmp_path)
+    elif name == "copy_modifier":
+        link(add_plane("Copy").copy())
+    elif name == "apply_and_bake_again":
+        apply("Plain")(tmp_path)
+    expected = user_contents()
+    scene = build()
+    if saved:
+        scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "pictures")
+    bake(scene, cameras=scene_cameras(scene))
+    action(tmp_path)
+    scene = bpy.context.scene
+    assert has_pictures(scene)
+    remove_bakes(scene)
+    assert user_contents() == expected
+    assert not has_pictures(scene) and not list_bakes(scene)
+
+
+@pytest.mark.parametrize("applied", [False, True], ids=["modifier", "applied"])
+def test_an_appended_object(applied, tmp_path):
+    """It brings its picture, which the panel lists and Remove removes."""
+    scene = build()
+    bake(scene)
+    if applied:
+        apply("Plain")(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    scene = build()
+    bake(scene)
+    append(tmp_path / "baked.blend")
+    appended = obj("Plain.001")
+    infos = list_bakes(scene)
+    assert [(info.width, info.height, info.is_shown) for info in infos] == [(24, 24, True)] * 2
+    assert [info.camera for info in infos if info.unknown_reason] == ["Camera.001"]
+    assert len({info.image for info in infos}) == 2
+    remove_bakes(scene)
+    assert not list_bakes(scene) and not has_pictures(scene)
+    assert [material.name[:5] for material in appended.data.materials] == ["Own.0", "Other"]
+    assert not bpy.data.node_groups
+    assert [image.name for image in bpy.data.images] == ["Painting"]
+    assert {material.name[:3] for material in bpy.data.materials} == {"Own", "Oth"}
+
+
+def append(path):
+    with bpy.data.libraries.load(str(path)) as (_, target):
+        target.objects = ["Plain"]
+    for appended in target.objects:
+        link(appended)
+
+
+def test_an_appended_object_takes_part_in_the_next_bake(tmp_path):
+    scene = build()
+    bake(scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    scene = build()
+    append(tmp_path / "baked.blend")
+    (info,) = list_bakes(scene)
+    assert info.unknown_reason == "baked in another file or scene"
+    bake(scene)
+    assert [(info.camera, info.unknown_reason) for info in list_bakes(scene)] == [("Camera", "")]
+    assert len([image for image in bpy.data.images if image.get("rosy_made")]) == 1
+
+
+def test_a_linked_object_is_left_alone(tmp_path):
+    scene = build()
+    bake(scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    scene = build()
+    with bpy.data.libraries.load(str(tmp_path / "baked.blend"), link=True) as (_, target):
+        target.objects = ["Plain"]
+    link(target.objects[0])
+    before = contents()
+    assert not has_pictures(scene) and not list_bakes(scene)
+    remove_bakes(scene)
+    assert contents() == before
+
+
+def test_materials_of_strokes_stay(tmp_path):
+    """A mesh of the user's may have the ink of strokes that were converted."""
+    scene = build()
+    ink = bpy.data.materials.new("RoSy Ink")
+    ink["rosy_made"] = True
+    obj("Plain").data.materials.append(ink)
+    bake(scene)
+    remove_bakes(scene)
+    assert [material.name for material in obj("Plain").data.materials] == [
+        "Own",
+        "Other",
+        "RoSy Ink",
+    ]
+
+
+def test_a_duplicate_shows_the_picture_of_another_camera(tmp_path):
+    scene = build()
+    bake(scene, cameras=scene_cameras(scene))
+    rename(tmp_path)
+    select("My Plain")
+    bpy.ops.object.duplicate()
+    from rosy.rosy_addon.scene.pictures import show_bake
+
+    show_bake(scene, "Second")
+    shown = {info.camera: info.is_shown for info in list_bakes(scene)}
+    assert shown == {"Second": True, "My Camera": False}
+    matrices = {
+        np.round(tuple(modifier.node_group.rosy.projections[0].matrix), 4).tobytes()
+        for name in ("My Plain", "My Plain.001", "My Sheet")
+        for modifier in obj(name).modifiers
+        if modifier.name == "RoSy"
+    }
+    assert len(matrices) == 2 and len(bpy.data.node_groups) == 3

@@ -55,6 +55,11 @@ def select_renderer(
     return CpuRenderer(cache, keep_gbuffers=keep_gbuffers)
 
 
+def automatic_device(look: Look) -> str:
+    """Return which device draws a look if the device is "auto": "cpu" or "gpu"."""
+    return select_renderer("auto", look).device_name
+
+
 def select_viewport_renderer(device: str) -> ViewportRenderer:
     """Return the renderer for 3D views: numpy if the device is "cpu", otherwise the graphics card.
 

@@ -7,16 +7,18 @@ picture may also have no record in a scene, as on objects that were appended fro
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
+from ..compositor.look import Look
 from ..errors import RosyError
 from ..projection.camera import Camera
 from .cameras import CameraSource, frame_camera
+from .look_properties import read_look
 from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
     applied_materials,
@@ -212,7 +214,12 @@ def recorded_materials() -> set[bpy.types.Material]:
     return {record.material for scene in bpy.data.scenes for record in scene.rosy.bakes}
 
 
-def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeInfo]:
+def list_bakes(
+    scene: bpy.types.Scene,
+    *,
+    for_panel: bool = False,
+    automatic_device: Callable[[Look], str] | None = None,
+) -> list[BakeInfo]:
     """Return the pictures on the objects of a scene, sorted by camera name.
 
     Parameters
@@ -221,6 +228,9 @@ def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeI
     for_panel : bool
         Do not read a large scene again if nothing has changed, or if it was read a moment ago; see
         `SceneStateCache`.
+    automatic_device : callable, optional
+        Returns the device, "cpu" or "gpu", that draws a look if the scene's device is "auto". By
+        default it is the one that has drawn the picture.
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
     shown_materials = {
@@ -228,7 +238,7 @@ def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeI
     }
     if for_panel and not recorded:
         MESH_STATES.clear()
-    reasons = _PresentReasons(scene, for_panel) if recorded else None
+    reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
     infos = []
     for record in recorded:
         info = BakeInfo(
@@ -253,8 +263,14 @@ def list_bakes(scene: bpy.types.Scene, *, for_panel: bool = False) -> list[BakeI
 class _PresentReasons:
     """Compares records with the present state of a scene, which is read once for all of them."""
 
-    def __init__(self, scene: bpy.types.Scene, for_panel: bool) -> None:
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        for_panel: bool,
+        automatic_device: Callable[[Look], str] | None,
+    ) -> None:
         self.scene = scene
+        self.automatic_device = automatic_device
         self.depsgraph = scene_depsgraph(scene)
         self.scene_state = (
             MESH_STATES.get(scene, self.depsgraph)
@@ -284,7 +300,17 @@ class _PresentReasons:
         present = self.scene_state.picture_state(self.scene, self.depsgraph, source)
         if record.frames:
             del present.output["placement"]  # frames always fill the frame of the camera
-        return {"stale_reason": difference(recorded, present, source.name, record.device)}
+        recorded = replace(recorded, device=record.device)
+        present = replace(present, device=self._device(present, record))
+        return {"stale_reason": difference(recorded, present, source.name)}
+
+    def _device(self, present: PictureState, record: bpy.types.PropertyGroup) -> str:
+        """Return what would draw a picture now: "cpu" or "gpu"."""
+        if present.device != "auto":
+            return present.device
+        if self.automatic_device is None:
+            return record.device
+        return self.automatic_device(read_look(self.scene.rosy))
 
     def _source(self, record: bpy.types.PropertyGroup) -> CameraSource | None:
         """Return the camera that a picture would be drawn from; None if it was deleted."""

@@ -54,7 +54,7 @@ class PictureState:
     output : dict
         Values of `OUTPUT_PROPERTIES`.
     device : str
-        The device: "cpu", "gpu" or "auto".
+        What draws the picture: "cpu", "gpu" or "auto".
     objects, occluders, lights : dict of str to list of str
         By the name of an object, the digests of the transforms of its instances and of what they
         are instances of. Only the occluders and lights that may change the picture are in it.

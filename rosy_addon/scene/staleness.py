@@ -105,7 +105,7 @@ def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> 
     MESH_STATES.note_changes(depsgraph)
 
 
-def difference(recorded: PictureState, present: PictureState, camera: str, device: str) -> str:
+def difference(recorded: PictureState, present: PictureState, camera: str) -> str:
     """Return why a picture is out of date; empty if it is up to date.
 
     Parameters
@@ -116,8 +116,6 @@ def difference(recorded: PictureState, present: PictureState, camera: str, devic
         What it would be drawn from now.
     camera : str
         Name of the camera.
-    device : str
-        What drew the picture: "cpu" or "gpu".
     """
     if recorded.look != present.look:
         return "the look was changed"
@@ -131,7 +129,7 @@ def difference(recorded: PictureState, present: PictureState, camera: str, devic
         or _light_difference(recorded.lights, present.lights)
         or ("the picture of the tone was changed" * (recorded.reference != present.reference))
         or _output_difference(recorded.output, present.output)
-        or ("the device was changed" * (present.device not in ("auto", device)))
+        or ("the device was changed" * (recorded.device != present.device))
     )
 
 

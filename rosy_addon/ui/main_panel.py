@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..errors import counted
+from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
@@ -117,7 +118,7 @@ def _draw_picture_section(
     if job_status.current is not None:
         draw_progress(layout)
         return
-    bake_infos = list_bakes(context.scene, for_panel=True)
+    bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
     _redraw_later(MESH_STATES.seconds_to_wait())
     for bake in bake_infos:
         _draw_bake_info(layout, bake, several=len(bake_infos) > 1)

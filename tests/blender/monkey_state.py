@@ -368,6 +368,8 @@ def leftovers() -> list[str]:
             if getattr(modifier, "node_group", None) is not None and is_owned(modifier.node_group)
         ]
     for mesh in bpy.data.meshes:
+        if mesh.library is not None:
+            continue
         left += [
             f"attribute '{attribute.name}' of '{mesh.name}'"
             for attribute in mesh.attributes

@@ -13,6 +13,7 @@ from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake, bake_task
 from rosy.rosy_addon.cache import BAKE_CACHE
 from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.gpu.select import automatic_device
 from rosy.rosy_addon.presets.store import load_preset
 from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
@@ -421,7 +422,8 @@ TABLE = {
     "store": (put("rosy.store", "SAVED"), None, "the storage was changed"),
     "format": (put("rosy.image_format", "FLOAT"), None, "the format was changed"),
     "folder without storing": (put("rosy.directory", "//elsewhere/"), None, ""),
-    "device": (put("rosy.device", "AUTO"), None, ""),
+    "automatic device": (put("rosy.device", "AUTO"), None, None),
+    "graphics card": (put("rosy.device", "GPU"), None, "the device was changed"),
     # what a picture does not depend on
     "scene renamed": (put("name", "Shot"), None, ""),
     "selection": (select, None, ""),
@@ -435,7 +437,10 @@ TABLE = {
 
 def bake_word(scene):
     """Return what the panel says about the picture, in a scene that is watched and in one that is not."""
-    (watched,), (info,) = list_bakes(scene, for_panel=True), list_bakes(scene)
+    (watched,), (info,) = (
+        list_bakes(scene, for_panel=for_panel, automatic_device=automatic_device)
+        for for_panel in (True, False)
+    )
     assert not info.unknown_reason
     assert watched.stale_reason == info.stale_reason
     return info.stale_reason

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -59,8 +60,7 @@ class SceneStateCache:
             end = time.monotonic()
             self._next_reading = end + max(STATE_TTL_SECONDS, TTL_READINGS * (end - start))
             if self._scene_state.face_count > MAX_UNWATCHED_FACES and not self._is_watching():
-                for name in _WATCHED_EVENTS:
-                    getattr(bpy.app.handlers, name).append(_note_changes)
+                self._watch()
         return self._scene_state
 
     def seconds_to_wait(self) -> float:
@@ -89,6 +89,13 @@ class SceneStateCache:
         if self._is_watching():
             for name in _WATCHED_EVENTS:
                 getattr(bpy.app.handlers, name).remove(_note_changes)
+        atexit.unregister(self.clear)
+
+    def _watch(self) -> None:
+        """Add the handlers. Blender's Python module must not have them when Python exits."""
+        for name in _WATCHED_EVENTS:
+            getattr(bpy.app.handlers, name).append(_note_changes)
+        atexit.register(self.clear)
 
     @staticmethod
     def _is_watching() -> bool:

@@ -202,6 +202,7 @@ class Look:
         panel="streaks",
         panel_before="high_pass",
         stage=Stage.SHADING,
+        applies=lambda look: not is_hatched(look),
     )
     guiding_angle: float = number(
         0.0,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -115,11 +115,14 @@ class MeshState:
     bounds : (2, 3) float32 ndarray
         Object space.
     face_count : int
+    lacks_tone : bool
+        Whether the mesh does not have the tone that the look asks for. It is lit instead.
     """
 
     digest: str
     bounds: np.ndarray
     face_count: int
+    lacks_tone: bool = False
 
 
 #: What has been read of meshes, by the object, the evaluated mesh and, for fields, their sources.
@@ -167,6 +170,7 @@ class SceneState:
         mesh_states: MeshStates | None = None,
     ) -> None:
         self.face_count = 0
+        self._lacks_tone = False
         self._fields: dict[str, _Instances] = {}
         self._occluders: dict[str, _Instances] = {}
         self._lights: dict[str, list[str]] = {}
@@ -191,6 +195,7 @@ class SceneState:
             if mesh_state is None:
                 continue
             self.face_count += mesh_state.face_count
+            self._lacks_tone |= mesh_state.lacks_tone
             matrix = np.array(instance.matrix_world)
             group = self._fields if draws_field else self._occluders
             instances = group.setdefault(owner.name_full, _Instances())
@@ -208,7 +213,7 @@ class SceneState:
     ) -> PictureState:
         """Return the state of the picture from a camera."""
         camera = _resolved_camera(scene, depsgraph, source)
-        settings = applied_settings(read_look(scene.rosy))
+        settings = applied_settings(read_look(scene.rosy), self._lacks_tone)
         output = {name: getattr(scene.rosy, name) for name in OUTPUT_PROPERTIES}
         if output["store"] == "PACKED":
             del output["directory"]
@@ -221,7 +226,7 @@ class SceneState:
             device=scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
             occluders={name: instances.digest_pair() for name, instances in occluders},
-            lights=self._lights,
+            lights=self._lights if settings["light"] == "scene" else {},
             reference=(
                 _reference_digest(scene, depsgraph) if settings["tone"] == "picture" else ""
             ),
@@ -262,7 +267,7 @@ def read_picture_states(
 def _read_sources(scene: bpy.types.Scene) -> _Sources:
     """Return what the settings of a scene ask of its objects."""
     look = read_look(scene.rosy)
-    uses_lights = applied_settings(look)["light"] == "scene"
+    uses_lights = look.light == "scene" and look.shading > 0
     return _Sources(make_tone_request(scene, look), uses_lights, scene.rosy.undefined)
 
 
@@ -278,10 +283,18 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
     return _read_sources(scene), tuple(objects)
 
 
-def applied_settings(look: Look) -> dict:
-    """Return the settings of a look by name. Those that do not apply have their defaults."""
+def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
+    """Return the settings of a look by name. Those that do not apply have their defaults.
+
+    Parameters
+    ----------
+    look : Look
+    lacks_tone : bool
+        Whether a mesh does not have the tone of the look. Then the light falls on it.
+    """
+    drawn_look = replace(look, tone_lit=True) if lacks_tone else look
     return {
-        name: getattr(look, name) if setting.applies(look) else setting.default
+        name: getattr(look, name) if setting.applies(drawn_look) else setting.default
         for name, setting in settings_of(Look).items()
     }
 
@@ -307,15 +320,16 @@ def _field_mesh_state(
     with evaluated_mesh(obj) as mesh:
         if mesh is None:
             return None
-        parts = [shape_digest(mesh), *_field_parts(mesh, original)]
-        parts.append(tone_source_digest(mesh, owner, sources.tone_request))
+        tone_digest = tone_source_digest(mesh, owner, sources.tone_request)
+        parts = [shape_digest(mesh), *_field_parts(mesh, original), tone_digest]
         bounds, face_count = _bounds(mesh), len(mesh.polygons)
     if user_modifiers(owner) or original.shape_keys:
         # The rest shape and its normals, from which the field is transported.
         parts += [shape_digest(original), *_field_parts(original, original)]
     if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
         parts.append(sources.ignores_bad_vectors)
-    return MeshState(_digest(*parts), bounds, face_count)
+    lacks_tone = sources.tone_request is not None and not tone_digest
+    return MeshState(_digest(*parts), bounds, face_count, lacks_tone)
 
 
 def _occluder_state(obj: bpy.types.Object) -> MeshState | None:

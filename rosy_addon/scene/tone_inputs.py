@@ -97,7 +97,10 @@ def read_tone(
 def tone_source_digest(
     mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
 ) -> bytes:
-    """Return a digest of what `read_tone` reads. It is that of the error if it cannot be read."""
+    """Return a digest of what `read_tone` reads; empty if the mesh has no tone.
+
+    If the tone cannot be read, it is the digest of the error.
+    """
     if tone_request is None:
         return b""
     try:

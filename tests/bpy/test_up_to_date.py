@@ -5,6 +5,8 @@ A change either changes what the next bake gives, and the panel says so, or neit
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from rosy.rosy_addon.bake import bake, bake_task
 from rosy.rosy_addon.cache import BAKE_CACHE
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
+from rosy.rosy_addon.image_io.png import write_png
 from rosy.rosy_addon.presets.store import load_preset
 from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
@@ -83,12 +86,39 @@ def add_tone(value=0.5):
         mesh.update()
 
 
+def tone_and_lights(scene):
+    tone(scene)
+    scene_lights(scene)
+
+
+def tone_of_one_and_lights(scene):
+    tone_and_lights(scene)
+    mesh = obj("Plain").data
+    mesh.attributes.remove(mesh.attributes["dark"])
+    mesh.update()
+
+
 def tone_image(scene):
     scene.rosy.look.tone = "image"
     image = bpy.data.images.new("Tone", 4, 4)
     for name in ("Sheet", "Plain"):
         obj(name).data.uv_layers.new(name="UVMap")
         obj(name).rosy.tone_image = image
+
+
+def write_reference(value):
+    def change(scene):
+        rgba = np.ones((SIZE, SIZE, 4), dtype=np.float32)
+        rgba[: SIZE // 2, :, :3] = value
+        write_png(Path(scene.rosy.tone_picture), rgba)
+
+    return change
+
+
+def tone_picture(scene):
+    scene.rosy.look.tone = "picture"
+    scene.rosy.tone_picture = scene.rosy.directory + "/render.png"
+    write_reference(0.3)(scene)
 
 
 def paint_tone(scene):
@@ -396,11 +426,21 @@ TABLE = {
     "light without shading": (put("rosy.look.light", "scene"), put("rosy.look.shading", 0.0), ""),
     "ink without hatching": (put("rosy.look.ink_colour", (1.0, 0.0, 0.0)), None, ""),
     "paper": (put("rosy.look.paper_colour", (1.0, 0.0, 0.0)), hatched, "the look was changed"),
+    "gain": (put("rosy.look.gain", 1.0), None, "the look was changed"),
+    "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
     "unit size in pixels": (put("rosy.look.unit_size", 0.5), None, ""),
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "preset": (preset, None, "the look was changed"),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
     "tone attribute unused": (lambda scene: add_tone(0.2), None, ""),
+    "tone picture": (write_reference(0.6), tone_picture, "the picture of the tone was changed"),
+    "tone picture of the same name": (write_reference(0.3), tone_picture, ""),
+    "lamp with tones": (put("Key:data.energy", 900.0), tone_and_lights, ""),
+    "lamp without one of the tones": (
+        put("Key:data.energy", 900.0),
+        tone_of_one_and_lights,
+        "light 'Key' was changed",
+    ),
     "tone image": (paint_tone, tone_image, "field of 'Plain' was changed"),
     # camera and output
     "camera moved": (move("Camera", 0.1, 0.0, 0.0), None, "camera 'Camera' was changed"),

@@ -2,8 +2,9 @@
 
 Only objects that have changed are read again. In contrast to `scene_reader.read_scene`, nothing is
 changed in the file, so a scene can be read while Blender draws. If modifiers only deform an object,
-its original mesh has the rest positions and the field. If they change the topology, both have to be
-read once by `SceneCache.resolve_topologies`, and are valid until the topology changes again.
+its original mesh has the rest positions and the field. If they change the topology, or may change the
+attribute of the field, both have to be read once by `SceneCache.resolve_topologies`, and are valid
+until one of them changes again. If that fails, the error is valid until the object changes.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ import bpy
 import numpy as np
 
 from ..cache import Cache, content_hash
-from ..errors import RosyError
+from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .evaluated_field import FieldLayout, read_evaluated_field
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
-from .meshes import evaluated_mesh, mesh_surface
+from .meshes import evaluated_mesh, mesh_surface, read_attribute
 from .owned_data import user_modifiers
 from .read_field import read_mesh_field
-from .scene_reader import is_field_enabled, temp_attributes
+from .scene_reader import is_field_enabled, lost_field_error, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
 
 
@@ -53,9 +54,12 @@ class InstanceState:
 class _TopologyEntry:
     """Rest positions and field of an evaluated mesh whose topology differs from the original's."""
 
-    topology_hash: bytes
     rest: np.ndarray | None
     field: RosyField
+
+
+#: The name of an object, and the `_topology_hash` of one of its evaluated meshes.
+_TopologyKey = tuple[str, bytes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +83,12 @@ class SceneCache:
     def __init__(self) -> None:
         self.errors: dict[str, str] = {}
         self._cache = Cache()
-        # By the name of the object.
-        self._topologies: dict[str, _TopologyEntry] = {}
+        # The error message of a mesh that could not be read.
+        self._topologies: dict[_TopologyKey, _TopologyEntry | str] = {}
         # By the name of the object, the pointer of its mesh, and `tone_image_key`.
         self._mesh_states: dict[tuple[str, int, tuple], _MeshState] = {}
-        # Names of objects that need `resolve_topologies`.
-        self._unresolved: set[str] = set()
+        # Meshes that need `resolve_topologies`.
+        self._unresolved: set[_TopologyKey] = set()
         # Mesh instances of the last call of `read`, and their versions.
         self._instances: dict[tuple, tuple[MeshInstance, int]] = {}
         self._last_version = 0
@@ -102,9 +106,9 @@ class SceneCache:
         """
         for key in [key for key in self._mesh_states if names is None or key[0] in names]:
             del self._mesh_states[key]
-        if topology_changed:
-            for name in [name for name in self._topologies if names is None or name in names]:
-                del self._topologies[name]
+        for key in [key for key in self._topologies if names is None or key[0] in names]:
+            if topology_changed or isinstance(self._topologies[key], str):
+                del self._topologies[key]
 
     def read(
         self,
@@ -136,6 +140,7 @@ class SceneCache:
         self._unresolved.clear()
         states: list[InstanceState] = []
         instances: dict[tuple, tuple[MeshInstance, int]] = {}
+        faceless: set[bpy.types.Object] = set()
         for instance in depsgraph.object_instances:
             obj = instance.object
             if obj.type != "MESH" or not instance.show_self:
@@ -146,6 +151,8 @@ class SceneCache:
                 continue
             mesh_state = self._read_cached(obj, owner, nonfinite, draws_field)
             if mesh_state is None:
+                if draws_field:
+                    faceless.add(owner)
                 continue
             visibility_object = (
                 instance.parent.original if instance.is_instance and instance.parent else owner
@@ -164,11 +171,19 @@ class SceneCache:
                     instances[instance_key][0], owner, visibility_object, instances[instance_key][1]
                 )
             )
+        self._report_faceless(faceless - {state.owner for state in states})
         # The instances of the last call are released only now: while their surfaces are alive, no
         # new object can have the same id.
         self._instances = instances
         self._cache.evict_over_limit()
         return states
+
+    def _report_faceless(self, owners: set[bpy.types.Object]) -> None:
+        """Add errors for objects without any mesh that was read, unless they have one."""
+        waiting = {name for name, _ in self._unresolved}
+        for owner in owners:
+            if owner.name not in self.errors and owner.name not in waiting:
+                self.errors[owner.name] = str(lost_field_error(owner, None))
 
     def _versioned_instance(
         self, instance_key: tuple, mesh_state: _MeshState, matrix: np.ndarray
@@ -191,18 +206,23 @@ class SceneCache:
 
         This adds temporary attributes to the meshes, so it must not be called while Blender draws.
         """
-        names, self._unresolved = set(self._unresolved), set()
-        for name in names:
+        unresolved, self._unresolved = self._unresolved, set()
+        for name in {name for name, _ in unresolved}:
             obj = depsgraph.view_layer.objects.get(name) or bpy.data.objects.get(name)
             if obj is None:
                 continue
+            for key in [key for key in self._topologies if key[0] == name]:
+                del self._topologies[key]
             try:
-                with temp_attributes(depsgraph, [obj], nonfinite, self._cache) as layouts:
-                    self._topologies[name] = self._evaluate_topology(
-                        depsgraph, obj, layouts[obj], nonfinite
-                    )
-            except RosyError as error:
-                self.errors[name] = str(error)
+                self._resolve_object(depsgraph, obj, nonfinite)
+            except REPORTED_ERRORS as error:
+                problem = error_text(error)
+            else:
+                problem = str(lost_field_error(obj, attribute_name(obj.data)))
+            # Whatever was not read now is not tried again before the object changes.
+            for key in unresolved:
+                if key[0] == name:
+                    self._topologies.setdefault(key, problem)
 
     def _read_cached(
         self, obj: bpy.types.Object, owner: bpy.types.Object, nonfinite: str, draws_field: bool
@@ -212,7 +232,7 @@ class SceneCache:
         key = name, obj.data.as_pointer(), tone_image_key(owner, self._tone_request)
         if key in self._mesh_states:
             return self._mesh_states[key]
-        if name in self.errors or name in self._unresolved:
+        if name in self.errors:
             return None
         try:
             mesh_state = (
@@ -220,8 +240,8 @@ class SceneCache:
                 if draws_field
                 else self._read_occluder(obj)
             )
-        except RosyError as error:
-            self.errors[name] = str(error)
+        except REPORTED_ERRORS as error:
+            self.errors[name] = error_text(error)
             return None
         if mesh_state is not None:
             self._mesh_states[key] = mesh_state
@@ -248,12 +268,11 @@ class SceneCache:
             surface = mesh_surface(mesh, label, cache=self._cache)
             tone = read_tone(mesh, owner, surface, self._tone_request, self._cache)
             if original.is_editmode:
-                field_in_edit_mode = self._edit_mode_field(
-                    mesh, original, surface, nonfinite, label
-                )
+                field_in_edit_mode = self._edit_mode_field(mesh, owner, surface, nonfinite, label)
                 return _MeshState(surface, field_in_edit_mode, tone)
             original_surface = mesh_surface(original, label, cache=self._cache)
-            if _has_same_topology(surface, original_surface):
+            keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
+            if keeps_field and _has_same_topology(surface, original_surface):
                 field = read_mesh_field(
                     original,
                     nonfinite=nonfinite,
@@ -266,22 +285,28 @@ class SceneCache:
                     _with_rest(surface, original_surface.vertices) if deformed else surface
                 )
                 return _MeshState(rest_surface, field, tone)
-        entry = self._topologies.get(owner.name)
-        if entry is None or entry.topology_hash != _topology_hash(surface):
-            self._unresolved.add(owner.name)
+            key = owner.name, _topology_hash(surface, mesh, original)
+        entry = self._topologies.get(key)
+        if entry is None:
+            self._unresolved.add(key)
             return None
+        if isinstance(entry, str):
+            raise RosyError(entry)
         return _MeshState(_with_rest(surface, entry.rest), entry.field, tone)
 
     def _edit_mode_field(
         self,
         mesh: bpy.types.Mesh,
-        original: bpy.types.Mesh,
+        owner: bpy.types.Object,
         surface: Surface,
         nonfinite: str,
         label: str,
     ) -> RosyField:
         """Return the field of a mesh in edit mode. Only its evaluated mesh can be read."""
+        original = owner.data
         name = attribute_name(original)
+        if name in original.attributes and name not in mesh.attributes:
+            raise lost_field_error(owner, name)
         if name not in mesh.attributes or not is_face_vector_field(mesh, name):
             raise RosyError(
                 f"{label}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
@@ -289,22 +314,28 @@ class SceneCache:
         layout = FieldLayout(name, field_degree(original))
         return read_evaluated_field(mesh, layout, surface, nonfinite, label)
 
-    def _evaluate_topology(
-        self,
-        depsgraph: bpy.types.Depsgraph,
-        owner: bpy.types.Object,
-        layout: FieldLayout,
-        nonfinite: str,
-    ) -> _TopologyEntry:
-        """Read the rest positions and the field of an object with temporary attributes."""
-        evaluated = owner.evaluated_get(depsgraph)
-        label = f"object '{owner.name}'"
-        with evaluated_mesh(evaluated) as mesh:
-            if mesh is None or any(name not in mesh.attributes for name in layout.attribute_names):
-                raise RosyError(f"{label}: a modifier removes the attribute of its field")
-            surface = mesh_surface(mesh, label, read_rest=True, cache=self._cache)
-            field = read_evaluated_field(mesh, layout, surface, nonfinite, label, self._cache)
-        return _TopologyEntry(_topology_hash(surface), surface.rest_vertices, field)
+    def _resolve_object(
+        self, depsgraph: bpy.types.Depsgraph, owner: bpy.types.Object, nonfinite: str
+    ) -> None:
+        """Read the rest positions and fields of all meshes of an object, where they have a field."""
+        with temp_attributes(depsgraph, [owner], nonfinite, self._cache) as layouts:
+            layout, label = layouts[owner], f"object '{owner.name}'"
+            for instance in depsgraph.object_instances:
+                obj = instance.object
+                if obj.type != "MESH" or obj.original != owner:
+                    continue
+                with evaluated_mesh(obj) as mesh:
+                    if mesh is None or any(
+                        name not in mesh.attributes for name in layout.attribute_names
+                    ):
+                        continue
+                    surface = mesh_surface(mesh, label, read_rest=True, cache=self._cache)
+                    key = owner.name, _topology_hash(surface, mesh, owner.data)
+                    if key not in self._topologies:
+                        field = read_evaluated_field(
+                            mesh, layout, surface, nonfinite, label, self._cache
+                        )
+                        self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
 
 
 def _has_same_topology(surface: Surface, other: Surface) -> bool:
@@ -316,9 +347,12 @@ def _has_same_topology(surface: Surface, other: Surface) -> bool:
     )
 
 
-def _topology_hash(surface: Surface) -> bytes:
-    """Return a hash of the faces of a surface, without vertex positions."""
-    return content_hash(surface.corner_vertex, surface.face_start)
+def _topology_hash(surface: Surface, mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
+    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
+    values = None
+    if is_face_vector_field(mesh, attribute_name(original)):
+        values = read_attribute(mesh, attribute_name(original), np.float32, 3)
+    return content_hash(surface.corner_vertex, surface.face_start, values)
 
 
 def _with_rest(surface: Surface, rest: np.ndarray | None) -> Surface:

@@ -236,19 +236,24 @@ class _SceneReader:
         drawn_objects = {owner for _, owner in self.field_instances}
         for obj in objects:
             if obj not in drawn_objects and obj not in (self.errors or ()):
-                record_error(self.errors, obj, RosyError(self._reason(obj)))
+                record_error(self.errors, obj, self._lost_error(obj))
 
-    def _reason(self, obj: bpy.types.Object) -> str:
+    def _lost_error(self, obj: bpy.types.Object) -> RosyError:
         """Return why an object's field was not read."""
         if obj not in {key[1] for key in self.mesh_data}:
-            return (
+            return RosyError(
                 f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or "
                 "switch off its drawing"
             )
         faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
-        problem = "has no faces" if faceless else f"has no attribute '{self.layouts[obj].name}'"
-        modifiers = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
-        return f"object '{obj.name}': after its modifiers ({modifiers}) the mesh {problem}"
+        return lost_field_error(obj, None if faceless else self.layouts[obj].name)
+
+
+def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
+    """Return the error for an object whose modifiers lose an attribute, or, if None, all faces."""
+    names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
+    problem = "has no faces" if attribute is None else f"has no attribute '{attribute}'"
+    return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
 
 
 @contextmanager

@@ -1,0 +1,205 @@
+"""Reading for the live view: what is left out is named, and nothing is read again without need."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.scene import scene_cache as scene_cache_module
+from rosy.rosy_addon.scene.scene_cache import SceneCache
+from rosy.rosy_addon.scene.scene_reader import read_instances
+from scenes import add_field, add_mesh, add_plane, contents, member_vectors, set_vectors
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def read(scene_cache):
+    """Read as the live view does until it rests, and return the names of the drawn objects."""
+    states = scene_cache.read(depsgraph())
+    if scene_cache.has_unresolved:
+        scene_cache.resolve_topologies(depsgraph())
+        states = scene_cache.read(depsgraph())
+    assert not scene_cache.has_unresolved, "the scene would be read for ever"
+    return [state.owner.name for state in states if state.instance.field is not None]
+
+
+def add_nodes(obj, *node_types):
+    """Add a modifier that passes a mesh through a chain of geometry nodes."""
+    group = bpy.data.node_groups.new("Chain", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
+    source, target = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    last = source.outputs[0]
+    for node_type in node_types:
+        node = group.nodes.new(node_type)
+        geometry = next((socket for socket in node.inputs if socket.type == "GEOMETRY"), None)
+        if geometry is not None:
+            group.links.new(last, geometry)
+        last = node.outputs[0]
+    group.links.new(last, target.inputs[0])
+    modifier = obj.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    return group
+
+
+def remesh(obj):
+    modifier = obj.modifiers.new("Rebuild", "REMESH")
+    modifier.mode, modifier.voxel_size = "VOXEL", 0.2
+
+
+def skin(obj):
+    obj.modifiers.new("Skin", "SKIN")
+
+
+def new_geometry(obj):
+    add_nodes(obj, "GeometryNodeMeshCube")
+
+
+def removed_attribute(obj):
+    group = add_nodes(obj, "GeometryNodeRemoveAttribute")
+    group.nodes["Remove Named Attribute"].inputs["Name"].default_value = "rosy"
+
+
+def points_only(obj):
+    add_nodes(obj, "GeometryNodeMeshToPoints")
+
+
+def masked(obj):
+    obj.vertex_groups.new(name="None")
+    obj.modifiers.new("Hide All", "MASK").vertex_group = "None"
+
+
+def edges_only(obj):
+    group = add_nodes(obj, "GeometryNodeDeleteGeometry")
+    node = group.nodes["Delete Geometry"]
+    node.domain, node.mode = "FACE", "ONLY_FACE"
+
+
+LOSSES = {
+    "remesh": (remesh, ["(Rebuild)", "no attribute 'rosy'"]),
+    "skin": (skin, ["(Skin)", "no attribute 'rosy'"]),
+    "new geometry": (new_geometry, ["(Nodes)", "no attribute 'rosy'"]),
+    "removed attribute": (removed_attribute, ["(Nodes)", "no attribute 'rosy'"]),
+    "points only": (points_only, ["(Nodes)", "no faces"]),
+    "masked": (masked, ["(Hide All)", "no faces"]),
+    "edges only": (edges_only, ["(Nodes)", "no faces"]),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_field_lost_in_modifiers_is_named_once(monkey, loss, monkeypatch):
+    """The error is known after one attempt, stays, and is gone with the modifier."""
+    lose, words = LOSSES[loss]
+    lose(monkey)
+    before, scene_cache = contents(), SceneCache()
+    assert read(scene_cache) == []
+    message = scene_cache.errors["Suzanne"]
+    assert all(word in message for word in ("'Suzanne'", *words)), message
+    assert contents() == before
+    monkeypatch.setattr(scene_cache_module, "temp_attributes", None)  # a second attempt would fail
+    assert read(scene_cache) == [] and scene_cache.errors["Suzanne"] == message
+    monkey.modifiers.clear()
+    scene_cache.invalidate({"Suzanne"}, topology_changed=False)
+    assert read(scene_cache) == ["Suzanne"] and not scene_cache.errors
+
+
+def test_an_attribute_that_is_kept_again(monkey):
+    """The modifiers keep the faces, but no longer lose the attribute."""
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    removed_attribute(monkey)
+    scene_cache = SceneCache()
+    assert read(scene_cache) == []
+    bpy.data.node_groups["Chain"].nodes["Remove Named Attribute"].inputs[
+        "Name"
+    ].default_value = "other"
+    scene_cache.invalidate({"Suzanne"}, topology_changed=False)
+    assert read(scene_cache) == ["Suzanne"]
+
+
+def test_a_field_that_nodes_change_is_that_of_a_bake(monkey):
+    """Geometry nodes that turn the vectors of a field, and keep the faces."""
+    group = add_nodes(monkey, "GeometryNodeStoreNamedAttribute")
+    store = group.nodes["Store Named Attribute"]
+    store.data_type, store.domain = "FLOAT_VECTOR", "FACE"
+    store.inputs["Name"].default_value = "rosy"
+    named, normal = (
+        group.nodes.new(kind)
+        for kind in ("GeometryNodeInputNamedAttribute", "GeometryNodeInputNormal")
+    )
+    named.data_type = "FLOAT_VECTOR"
+    named.inputs["Name"].default_value = "rosy"
+    cross = group.nodes.new("ShaderNodeVectorMath")
+    cross.operation = "CROSS_PRODUCT"
+    group.links.new(named.outputs[0], cross.inputs[0])
+    group.links.new(normal.outputs[0], cross.inputs[1])
+    value = next(socket for socket in store.inputs if socket.name == "Value" and socket.enabled)
+    group.links.new(cross.outputs[0], value)
+    scene_cache = SceneCache()
+    assert read(scene_cache) == ["Suzanne"]
+    (state,) = scene_cache.read(depsgraph())
+    (instance,) = read_instances(depsgraph())
+    np.testing.assert_array_equal(state.instance.field.vectors, instance.field.vectors)
+    turned = np.abs((state.instance.field.vectors * member_vectors(monkey.data)).sum(axis=1))
+    assert np.median(turned) < 0.05
+
+
+def test_instances_with_other_faces_than_their_owner(monkey):
+    """Geometry nodes show a mesh and a subdivided instance of it: one object, two topologies."""
+    group = add_nodes(monkey)
+    nodes, links = group.nodes, group.links
+    join = nodes.new("GeometryNodeJoinGeometry")
+    to_instance = nodes.new("GeometryNodeGeometryToInstance")
+    subdivide = nodes.new("GeometryNodeSubdivideMesh")
+    source = nodes["Group Input"].outputs[0]
+    links.new(source, subdivide.inputs[0])
+    links.new(subdivide.outputs[0], to_instance.inputs[0])
+    links.new(source, join.inputs[0])
+    links.new(to_instance.outputs[0], join.inputs[0])
+    links.new(join.outputs[0], nodes["Group Output"].inputs[0])
+    scene_cache = SceneCache()
+    assert read(scene_cache) == ["Suzanne", "Suzanne"] and not scene_cache.errors
+    counts = [len(state.instance.surface.face_start) - 1 for state in scene_cache.read(depsgraph())]
+    assert sorted(counts) == [len(monkey.data.polygons), len(monkey.data.loops)]
+
+
+def test_other_objects_are_drawn(monkey):
+    plane = add_field(add_plane(), kind="axis")
+    remesh(monkey)
+    scene_cache = SceneCache()
+    assert read(scene_cache) == [plane.name] and list(scene_cache.errors) == ["Suzanne"]
+
+
+def test_a_mesh_without_faces_is_named(scene):
+    bare = add_mesh("Bare", [(0, 0, 0), (1, 0, 0)], [])
+    bare.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
+    scene_cache = SceneCache()
+    assert read(scene_cache) == [] and "no faces" in scene_cache.errors["Bare"]
+
+
+@pytest.mark.parametrize("mesh_kind", ["bare", "remesh"])
+def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
+    if mesh_kind == "remesh":
+        monkey.modifiers.new("Subdivision", "SUBSURF")
+
+    def fail(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(scene_cache_module, "read_evaluated_field", fail)
+    scene_cache = SceneCache()
+    assert read(scene_cache) == [] and "not enough memory" in scene_cache.errors["Suzanne"]
+
+
+def test_edit_mode_names_a_field_that_cannot_be_read(scene):
+    plane = add_plane(cuts=2)
+    set_vectors(plane.data, np.tile([1.0, 0.0, 0.0], (9, 1)), domain="POINT")
+    bpy.context.view_layer.objects.active = plane
+    bpy.ops.object.mode_set(mode="EDIT")
+    scene_cache = SceneCache()
+    try:
+        assert read(scene_cache) == [] and "leave edit mode" in scene_cache.errors["Plane"]
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+    scene_cache.invalidate({"Plane"})
+    assert read(scene_cache) == ["Plane"] and not scene_cache.errors

@@ -15,6 +15,7 @@ import bpy
 from ..rosy_addon.errors import REPORTED_ERRORS, error_text
 from ..rosy_addon.progress import Progress, Task, run_to_completion
 from ..rosy_addon.ui import job_status
+from ..rosy_addon.viewport.view3d import redraw_sidebars
 
 #: Seconds of work in each slice. Events of the user are handled between slices.
 SLICE_SECONDS = 0.05
@@ -145,7 +146,7 @@ class Job:
             context.workspace.status_text_set(
                 f"RoSy: {progress.label}, {percent} %     ESC: cancel"
             )
-        _redraw_sidebars(self.window_manager)
+        redraw_sidebars()
 
     def stop(self, reason: str) -> None:
         """Stop the job, and release everything that it holds. Later calls have no effect."""
@@ -172,17 +173,7 @@ class Job:
             # `status_text_set` acts on the context's workspace, not on the one it is called on.
             with bpy.context.temp_override(workspace=workspace):
                 workspace.status_text_set(None)
-        _redraw_sidebars(self.window_manager)
-
-
-def _redraw_sidebars(window_manager: bpy.types.WindowManager) -> None:
-    """Redraw the sidebars of all 3D views."""
-    for window in window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+        redraw_sidebars()
 
 
 class ModalTaskMixin:

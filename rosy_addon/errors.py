@@ -48,7 +48,9 @@ REPORTED_ERRORS = (RosyError, MemoryError)
 
 
 def error_text(error: Exception) -> str:
-    """Return the message of one line to the user, for one of `REPORTED_ERRORS`."""
+    """Return the message of one line to the user, for one of `REPORTED_ERRORS` or a fault of RoSy."""
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a smaller size or a smaller mesh"
-    return str(error)
+    if isinstance(error, RosyError):
+        return str(error)
+    return escape_unsafe(" ".join(f"a fault of RoSy, {type(error).__name__}: {error}".split()))

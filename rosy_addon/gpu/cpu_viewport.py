@@ -47,6 +47,10 @@ class CpuViewportRenderer:
         vertices[:, 2] = -0.9999
         self._fullscreen_batch = device.batch(vertices)
 
+    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
+        """As `ViewportRenderer.prepare_task`."""
+        yield from self._device.compile_task((COMPOSITE,))
+
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[MeshInstance]:
         """As `ViewportRenderer.upload`."""
         return list(instances)

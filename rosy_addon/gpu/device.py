@@ -5,12 +5,14 @@ Tests and benchmarks implement the protocol `Device` without Blender.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import DeviceError
+from ..progress import Progress, Task
 from .passes import WORKGROUP_SIZE, ComputePass, RasterPass, Uniforms
 
 NamedValues = Mapping[str, Any]
@@ -32,6 +34,12 @@ class Device(Protocol):
     """
 
     max_texture_size: int
+
+    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
+        """Compile shaders that are not compiled yet, each in a step. Others are compiled when used.
+
+        A shader that the driver rejects is an error only when it is used.
+        """
 
     def texture(
         self,
@@ -110,6 +118,14 @@ class BlenderDevice:
         self._gpu = gpu
         self._shaders: dict[str, Any] = {}
         self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
+
+    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
+        """As `Device.compile_task`."""
+        missing = [shader for shader in shaders if shader.name not in self._shaders]
+        for index, shader in enumerate(missing):
+            yield Progress(index / len(missing), "compiling shaders")
+            with suppress(DeviceError):
+                self._program(shader)
 
     def texture(
         self,

@@ -37,7 +37,8 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     """
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
-    textures = {**frame.textures, **_unfold(frame, kind, box, covering)}
+    textures = {**frame.textures, **(yield from _unfold_task(frame, kind, box, covering))}
+    yield Progress(0.0, "measuring streaks")
     textures |= {
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
         "color_map": lookup_tables.color_map(resources, look),
@@ -49,7 +50,9 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         textures["paper_grain"] = lookup_tables.picture_grain(
             resources, *frame.size, look, kind.line_count
         )
+    yield Progress(0.0, "measuring streaks")
     uniforms = {**covering, **look_uniforms(kind, look)}
+    yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
     row_steps = (right - left) * kind.line_count * 2 * uniforms["half_length"]
     # Whole work groups: a partial one would reach into rows that belong to the next band.
@@ -61,8 +64,11 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         yield Progress((start + band_rows - bottom) / (top - bottom), "tracing streamlines")
 
 
-def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -> dict[str, Any]:
+def _unfold_task(
+    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]
+) -> Task[dict[str, Any]]:
     """Return the images of the covering: its cells, and directions with their gradients."""
+    yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
     cells = image("cells", *frame.size)
     directions = image("directions", *frame.size, "RGBA16F", lines)
@@ -78,6 +84,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -
             **direction_uniforms(kind, frame.look, frame.camera),
         },
     )
+    yield Progress(0.0, "finding directions")
     textures = {"cells": cells, "directions": directions}
     images = {"angle_gradients": angle_gradients}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)

@@ -12,7 +12,7 @@ from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, box_corners
-from ..progress import run_to_completion
+from ..progress import Progress, Task, subtask
 from ..projection.corner_field import CornerField, corner_field_task
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
@@ -108,14 +108,14 @@ def field_channels(field: RosyField) -> list[FieldChannel]:
     return channels
 
 
-def build_mesh_buffers(
+def mesh_buffers_task(
     surface: Surface,
     linear: np.ndarray,
     field: RosyField | None,
     display: str,
     channels: Sequence[FieldChannel] = (),
     tone: SurfaceTone | None = None,
-) -> MeshBuffers:
+) -> Task[MeshBuffers]:
     """Return a surface and its field in the layout of the shaders.
 
     Parameters
@@ -130,6 +130,10 @@ def build_mesh_buffers(
         What each layer of the image of field channels contains, for all fields of this degree.
     tone : SurfaceTone, optional
 
+    Yields
+    ------
+    Progress
+
     Raises
     ------
     RosyError
@@ -140,6 +144,7 @@ def build_mesh_buffers(
             f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
             f"most {MAX_TRIANGLES}: choose the processor"
         )
+    yield Progress(0.0, "preparing the mesh")
     points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     bounds = box_corners(points[:, surface.used_vertices].T)
     center = bounds.mean(axis=0)
@@ -153,13 +158,16 @@ def build_mesh_buffers(
     if field is not None:
         matrix = np.eye(4)
         matrix[:3, :3] = linear
-        corner_field = run_to_completion(corner_field_task(surface, matrix, field, display))
+        task = corner_field_task(surface, matrix, field, display)
+        corner_field = yield from subtask(task, 0.2, 0.7)
+        yield Progress(0.7, "preparing the mesh")
         rest = rest_positions(surface).take(surface.triangle_vertex, axis=0)
         tone_values = None if tone is None else tone.values[surface.triangles]
         records = _triangle_records(
             corners, rest, corner_field, field.degree, channels, tone_values
         )
         texels = records.shape[1]
+        yield Progress(0.9, "preparing the mesh")
         records = _to_texture_rows(records)
     has_tone = field is not None and tone is not None
     return MeshBuffers(corners.reshape(-1, 4), center, records, texels, bounds - center, has_tone)

@@ -13,22 +13,35 @@ from ..compositor.look_units import cell_size_args
 from ..compositor.paper_grain import surface_paper_grain_args
 from ..compositor.surface_noise import instance_hashes
 from ..compositor.wobble import has_wobble
+from ..progress import Progress, Task
 from . import lookup_tables, passes
 from .frame import Frame
 from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
 
+#: Label of all steps of this stage.
+STEP_LABEL = "drawing noise"
 
-def render_noise(frame: Frame) -> None:
+
+def noise_task(frame: Frame) -> Task[None]:
+    """Render the noise of a picture, its paper grain and wobble into ``frame.textures``."""
+    yield Progress(0.02, STEP_LABEL)
+    yield from _noise_task(frame)
+    yield from _paper_grain_task(frame)
+    yield Progress(0.12, STEP_LABEL)
+    _render_wobble(frame)
+
+
+def _noise_task(frame: Frame) -> Task[None]:
     """Render the noise of the picture or of the surfaces, as ``frame.textures["noise"]``."""
     look = frame.look
     if look.anchor == "surface":
         settings = noise_args(frame.pixel_look) | cell_size_args(frame.pixel_look)
-        frame.textures["noise"] = _surface_noise(frame, settings, "noise")
+        frame.textures["noise"] = yield from _surface_noise_task(frame, settings, "noise")
     else:
         frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, *frame.size, look)
 
 
-def render_paper_grain(frame: Frame) -> None:
+def _paper_grain_task(frame: Frame) -> Task[None]:
     """Render the paper grain of the surfaces, as ``frame.textures["paper_grain"]``.
 
     Nothing is rendered if the grain is fixed to the picture: it then depends on the number of lines,
@@ -36,10 +49,12 @@ def render_paper_grain(frame: Frame) -> None:
     """
     if has_paper_grain(frame.look) and frame.look.anchor == "surface":
         settings = surface_paper_grain_args(frame.pixel_look) | cell_size_args(frame.pixel_look)
-        frame.textures["paper_grain"] = _surface_noise(frame, settings, "paper_grain")
+        frame.textures["paper_grain"] = yield from _surface_noise_task(
+            frame, settings, "paper_grain"
+        )
 
 
-def render_wobble(frame: Frame) -> None:
+def _render_wobble(frame: Frame) -> None:
     """Render the angle by which lines wobble, as ``frame.textures["wobble_angles"]``.
 
     The method is that of `wobble.wobble_angle`.
@@ -56,7 +71,7 @@ def render_wobble(frame: Frame) -> None:
     frame.textures["wobble_angles"] = angles
 
 
-def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
+def _surface_noise_task(frame: Frame, settings: dict[str, Any], name: str) -> Task[Any]:
     """Return noise that moves with the surfaces, as `surface_noise.surface_noise`."""
     raw_noise = frame.resources.image("raw_noise", *frame.size)
     frame.resources.device.clear(raw_noise)
@@ -71,10 +86,11 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
         }
         images = {"raw_noise": raw_noise}
         frame.run_on_instance(passes.SURFACE_NOISE, instance_id, box, images, uniforms)
-    return _high_passed(frame, raw_noise, settings["high_pass"], name)
+    yield Progress(0.05, STEP_LABEL)
+    return (yield from _high_pass_task(frame, raw_noise, settings["high_pass"], name))
 
 
-def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
+def _high_pass_task(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Task[Any]:
     """Return centered noise, without its low frequencies if `high_pass` is not 0."""
     size, blurred = frame.size, raw_noise
     if high_pass:
@@ -89,6 +105,7 @@ def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> A
                 {"blur_axis": axis, "radius": radius},
             )
             blurred = next_blurred
+            yield Progress(0.08, STEP_LABEL)
     noise = frame.resources.image(name, *size)
     frame.resources.device.compute(
         passes.CENTER_NOISE,

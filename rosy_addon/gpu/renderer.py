@@ -16,7 +16,7 @@ from ..compositor.look_units import look_in_pixels
 from ..compositor.picture import Picture
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
-from ..progress import Progress, Task, subtask
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
@@ -26,7 +26,7 @@ from .device import Device
 from .frame import Frame
 from .gbuffer_stage import render_gbuffer
 from .lic_stage import lic_task
-from .noise_stage import render_noise, render_paper_grain, render_wobble
+from .noise_stage import noise_task
 from .resources import DrawItem, GpuResources
 from .screen_box import box_size, is_empty, screen_box, union_box
 from .tone_stage import render_target_tones
@@ -75,9 +75,14 @@ class GpuRenderer:
             raise_nothing_in_view(instances, view.sample_camera)
         return Picture(rgba, ())
 
+    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
+        """As `ViewportRenderer.prepare_task`."""
+        yield from self.device.compile_task(passes.ALL_PASSES)
+        yield from self.resources.upload_task(instances, display)
+
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """As `ViewportRenderer.upload`."""
-        return self.resources.upload(instances, display)
+        return run_to_completion(self.resources.upload_task(instances, display))
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
         """As `ViewportRenderer.covered_pixels`."""
@@ -114,9 +119,8 @@ class GpuRenderer:
         )
         render_gbuffer(frame)
         self.device.clear(fine_picture)
-        render_noise(frame)
-        render_paper_grain(frame)
-        render_wobble(frame)
+        yield from noise_task(frame)
+        yield Progress(0.15, "finding tones")
         render_target_tones(frame)
         kinds = frame.kinds
         for index, kind in enumerate(kinds):

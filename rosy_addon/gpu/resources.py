@@ -11,6 +11,7 @@ import numpy as np
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
+from ..progress import Task, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
@@ -19,7 +20,7 @@ from .device import Device
 from .field_kind import FieldKind, field_kinds
 from .mesh_buffers import (
     MeshBuffers,
-    build_mesh_buffers,
+    mesh_buffers_task,
     mip_atlas,
     split_matrix,
     translation_matrix,
@@ -137,7 +138,7 @@ class GpuResources:
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
             cache.clear()
 
-    def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
+    def upload_task(self, instances: Sequence[MeshInstance], display: str) -> Task[list[DrawItem]]:
         """Return draw items of mesh instances. Meshes on the device are not sent again.
 
         Raises
@@ -148,7 +149,9 @@ class GpuResources:
         self._upload_count += 1
         self._evict_images()
         kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
-        items = [self._draw_item(instance, display, kinds) for instance in instances]
+        items = []
+        for instance in instances:
+            items.append((yield from self._draw_item_task(instance, display, kinds)))
         oldest_kept = self._upload_count - MESH_LIFETIME_UPLOADS
         for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
             del self._meshes[key]
@@ -225,9 +228,9 @@ class GpuResources:
         for key in [key for key, last_used in self._last_used.items() if last_used < oldest_kept]:
             del self._images[key], self._last_used[key]
 
-    def _draw_item(
+    def _draw_item_task(
         self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
-    ) -> DrawItem:
+    ) -> Task[DrawItem]:
         linear, model_matrix = split_matrix(instance.matrix)
         kind = None if instance.field is None else kinds[instance.field.degree]
         channels = () if kind is None else kind.channels
@@ -240,7 +243,9 @@ class GpuResources:
             channels,
         )
         if key not in self._meshes:
-            self._meshes[key] = self._upload_mesh(instance, linear, display, channels)
+            self._meshes[key] = yield from self._upload_mesh_task(
+                instance, linear, display, channels
+            )
         mesh = self._meshes[key]
         mesh.last_used = self._upload_count
         model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
@@ -248,15 +253,16 @@ class GpuResources:
             mesh, instance.field, model_matrix, matrix_scale(instance.matrix), kind, instance
         )
 
-    def _upload_mesh(
+    def _upload_mesh_task(
         self,
         instance: MeshInstance,
         linear: np.ndarray,
         display: str,
         channels: Sequence[FieldChannel],
-    ) -> GpuMesh:
+    ) -> Task[GpuMesh]:
         surface, field, tone = instance.surface, instance.field, instance.tone
-        buffers = build_mesh_buffers(surface, linear, field, display, channels, tone)
+        task = mesh_buffers_task(surface, linear, field, display, channels, tone)
+        buffers = yield from subtask(task, 0.0, 1.0, f"preparing the mesh of {surface.name}")
         records_texture = None
         if buffers.triangle_records is not None:
             if len(buffers.triangle_records) > self.device.max_texture_size:

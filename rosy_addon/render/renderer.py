@@ -52,6 +52,12 @@ class ViewportRenderer(Protocol):
     downscale_factors: tuple[int, int]
     needs_occluders: bool
 
+    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
+        """Do what takes long before the first picture: compile shaders, and `upload`.
+
+        Each step is named before it begins.
+        """
+
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[Any]:
         """Return draw items of mesh instances. Meshes that are on the card are not sent again.
 

@@ -9,6 +9,8 @@ until one of them changes again. If that fails, the error is valid until the obj
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass, replace
 
 import bpy
@@ -27,6 +29,9 @@ from .owned_data import user_modifiers
 from .read_field import read_mesh_field
 from .scene_reader import is_field_enabled, lost_field_error, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
+
+#: Consecutive calls of `SceneCache.resolve_topologies` for an object that may not suffice.
+MAX_ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +83,24 @@ class SceneCache:
     ----------
     errors : dict of str to str
         By the name of an object: why its field is not drawn.
+    is_complete : bool
+        Whether the last call of `read` ended before its deadline.
     """
 
     def __init__(self) -> None:
         self.errors: dict[str, str] = {}
+        self.is_complete = True
+        self._deadline = math.inf
+        self._has_read_any = False
         self._cache = Cache()
         # The error message of a mesh that could not be read.
         self._topologies: dict[_TopologyKey, _TopologyEntry | str] = {}
-        # By the name of the object, the pointer of its mesh, and `tone_image_key`.
-        self._mesh_states: dict[tuple[str, int, tuple], _MeshState] = {}
+        # By the name of the object, the pointer of its mesh, and `tone_image_key`. None: no faces.
+        self._mesh_states: dict[tuple[str, int, tuple], _MeshState | None] = {}
         # Meshes that need `resolve_topologies`.
         self._unresolved: set[_TopologyKey] = set()
+        # By the name of an object: consecutive calls of `resolve_topologies` that did not suffice.
+        self._attempts: dict[str, int] = {}
         # Mesh instances of the last call of `read`, and their versions.
         self._instances: dict[tuple, tuple[MeshInstance, int]] = {}
         self._last_version = 0
@@ -109,6 +121,9 @@ class SceneCache:
         for key in [key for key in self._topologies if names is None or key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], str):
                 del self._topologies[key]
+        for by_name in (self._attempts, self.errors):
+            for name in [name for name in by_name if names is None or name in names]:
+                del by_name[name]
 
     def read(
         self,
@@ -117,6 +132,7 @@ class SceneCache:
         *,
         include_occluders: bool = False,
         tone_request: ToneRequest | None = None,
+        deadline: float = math.inf,
     ) -> list[InstanceState]:
         """Return all instances of RoSy objects in their current state.
 
@@ -132,11 +148,16 @@ class SceneCache:
             Read all other meshes too, since they may occlude the RoSy objects.
         tone_request : ToneRequest, optional
             The source of the surface tones.
+        deadline : float
+            Seconds, monotonic. Objects that were not begun by then, except one, are left for the
+            next call; see `is_complete`.
         """
+        if self.is_complete:
+            self.errors.clear()
+        self._deadline, self.is_complete, self._has_read_any = deadline, True, False
         if tone_request != self._tone_request:
             self._mesh_states.clear()
             self._tone_request = tone_request
-        self.errors.clear()
         self._unresolved.clear()
         states: list[InstanceState] = []
         instances: dict[tuple, tuple[MeshInstance, int]] = {}
@@ -171,16 +192,18 @@ class SceneCache:
                     instances[instance_key][0], owner, visibility_object, instances[instance_key][1]
                 )
             )
-        self._report_faceless(faceless - {state.owner for state in states})
+        waiting = {name for name, _ in self._unresolved}
+        self._attempts = {name: n for name, n in self._attempts.items() if name in waiting}
+        if self.is_complete:
+            self._report_faceless(faceless - {state.owner for state in states}, waiting)
         # The instances of the last call are released only now: while their surfaces are alive, no
         # new object can have the same id.
         self._instances = instances
         self._cache.evict_over_limit()
         return states
 
-    def _report_faceless(self, owners: set[bpy.types.Object]) -> None:
-        """Add errors for objects without any mesh that was read, unless they have one."""
-        waiting = {name for name, _ in self._unresolved}
+    def _report_faceless(self, owners: set[bpy.types.Object], waiting: set[str]) -> None:
+        """Add errors for objects without any mesh that was read, unless they have one or wait."""
         for owner in owners:
             if owner.name not in self.errors and owner.name not in waiting:
                 self.errors[owner.name] = str(lost_field_error(owner, None))
@@ -201,13 +224,21 @@ class SceneCache:
         """Whether there are objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
-    def resolve_topologies(self, depsgraph: bpy.types.Depsgraph, nonfinite: str = "error") -> None:
+    def resolve_topologies(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        nonfinite: str = "error",
+        deadline: float = math.inf,
+    ) -> None:
         """Read the rest positions and fields of meshes whose modifiers change the topology.
 
         This adds temporary attributes to the meshes, so it must not be called while Blender draws.
+        Objects that were not begun by the deadline, except one, are left for the next call.
         """
-        unresolved, self._unresolved = self._unresolved, set()
-        for name in {name for name, _ in unresolved}:
+        for name in sorted({name for name, _ in self._unresolved}):
+            unresolved = {key for key in self._unresolved if key[0] == name}
+            self._unresolved -= unresolved
+            self._attempts[name] = self._attempts.get(name, 0) + 1
             obj = depsgraph.view_layer.objects.get(name) or bpy.data.objects.get(name)
             if obj is None:
                 continue
@@ -221,8 +252,9 @@ class SceneCache:
                 problem = str(lost_field_error(obj, attribute_name(obj.data)))
             # Whatever was not read now is not tried again before the object changes.
             for key in unresolved:
-                if key[0] == name:
-                    self._topologies.setdefault(key, problem)
+                self._topologies.setdefault(key, problem)
+            if time.monotonic() > deadline:
+                return
 
     def _read_cached(
         self, obj: bpy.types.Object, owner: bpy.types.Object, nonfinite: str, draws_field: bool
@@ -234,6 +266,10 @@ class SceneCache:
             return self._mesh_states[key]
         if name in self.errors:
             return None
+        if self._has_read_any and time.monotonic() > self._deadline:
+            self.is_complete = False
+            return None
+        self._has_read_any = True
         try:
             mesh_state = (
                 self._read_evaluated(obj, owner, nonfinite)
@@ -243,7 +279,7 @@ class SceneCache:
         except REPORTED_ERRORS as error:
             self.errors[name] = error_text(error)
             return None
-        if mesh_state is not None:
+        if mesh_state is not None or name not in {name for name, _ in self._unresolved}:
             self._mesh_states[key] = mesh_state
         return mesh_state
 
@@ -288,6 +324,8 @@ class SceneCache:
             key = owner.name, _topology_hash(surface, mesh, original)
         entry = self._topologies.get(key)
         if entry is None:
+            if self._attempts.get(owner.name, 0) >= MAX_ATTEMPTS:
+                raise RosyError(f"{label}: its modifiers make other faces at each evaluation")
             self._unresolved.add(key)
             return None
         if isinstance(entry, str):

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
+
 import bpy
 
 from . import job_status
+
+#: Mean width of a character, and width of the icon and margins of a row, at a user interface scale
+#: of 1.
+CHARACTER_PIXELS, MARGIN_PIXELS = 6.0, 60
+
+#: Characters of a row in the narrowest sidebar.
+MIN_CHARACTERS = 16
 
 
 class SidebarPanel:
@@ -19,6 +29,18 @@ def use_property_columns(layout: bpy.types.UILayout) -> None:
     """Draw labels and values in two columns, without buttons for keyframes."""
     layout.use_property_split = True
     layout.use_property_decorate = False
+
+
+def draw_wrapped(
+    layout: bpy.types.UILayout, context: bpy.types.Context, messages: Sequence[str]
+) -> None:
+    """Draw messages, each in as many lines as the width of the region needs."""
+    width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
+    for message in messages:
+        column = layout.column(align=True)
+        rows = textwrap.wrap(message, max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS))
+        for index, row in enumerate(rows):
+            column.label(text=row, icon="BLANK1" if index else "INFO")
 
 
 def draw_progress(layout: bpy.types.UILayout) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
@@ -14,6 +16,9 @@ from ..scene.tone_inputs import make_tone_request
 
 #: Types of data-blocks whose changes may change a picture.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
+
+#: Seconds of one slice of reading.
+SLICE_SECONDS = 0.08
 
 
 @dataclass(eq=False)
@@ -29,12 +34,15 @@ class LayerState:
         Whether they must be read again.
     request_key : hashable
         The options with which they were read: whether with occluders, and with which tones.
+    is_starting : bool
+        Whether they were not read completely yet. They are read in slices of time until then.
     """
 
     scene_cache: SceneCache = field(default_factory=SceneCache)
     instances: list[InstanceState] = field(default_factory=list)
     stale: bool = True
     request_key: Hashable = None
+    is_starting: bool = True
 
 
 class LayerStates:
@@ -64,9 +72,15 @@ class LayerStates:
         *,
         include_occluders: bool,
     ) -> LayerState:
-        """Return the state of the context's view layer, up to date."""
+        """Return the state of the context's view layer, up to date unless it is starting.
+
+        The first call only creates it, so that the view can say what will be done.
+        """
         key = context.scene.name, context.view_layer.name
-        layer = self._layers.setdefault(key, LayerState())
+        if key not in self._layers:
+            self._layers[key] = LayerState()
+            return self._layers[key]
+        layer = self._layers[key]
         tone_request = make_tone_request(context.scene, look)
         request_key = include_occluders, tone_request
         if layer.stale or layer.request_key != request_key:
@@ -75,10 +89,13 @@ class LayerStates:
                 nonfinite_policy(context.scene),
                 include_occluders=include_occluders,
                 tone_request=tone_request,
+                deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
-            layer.stale, layer.request_key = False, request_key
+            layer.stale, layer.request_key = not layer.scene_cache.is_complete, request_key
             if layer.scene_cache.has_unresolved:
                 self._schedule_resolving()
+            elif layer.scene_cache.is_complete:
+                layer.is_starting = False
         return layer
 
     def mark_all_stale(self) -> None:
@@ -89,6 +106,12 @@ class LayerStates:
     def clear(self) -> None:
         """Drop all layers."""
         self._layers.clear()
+
+    def forget(self) -> None:
+        """Drop everything that was read."""
+        self._layers = {
+            key: LayerState(is_starting=layer.is_starting) for key, layer in self._layers.items()
+        }
 
     def invalidate(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:
         """Mark what has changed in a scene, so that it is read again.
@@ -125,9 +148,15 @@ class LayerStates:
                 layer.scene_cache.invalidate(remeshed_names)
                 layer.stale = True
 
-    def resolve_topologies(self) -> None:
-        """Read the data that cannot be read while Blender draws, in all windows."""
-        self._is_resolving = True
+    def resolve_topologies(self) -> bool:
+        """Read the data that cannot be read while Blender draws, in all windows, for one slice.
+
+        Returns
+        -------
+        bool
+            Whether everything was read.
+        """
+        self._is_resolving, deadline = True, time.monotonic() + SLICE_SECONDS
         try:
             for window in bpy.context.window_manager.windows:
                 layer = self.get(window.scene, window.view_layer)
@@ -135,7 +164,19 @@ class LayerStates:
                     continue
                 with bpy.context.temp_override(window=window):
                     depsgraph = bpy.context.evaluated_depsgraph_get()
-                    layer.scene_cache.resolve_topologies(depsgraph, nonfinite_policy(window.scene))
+                    layer.scene_cache.resolve_topologies(
+                        depsgraph, nonfinite_policy(window.scene), deadline
+                    )
                 layer.stale = True
+                if layer.scene_cache.has_unresolved:
+                    return False
+            return True
         finally:
+            self._flush_own_changes()
             self._is_resolving = False
+
+    def _flush_own_changes(self) -> None:
+        """Evaluate all windows, so that no temporary attribute is taken for a change later."""
+        for window in bpy.context.window_manager.windows:
+            with bpy.context.temp_override(window=window):
+                bpy.context.evaluated_depsgraph_get()

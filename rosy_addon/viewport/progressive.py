@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..compositor.look_units import preview_look
-from ..progress import Task, run_to_completion
+from ..errors import RosyError, error_text
+from ..progress import Progress, Task, run_to_completion
 from ..render.renderer import ViewportRenderer
 from ..render.view_input import ViewInput
 
@@ -47,12 +48,21 @@ class ViewState:
         The key of the picture that was requested last.
     requested_time : float
         Seconds, monotonic: when it was requested first.
+    items : list
+        Draw items of the picture that is shown.
     task : generator or None
         The final picture, being rendered.
     task_key : hashable
         The key of the picture that is being rendered.
     task_time : float
         Seconds, monotonic: when it was worked on last.
+    task_seconds : float
+        Seconds of work on it so far.
+    progress : Progress or None
+        The next step, while there is no picture yet.
+    error : str or None
+        Why the picture of `error_key` could not be rendered.
+    error_key : hashable
     """
 
     texture: Any = None
@@ -60,24 +70,28 @@ class ViewState:
     downscale: int = 1
     requested_key: Hashable = None
     requested_time: float = 0.0
+    items: list[Any] = field(default_factory=list)
     task: Task[Any] | None = None
     task_key: Hashable = None
     task_time: float = 0.0
+    task_seconds: float = 0.0
+    progress: Progress | None = None
+    error: str | None = None
+    error_key: Hashable = None
 
     @property
     def is_rendering(self) -> bool:
-        """Whether the requested picture is being rendered. Views that left the screen have stopped."""
-        return (
-            self.task_key == self.requested_key
-            and time.monotonic() < self.task_time + ABANDON_SECONDS
-        )
+        """Whether a picture is being rendered. Views that left the screen have stopped."""
+        return self.task is not None and time.monotonic() < self.task_time + ABANDON_SECONDS
 
 
 class ProgressiveRenderer:
     """Keeps the pictures of views up to date, as far as the time budget of a redraw allows.
 
-    A picture that fits into the budget is rendered at once. Otherwise a preview is rendered while
-    the view changes, and the final picture in slices of time once it is at rest.
+    The first picture of a session is prepared and rendered in steps, so that the view can name each
+    step before it begins. After that, a picture that fits into the budget is rendered at once.
+    Otherwise a preview is rendered while the view changes, and the final picture in slices of time
+    once it is at rest. A picture that could not be rendered is not tried again.
 
     Parameters
     ----------
@@ -97,6 +111,9 @@ class ProgressiveRenderer:
         self.renderer = renderer
         self.views: dict[tuple[int, int], ViewState] = {}
         self._schedule_redraw = schedule_redraw
+        #: What must be done before the first picture; None if it is done, or not begun.
+        self._preparation: Task[None] | None = None
+        self._is_prepared = False
         #: The view whose final picture is being rendered.
         self._refining_view: ViewState | None = None
         #: Estimated cost of a final picture; 0 until one is known.
@@ -110,14 +127,11 @@ class ProgressiveRenderer:
     def release(self) -> None:
         """Free all resources."""
         self.views.clear()
+        self._preparation = None
         self.renderer.release()
 
     def update(
-        self,
-        view_pointers: tuple[int, int],
-        requested_key: Hashable,
-        draw_items: list[Any],
-        view_input: ViewInput,
+        self, view_pointers: tuple[int, int], requested_key: Hashable, view_input: ViewInput
     ) -> ViewState:
         """Bring the picture of a view up to date, as far as there is time for it.
 
@@ -127,32 +141,70 @@ class ProgressiveRenderer:
             Of space and region.
         requested_key : hashable
             Changes whenever the picture would change.
-        draw_items : list
-            Of the renderer, for the instances of the view.
         view_input : ViewInput
             Its camera has the size of the region.
+
+        Raises
+        ------
+        Exception
+            If this picture cannot be rendered. In later calls, a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
-        now = time.monotonic()
         if requested_key != view.requested_key:
-            view.requested_key, view.requested_time = requested_key, now
+            view.requested_key, view.requested_time = requested_key, time.monotonic()
+        if view.error is not None and view.error_key == requested_key:
+            raise RosyError(view.error)
+        view.error = None
+        try:
+            if self._is_prepared or self._prepare(view, view_input):
+                view.items = self.renderer.upload(view_input.instances, view_input.look.display)
+                self._update_picture(view, view_input)
+        except Exception as error:
+            view.error, view.error_key = error_text(error), requested_key
+            view.task = view.progress = view.texture = view.texture_key = None
+            raise
+        return view
+
+    def _prepare(self, view: ViewState, view_input: ViewInput) -> bool:
+        """Continue to prepare the first picture for one step. Return whether it is prepared."""
+        if self._preparation is None:
+            self._preparation = self.renderer.prepare_task(
+                view_input.instances, view_input.look.display
+            )
+        try:
+            view.progress = next(self._preparation)
+        except StopIteration:
+            self._preparation, self._is_prepared, view.progress = None, True, None
+            return True
+        except Exception:
+            self._preparation = None
+            raise
+        self._schedule_redraw(0.0)
+        return False
+
+    def _update_picture(self, view: ViewState, view_input: ViewInput) -> None:
+        """Bring the picture of a view up to date, with its items uploaded."""
         preview_downscale, full_downscale = self.renderer.downscale_factors
-        if view.texture_key == requested_key and view.downscale == full_downscale:
-            return view
+        if view.texture_key == view.requested_key and view.downscale == full_downscale:
+            return
+        items = view.items
         megapixels = (
-            self.renderer.covered_pixels(draw_items, view_input.camera)
+            self.renderer.covered_pixels(items, view_input.camera)
             * view_input.look.supersampling**2
             / (1e6 * full_downscale**2)
         )
 
         def render_at(downscale: int) -> Task[Any]:
             return self.renderer.render_texture_task(
-                draw_items, downscaled(view_input, downscale), (id(view), downscale)
+                items, downscaled(view_input, downscale), (id(view), downscale)
             )
 
-        if self._seconds_per_megapixel * megapixels <= FRAME_BUDGET_SECONDS:
+        is_first = not self._seconds_per_megapixel
+        if is_first:
+            self._refine(view, lambda: render_at(full_downscale), megapixels)
+        elif self._seconds_per_megapixel * megapixels <= FRAME_BUDGET_SECONDS:
             self._render_now(view, render_at(full_downscale), full_downscale, megapixels)
-        elif view.texture_key != requested_key:
+        elif view.texture_key != view.requested_key:
             self._render_now(
                 view,
                 render_at(preview_downscale),
@@ -160,11 +212,10 @@ class ProgressiveRenderer:
                 megapixels * PREVIEW_COST_RATIO,
             )
             self._schedule_redraw(IDLE_SECONDS)
-        elif now - view.requested_time < IDLE_SECONDS:
+        elif time.monotonic() - view.requested_time < IDLE_SECONDS:
             self._schedule_redraw(IDLE_SECONDS)
         else:
-            self._refine(view, lambda: render_at(full_downscale))
-        return view
+            self._refine(view, lambda: render_at(full_downscale), megapixels)
 
     def _render_now(
         self, view: ViewState, task: Task[Any], downscale: int, megapixels: float
@@ -174,37 +225,68 @@ class ProgressiveRenderer:
         start_time = time.monotonic()
         view.texture = run_to_completion(task)
         self.renderer.finish()
-        elapsed = time.monotonic() - start_time
+        self._update_estimate(time.monotonic() - start_time, megapixels)
+        view.texture_key, view.downscale = view.requested_key, downscale
+        view.task = view.progress = None
+
+    def _update_estimate(self, seconds: float, megapixels: float) -> None:
+        """Update the estimate of the cost after a picture."""
         # The minimum keeps the cost of single compilations and uploads out of the estimate.
-        cost = elapsed / max(megapixels, _MIN_MEGAPIXELS)
+        cost = seconds / max(megapixels, _MIN_MEGAPIXELS)
         self._seconds_per_megapixel = (
             cost
             if not self._seconds_per_megapixel
             else min(cost, 0.5 * (self._seconds_per_megapixel + cost))
         )
-        view.texture_key, view.downscale, view.task = view.requested_key, downscale, None
 
-    def _refine(self, view: ViewState, start_task: Callable[[], Task[Any]]) -> None:
-        """Continue the final picture of a view for one slice of time."""
+    def _refine(
+        self, view: ViewState, start_task: Callable[[], Task[Any]], megapixels: float
+    ) -> None:
+        """Continue the final picture of a view for one slice of time.
+
+        The first picture is completed even if the view has changed: its cost must be known.
+        """
         other = self._refining_view
         if other in self.views.values() and other is not view and other.is_rendering:
             self._schedule_redraw(0.0)  # one at a time: they share the renderer's images
             return
-        if other is not view or view.task_key != view.requested_key or view.task is None:
-            view.task, view.task_key = start_task(), view.requested_key
+        is_outdated = view.task_key != view.requested_key and view.texture is not None
+        if other is not view or view.task is None or is_outdated:
+            view.task, view.task_key, view.task_seconds = start_task(), view.requested_key, 0.0
             self._refining_view = view
-        deadline = time.monotonic() + SLICE_SECONDS
+        start_time = time.monotonic()
         try:
-            while time.monotonic() < deadline:
-                next(view.task)
-                self.renderer.finish()
+            self._run_slice(view, start_time + SLICE_SECONDS)
         except StopIteration as done:
-            view.texture, view.texture_key = done.value, view.requested_key
+            if not self._seconds_per_megapixel:
+                seconds = view.task_seconds + time.monotonic() - start_time
+                self._update_estimate(seconds, megapixels)
+            view.texture, view.texture_key = done.value, view.task_key
             view.downscale = self.renderer.downscale_factors[1]
-            view.task = self._refining_view = None
+            view.task = view.progress = self._refining_view = None
+            if view.texture_key != view.requested_key:
+                self._schedule_redraw(0.0)
             return
         view.task_time = time.monotonic()
+        view.task_seconds += view.task_time - start_time
         self._schedule_redraw(0.0)
+
+    def _run_slice(self, view: ViewState, deadline: float) -> None:
+        """Continue the task of a view until a deadline, or a step that the view has not named yet.
+
+        Raises
+        ------
+        StopIteration
+            If the task is done.
+        """
+        while time.monotonic() < deadline:
+            progress = next(view.task)
+            self.renderer.finish()
+            if view.texture is None:
+                named = view.progress is not None and view.progress.label == progress.label
+                view.progress = progress
+                if not named:
+                    return
 
 
 def downscaled(view_input: ViewInput, downscale: int) -> ViewInput:

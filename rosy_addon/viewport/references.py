@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
-from ..errors import RosyError
+from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..scene.cameras import render_camera
 from ..scene.tone_inputs import load_luminance, load_reference, reference_path
 
@@ -29,17 +29,21 @@ class ReferenceImages:
 
     def __init__(self, schedule_loading: Callable[[], None]) -> None:
         self._schedule_loading = schedule_loading
-        #: Luminance, or the error of reading it, by path and modification time. None: not loaded.
-        self._images: dict[Hashable, np.ndarray | RosyError | None] = {}
-        self._current: tuple[Hashable, ReferenceRender | None] = None, None
+        #: By the name of a scene: path and modification time of its file, and the luminance, or the
+        #: message of the error of reading it. None: not loaded.
+        self._images: dict[str, tuple[tuple, np.ndarray | str | None]] = {}
+        #: By the name of a scene: the last result, and what it depends on.
+        self._current: dict[str, tuple[Hashable, ReferenceRender]] = {}
 
     def load_pending(self) -> None:
         """Load the files that have been requested."""
-        for file_key in [key for key, image in self._images.items() if image is None]:
+        for name, (file_key, image) in list(self._images.items()):
+            if image is not None:
+                continue
             try:
-                self._images[file_key] = load_luminance(file_key[0])
-            except RosyError as error:
-                self._images[file_key] = error
+                self._images[name] = file_key, load_luminance(file_key[0])
+            except REPORTED_ERRORS as error:
+                self._images[name] = file_key, error_text(error)
 
     def current(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, look: Look
@@ -61,19 +65,19 @@ class ReferenceImages:
             return None
         path = reference_path(scene)
         file_key = path, _modified_time(path)
-        if file_key not in self._images:
-            self._images = {file_key: None}
+        if scene.name not in self._images or self._images[scene.name][0] != file_key:
+            self._images[scene.name] = file_key, None
             self._schedule_loading()
-        image = self._images[file_key]
-        if isinstance(image, RosyError):
-            raise image
+        image = self._images[scene.name][1]
+        if isinstance(image, str):
+            raise RosyError(image)
         if image is None:
             return None
         reference = load_reference(scene, depsgraph, render_camera(scene), look, image)
         key = file_key, reference.camera.view.tobytes(), reference.camera.projection.tobytes()
-        if self._current[0] != key:
-            self._current = key, reference
-        return self._current[1]
+        if scene.name not in self._current or self._current[scene.name][0] != key:
+            self._current[scene.name] = key, reference
+        return self._current[scene.name][1]
 
 
 def _modified_time(path: Path) -> float | None:

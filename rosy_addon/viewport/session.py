@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+import traceback
 from collections.abc import Callable, Hashable
 from typing import Any
 
 import bpy
 
-from ..errors import DeviceError, RosyError
+from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
 from ..render.view_input import ViewInput
 from ..scene.cameras import camera_of_view
@@ -16,11 +17,18 @@ from ..scene.lights import read_lights
 from ..scene.look_properties import read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
-from .layers import LayerStates
+from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
 from .references import ReferenceImages
-from .view3d import clip_planes, is_visible, open_view3d_spaces, redraw, shows_surfaces
+from .view3d import (
+    clip_planes,
+    is_visible,
+    open_view3d_spaces,
+    redraw,
+    redraw_sidebars,
+    shows_surfaces,
+)
 
 #: Seconds between two checks for views that were closed.
 CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
@@ -40,7 +48,11 @@ TIMER_METHODS = (
     "_tag_redraw",
     "_resolve_topologies",
     "_load_reference_images",
+    "_redraw_sidebars",
 )
+
+#: Pointers of a space and of one of its regions.
+ViewPointers = tuple[int, int]
 
 
 class ViewportSession:
@@ -56,8 +68,6 @@ class ViewportSession:
     ----------
     spaces : set of int
         Pointers of the `SpaceView3D` that are live.
-    error : str or None
-        Why the view that was drawn last shows no picture.
     fallback_reason : str or None
         Why the CPU draws instead of the graphics card.
 
@@ -72,9 +82,12 @@ class ViewportSession:
             select_viewport_renderer(device), self._schedule_redraw
         )
         self.spaces: set[int] = set()
-        self.error: str | None = None
         self.fallback_reason: str | None = None
         self._fallback_time = 0.0
+        #: Why a view shows no picture.
+        self._problems: dict[ViewPointers, str] = {}
+        #: The lines of text in each view.
+        self._lines: dict[ViewPointers, list[str]] = {}
         self.layers = LayerStates(lambda: self._schedule(0.0, "_resolve_topologies"))
         self._references = ReferenceImages(lambda: self._schedule(0.0, "_load_reference_images"))
         self._draw_handlers = [
@@ -106,6 +119,9 @@ class ViewportSession:
     def remove(self, space_pointer: int) -> None:
         """Make a view no longer live, given its pointer."""
         self.spaces.discard(space_pointer)
+        for texts in (self._problems, self._lines):
+            for pointers in [pointers for pointers in texts if pointers[0] == space_pointer]:
+                del texts[pointers]
         self.progressive.remove_space(space_pointer)
         redraw()
 
@@ -132,7 +148,7 @@ class ViewportSession:
         self.layers.invalidate(scene, depsgraph)
 
     def _on_undo(self, *_: Any) -> None:
-        self.layers.clear()
+        self.layers.forget()
 
     def _on_load(self, *_: Any) -> None:
         stop()
@@ -151,15 +167,21 @@ class ViewportSession:
         """Tag the live views for a redraw, in which rendering continues."""
         redraw(self.spaces)
 
-    def _resolve_topologies(self) -> None:
-        """Read the data that cannot be read while Blender draws."""
-        self.layers.resolve_topologies()
+    def _resolve_topologies(self) -> float | None:
+        """Read the data that cannot be read while Blender draws, in slices of time."""
+        if not self.layers.resolve_topologies():
+            return 0.0
         redraw(self.spaces)
+        return None
 
     def _load_reference_images(self) -> None:
         """Load the pictures that tones come from."""
         self._references.load_pending()
         redraw(self.spaces)
+
+    def _redraw_sidebars(self) -> None:
+        """Show the text of the views in the sidebars too."""
+        redraw_sidebars()
 
     def _schedule(self, seconds: float, name: str) -> None:
         """Start a timer that calls a method, unless it is running already."""
@@ -175,15 +197,25 @@ class ViewportSession:
     def _draw(self) -> None:
         context = bpy.context
         space, region = context.space_data, context.region
-        if space.as_pointer() not in self.spaces or not shows_surfaces(space):
+        if space.as_pointer() not in self.spaces:
             return
-        self.error = None
+        pointers = space.as_pointer(), region.as_pointer()
+        self._problems.pop(pointers, None)
         try:
+            if not shows_surfaces(space):
+                raise RosyError("fields are not drawn in wireframe shading: choose another shading")
             self._draw_view(context, space, region)
         except DeviceError as error:
-            self._fall_back_to_cpu(error)
-        except RosyError as error:
-            self.error = str(error)
+            if self.fallback_reason is None:
+                self._fall_back_to_cpu(error)
+            else:
+                self._problems[pointers] = str(error)
+        except REPORTED_ERRORS as error:
+            self._problems[pointers] = error_text(error)
+        except Exception as error:
+            # Blender would print this, and the view would stay plain.
+            traceback.print_exc()
+            self._problems[pointers] = error_text(error)
 
     def _fall_back_to_cpu(self, error: DeviceError) -> None:
         """Continue with the CPU when the graphics card rejects a shader."""
@@ -204,18 +236,15 @@ class ViewportSession:
         instances, view_input = self._read_view(context, depsgraph, space, region)
         if view_input is None:
             return
-        renderer = self.progressive.renderer
-        draw_items = renderer.upload(view_input.instances, view_input.look.display)
         view = self.progressive.update(
             (space.as_pointer(), region.as_pointer()),
             _picture_key(instances, view_input),
-            draw_items,
             view_input,
         )
         if view.texture is not None:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
-            renderer.composite(view.texture, draw_items, view_input, opacity)
+            self.progressive.renderer.composite(view.texture, view.items, view_input, opacity)
 
     def _read_view(
         self,
@@ -224,10 +253,19 @@ class ViewportSession:
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
     ) -> tuple[list[InstanceState], ViewInput | None]:
-        """Read what a view shows; no input if there is nothing to draw, or not yet."""
+        """Read what a view shows; no input if there is nothing to draw yet.
+
+        Raises
+        ------
+        RosyError
+            If no field is visible and nothing else says why, or if the tone has no source.
+        """
         look = read_look(context.scene.rosy)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
+        if layer.is_starting:
+            self._schedule_redraw(0.0)
+            return [], None
         camera = camera_of_view(region, context.region_data)
         visible = [
             entry
@@ -236,7 +274,11 @@ class ViewportSession:
         ]
         with_field = [entry for entry in visible if entry.instance.field is not None]
         if not with_field:
-            return visible, None
+            if layer.scene_cache.errors or layer.scene_cache.has_unresolved:
+                return visible, None
+            raise RosyError(
+                "no object with a field is visible here: make a field, or show its object"
+            )
         tone_request = make_tone_request(context.scene, look)
         check_tones(tone_request, [(entry.instance.tone, entry.owner) for entry in with_field])
         reference = self._references.current(context.scene, depsgraph, look)
@@ -252,17 +294,47 @@ class ViewportSession:
         )
 
     def _draw_text(self) -> None:
-        """Show why a field is not drawn."""
+        """Show what is being done, and why a field is not drawn."""
         context = bpy.context
-        if context.space_data.as_pointer() not in self.spaces:
+        pointers = context.space_data.as_pointer(), context.region.as_pointer()
+        if pointers[0] not in self.spaces:
             return
-        layer = self.layers.get(context.scene, context.view_layer)
-        lines = list(layer.scene_cache.errors.values())[:MAX_OBJECT_ERRORS] if layer else []
-        if self.error:
-            lines.insert(0, self.error)
+        lines = self._lines_of_view(pointers, self.layers.get(context.scene, context.view_layer))
+        draw_messages(lines, context)
+        if lines != self._lines.get(pointers, []):
+            self._lines[pointers] = lines
+            self._schedule(0.0, "_redraw_sidebars")
+
+    def _lines_of_view(self, pointers: ViewPointers, layer: LayerState | None) -> list[str]:
+        """Return the lines of text in a view."""
+        lines = []
         if self.fallback_reason and time.monotonic() < self._fallback_time + MESSAGE_SECONDS:
-            lines.insert(0, f"drawn on the processor, at reduced size: {self.fallback_reason}")
-        draw_messages(lines, context.preferences.system.ui_scale)
+            lines.append(f"drawn on the processor, at reduced size: {self.fallback_reason}")
+        if layer is not None and layer.is_starting:
+            lines.append("reading the meshes ...")
+        view = self.progressive.views.get(pointers)
+        if view is not None and view.progress is not None:
+            lines.append(f"{view.progress.label} ...")
+        if pointers in self._problems:
+            lines.append(self._problems[pointers])
+        errors = list(layer.scene_cache.errors.values()) if layer else []
+        lines += errors[:MAX_OBJECT_ERRORS]
+        if len(errors) > MAX_OBJECT_ERRORS:
+            lines.append(
+                f"{counted(len(errors) - MAX_OBJECT_ERRORS, 'more object')} cannot be drawn"
+            )
+        return lines
+
+    def messages(self, area: bpy.types.Area) -> list[str]:
+        """Return the text in the views of an area, as they were drawn last."""
+        space_pointer = area.spaces.active.as_pointer()
+        return list(
+            dict.fromkeys(
+                line
+                for region in area.regions
+                for line in self._lines.get((space_pointer, region.as_pointer()), [])
+            )
+        )
 
 
 def _picture_key(instances: list[InstanceState], view_input: ViewInput) -> Hashable:
@@ -292,6 +364,11 @@ _session: ViewportSession | None = None
 def is_live(space: bpy.types.SpaceView3D) -> bool:
     """Return whether a 3D view is live."""
     return _session is not None and space.as_pointer() in _session.spaces
+
+
+def messages(area: bpy.types.Area) -> list[str]:
+    """Return what the live views of an area say: what is being done, why a field is not drawn."""
+    return [] if _session is None else _session.messages(area)
 
 
 def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:

@@ -36,6 +36,16 @@ def redraw(spaces: set[int] | None = None) -> None:
                 area.tag_redraw()
 
 
+def redraw_sidebars() -> None:
+    """Tag the sidebars of all 3D views for a redraw."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()
+
+
 def shows_surfaces(space: bpy.types.SpaceView3D) -> bool:
     """Return whether the shading of a view shows surfaces, unlike wireframe shading."""
     return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}

@@ -164,6 +164,39 @@ def test_instances_with_other_faces_than_their_owner(monkey):
     assert sorted(counts) == [len(monkey.data.polygons), len(monkey.data.loops)]
 
 
+def test_reading_in_slices_ends(scene):
+    """With a deadline that has passed, each call reads one object, also if it cannot be drawn."""
+    scene_cache, calls = SceneCache(), 0
+    for index in range(6):
+        plane = add_plane(f"Plane {index}")
+        add_field(plane, kind="axis")
+        if index % 3 == 0:
+            new_geometry(plane)
+        elif index % 3 == 1:
+            edges_only(plane)
+    states = scene_cache.read(depsgraph(), deadline=0.0)
+    while not scene_cache.is_complete or scene_cache.has_unresolved:
+        calls += 1
+        assert calls < 20
+        scene_cache.resolve_topologies(depsgraph(), deadline=0.0)
+        states = scene_cache.read(depsgraph(), deadline=0.0)
+    assert [state.owner.name for state in states] == ["Plane 2", "Plane 5"]
+    assert sorted(scene_cache.errors) == [f"Plane {index}" for index in (0, 1, 3, 4)]
+
+
+def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatch):
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    salt = iter(range(100))
+    monkeypatch.setattr(scene_cache_module, "_topology_hash", lambda *_: bytes([next(salt)]))
+    scene_cache = SceneCache()
+    for _ in range(8):
+        scene_cache.read(depsgraph())
+        if not scene_cache.has_unresolved:
+            break
+        scene_cache.resolve_topologies(depsgraph())
+    assert "at each evaluation" in scene_cache.errors["Suzanne"]
+
+
 def test_other_objects_are_drawn(monkey):
     plane = add_field(add_plane(), kind="axis")
     remesh(monkey)

@@ -5,7 +5,7 @@ It has the same interface as `rosy_addon.gpu.device.BlenderDevice`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import moderngl
@@ -13,6 +13,7 @@ import numpy as np
 
 from rosy_addon.gpu.device import NamedValues
 from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
+from rosy_addon.progress import Progress, Task
 
 FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
 
@@ -32,6 +33,13 @@ class EglDevice:
     def name(self) -> str:
         """The name of the renderer that the driver reports."""
         return self.context.info["GL_RENDERER"]
+
+    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
+        """As `Device.compile_task`."""
+        for shader in shaders:
+            if shader.name not in self._programs:
+                yield Progress(0.0, "compiling shaders")
+                self._programs[shader.name] = self._compile(shader)
 
     def texture(
         self,

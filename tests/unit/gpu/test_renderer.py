@@ -33,7 +33,7 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.gpu import lic_stage, mesh_buffers, passes, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 from rosy_addon.gpu.field_kind import field_kinds
-from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, build_mesh_buffers, field_channels, split_matrix
+from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, mesh_buffers_task, split_matrix
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.screen_box import is_empty, screen_box, union_box
 from rosy_addon.progress import run_to_completion
@@ -43,6 +43,11 @@ from rosy_addon.projection.surface_tone import SurfaceTone
 from rosy_addon.render.view_input import ViewInput
 
 AXIS = (0.3, 0.2, 1.0)
+
+
+def build_mesh_buffers(*arguments):
+    return run_to_completion(mesh_buffers_task(*arguments))
+
 
 # --- input data ----------------------------------------------------------------------------------
 

@@ -11,9 +11,10 @@ import bpy
 from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
 from ..rosy_addon.field.guides import feature_edges
-from ..rosy_addon.field.rosy_field import MAX_DEGREE
+from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
+from ..rosy_addon.field.singularities import describe_fields
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.guides import (
     corner_uvs,
     guide_objects,
@@ -27,6 +28,10 @@ from .poll import poll_editable, selected_mesh_objects, store_fields
 
 #: Labels of generators that are not the capitalized key.
 KIND_LABELS = {"uv": "UV Map"}
+
+#: Generators that take less time than singularities take to be counted, and the number of faces up
+#: to which they are counted nevertheless.
+FAST_KINDS, MAX_FAST_FACES = ("axis", "uv"), 50_000
 
 # Not inside the annotation: up to Python 3.11, a comprehension there cannot see module names.
 KIND_ITEMS = [
@@ -134,8 +139,8 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_editable(cls, context)
 
-    def make_task(self, context: bpy.types.Context) -> Task[int]:
-        """Generate all fields, then store them. Return the number of faces."""
+    def make_task(self, context: bpy.types.Context) -> Task[str]:
+        """Generate all fields, then store them. Return what was made, for a message."""
         meshes = list(self.required_data(context))
         surfaces = [mesh_surface(mesh) for mesh in meshes]
         settings_per_mesh = [
@@ -148,8 +153,18 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 self.report({"WARNING"}, note)
             task = generate_task(surface, settings_per_mesh[index], self.degree)
             fields[mesh] = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
+        yield Progress(1.0, "counting singularities")
+        notes = self._notes(list(zip(surfaces, fields.values(), strict=True)))
         store_fields(self, context, fields, self.attribute)
-        return sum(len(field.vectors) for field in fields.values())
+        names = f"'{selected_mesh_objects(context)[0].name}'"
+        target = names if len(meshes) == 1 else counted(len(meshes), "mesh", "meshes")
+        return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
+
+    def _notes(self, fields: list[tuple[Surface, RosyField]]) -> str:
+        """Return what the message says about the fields. Counting must not take long."""
+        face_count = sum(surface.face_count for surface, _ in fields)
+        is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
+        return describe_fields(fields, count_singularities=is_cheap)
 
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
@@ -198,8 +213,8 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context))
 
-    def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Made a field of degree {self.degree} on {counted(result, 'face')}")
+    def finish(self, context: bpy.types.Context, result: str) -> None:
+        self.report({"INFO"}, f"Made {result}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

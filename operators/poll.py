@@ -11,7 +11,7 @@ from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.scene.write_field import assign_fields
-from ..rosy_addon.ui import job_status, overlay
+from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
 
 
@@ -83,12 +83,13 @@ def store_fields(
 ) -> None:
     """Store fields on meshes as `assign_fields`, and apply the preferences to the scene.
 
-    The overlay of singularities is updated where it is shown.
+    The overlay of singularities is updated where it is shown. The first field of a scene is shown
+    live.
 
     Parameters
     ----------
     operator : bpy.types.Operator
-        Reports errors in the preferences.
+        Reports what the preferences ask for and cannot be done.
     context : bpy.types.Context
     fields : dict of bpy.types.Mesh to RosyField
     name : str, optional
@@ -99,9 +100,15 @@ def store_fields(
     RosyError
         If a field cannot be stored on its mesh. Nothing is changed in this case.
     """
+    is_first = not any(has_field(obj) for obj in context.scene.objects)
     assign_fields(fields, name)
     overlay.refresh(context, fields)
     try:
         apply_preferences(context)
     except RosyError as error:
         operator.report({"WARNING"}, f"RoSy's preferences: {error}")
+    if is_first:
+        try:
+            live_views.start_with_first_field(context)
+        except RosyError as error:
+            operator.report({"WARNING"}, f"no live view: {error}")

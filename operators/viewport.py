@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.errors import RosyError
+from ..rosy_addon.ui import live_views
 from ..rosy_addon.viewport import session
 
 
@@ -49,6 +50,7 @@ class ROSY_OT_viewport(bpy.types.Operator):
         enable = not session.is_live(space) if self.show == "TOGGLE" else self.show == "ON"
         if not enable:
             session.stop(space)
+            live_views.decline(context.scene)
             return {"FINISHED"}
         try:
             session.start(space, self.device.lower())

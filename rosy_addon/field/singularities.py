@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..errors import counted
 from .frames import dot
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
@@ -69,6 +72,31 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)
     return vertex, index[vertex]
+
+
+def describe_fields(
+    fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool
+) -> str:
+    """Describe fields for a message.
+
+    Parameters
+    ----------
+    fields : sequence of (Surface, RosyField)
+    count_singularities : bool
+
+    Returns
+    -------
+    str
+        Such as "12 singularities, 3 faces without a direction"; empty if there is nothing to say.
+    """
+    parts = []
+    if count_singularities:
+        count = sum(len(find_singularities(surface, field)[0]) for surface, field in fields)
+        parts.append(counted(count, "singularity", "singularities"))
+    undefined = sum(int((~field.vectors.any(axis=1)).sum()) for _, field in fields)
+    if undefined:
+        parts.append(f"{counted(undefined, 'face')} without a direction")
+    return ", ".join(parts)
 
 
 def _signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The user interface: properties, the panels of the sidebar, preferences and the overlay."""
+"""The user interface: properties, panels of the sidebar, preferences, overlay and live views."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import bpy
 
 from . import (
     job_status,
+    live_views,
     look_panels,
     main_panel,
     overlay,
@@ -27,10 +28,12 @@ def register() -> None:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
     bpy.types.VIEW3D_PT_overlay.append(main_panel.draw_overlay_popover)
+    live_views.register()
 
 
 def unregister() -> None:
     """Remove them, and clear the state of this room."""
+    live_views.unregister()
     bpy.types.VIEW3D_PT_overlay.remove(main_panel.draw_overlay_popover)
     main_panel.unregister()
     for module in reversed(MODULES):

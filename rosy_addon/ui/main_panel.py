@@ -15,7 +15,7 @@ from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
 from .generator_settings import generator_setting_names
-from .sidebar import SidebarPanel, draw_progress, use_property_columns
+from .sidebar import SidebarPanel, draw_progress, draw_wrapped, use_property_columns
 
 #: Placeholder texts of empty settings of the generator.
 PLACEHOLDERS = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
@@ -115,6 +115,9 @@ def _draw_picture_section(
     """Draw the list of baked pictures and the buttons that bake."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
     _draw_live_toggle(layout, context)
+    if session.is_live(context.space_data):
+        layout.prop(context.scene.rosy, "remember_live")
+    draw_wrapped(layout, context, session.messages(context.area))
     if job_status.current is not None:
         draw_progress(layout)
         return

@@ -1,4 +1,4 @@
-"""Preferences of the extension: the defaults of new scenes."""
+"""Preferences of the extension: what happens when the first field of a scene is made."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import preset_library
 
 
 class ROSY_AP_preferences(bpy.types.AddonPreferences):
-    """Defaults that a scene gets when its first field is made."""
+    """What happens when the first field of a scene is made, and the defaults that the scene gets."""
 
     bl_idname = EXTENSION_ID
 
@@ -29,12 +29,25 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
     )
 
+    live_first_field: bpy.props.BoolProperty(
+        name="Live View",
+        description="Show the first field of a scene live in the 3D view in which it is made",
+        default=True,
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        layout.label(text="Defaults for a scene when its first field is made")
+        layout.label(text="When the first field of a scene is made")
+        layout.prop(self, "live_first_field")
         layout.prop(self, "preset")
         layout.prop(self, "directory")
+
+
+def addon_preferences(context: bpy.types.Context) -> ROSY_AP_preferences | None:
+    """Return the preferences; None if RoSy does not run as an extension."""
+    addon = context.preferences.addons.get(EXTENSION_ID)
+    return None if addon is None else addon.preferences
 
 
 def apply_preferences(context: bpy.types.Context) -> None:
@@ -45,10 +58,9 @@ def apply_preferences(context: bpy.types.Context) -> None:
     RosyError
         If the preset cannot be read.
     """
-    settings, addon = context.scene.rosy, context.preferences.addons.get(EXTENSION_ID)
-    if addon is None:
+    settings, preferences = context.scene.rosy, addon_preferences(context)
+    if preferences is None:
         return
-    preferences = addon.preferences
     has_default_look = not any(settings.look.is_property_set(name) for name in settings_of(Look))
     if preferences.preset and has_default_look:
         preset_library.apply_preset(settings, preferences.preset)

@@ -290,6 +290,15 @@ class RosyScene(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
         options=path_property_options(),
     )
+    remember_live: bpy.props.BoolProperty(
+        name="Remember in the File",
+        description="Save which views are live with the file, and show them again when it is opened",
+    )
+    live_views: bpy.props.StringProperty(
+        description="Views that were live when the file was saved: index of the area and name of the "
+        "screen, one view in each line",
+        options={"HIDDEN"},
+    )
     bakes: bpy.props.CollectionProperty(type=RosyBake)
     strokes: bpy.props.PointerProperty(type=RosyStrokes)
 

@@ -26,12 +26,15 @@ from typing import Any
 HERE = Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 
-#: Scripts that test in a window, by what they test, and the size of the window in pixels: small,
-#: as views are drawn in software, but with room for the menu of all presets.
+#: Simulated events. With this option Blender never waits for events, and takes a core at rest.
+SIMULATED_EVENTS = ("--enable-event-simulate",)
+
+#: Scripts that test in a window, by what they test, the size of the window in pixels (small, as views
+#: are drawn in software, but with room for the menu of all presets), and further options.
 WINDOWS = {
-    "panel": ("window_panel.py", 1000, 720),
-    "presets": ("window_presets.py", 1000, 900),
-    "live": ("window_live.py", 1000, 720),
+    "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
+    "presets": ("window_presets.py", 1000, 900, SIMULATED_EVENTS),
+    "live": ("window_live.py", 1000, 720, ()),
 }
 
 
@@ -133,14 +136,14 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         shots = folder / "shots"
         shots.mkdir()
         environment["ROSY_SHOTS"] = str(shots)
-        for script, width, height in windows:
+        for script, width, height, further_options in windows:
             results_file = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(results_file)
             time_limit = 900 if "ROSY_LIVE_MANY" in environment else 420
             process = blender(
                 "gui", "-s", str(time_limit), *backend,
                 "--window-geometry", "0", "0", str(width), str(height),
-                "--enable-event-simulate", "--python-exit-code", "1",
+                *further_options, "--python-exit-code", "1",
                 "-P", str(HERE / script),
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=time_limit + 60.0,
             )  # fmt: skip

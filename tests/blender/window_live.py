@@ -20,9 +20,26 @@ from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera
-from window_steps import SHOTS, capture, in_view, rosy, run_steps, view, wait_until
+from window_steps import (
+    SHOTS,
+    capture,
+    in_view,
+    preferences,
+    rosy,
+    run_steps,
+    view,
+    wait_until,
+)
 
 MANY = bool(os.environ.get("ROSY_LIVE_MANY"))
+
+#: Seconds for which a window at rest is measured, and CPU seconds that it may take in each of them:
+#: it looks for closed views, and draws no pixel.
+REST_SECONDS, REST_LOAD = (5.0, 0.04) if MANY else (0.8, 0.08)
+
+#: Seconds that a redraw may take at the start of a live view, drawn in software. On an idle machine, it
+#: takes half a second.
+MAX_STEP_SECONDS = 1.2
 
 #: Views that are compared, all around, and frames of an animation.
 VIEWS, FRAMES = (24, 24) if MANY else (4, 4)
@@ -30,6 +47,11 @@ VIEWS, FRAMES = (24, 24) if MANY else (4, 4)
 
 def session_module():
     return rosy("rosy_addon.viewport.session")
+
+
+def messages():
+    """Return what the live view says."""
+    return session_module().messages(view()[1])
 
 
 def switch(show, **options):
@@ -333,10 +355,8 @@ def tones_are_those_of_a_bake():
     yield from check_is_bake("live-tone-attribute", 0.97, max_difference)
     scene.rosy.tone_attribute = "Pencil"
     view()[1].tag_redraw()
-    yield from wait_until(lambda: session_module()._session.error)
-    assert (
-        "'Pencil'" in session_module()._session.error and "'Ink'" in session_module()._session.error
-    )
+    yield from wait_until(messages)
+    assert "'Pencil'" in messages()[0] and "'Ink'" in messages()[0]
     look.tone, look.shadows = "light", True
     with in_view():
         bpy.ops.object.light_add(type="SUN", location=(0, 0, 5), rotation=(0.9, 0.3, 0.0))
@@ -622,6 +642,302 @@ def bad_fields_are_named():
     yield 0.5
 
 
+def _remeshed(monkey):
+    modifier = monkey.modifiers.new("Rebuild", "REMESH")
+    modifier.mode, modifier.voxel_size = "VOXEL", 0.1
+    yield
+    monkey.modifiers.remove(modifier)
+
+
+def _skinned(monkey):
+    modifier = monkey.modifiers.new("Skin", "SKIN")
+    yield
+    monkey.modifiers.remove(modifier)
+
+
+def _new_geometry(monkey):
+    group = bpy.data.node_groups.new("New", "GeometryNodeTree")
+    group.interface.new_socket("Mesh", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    cube, target = group.nodes.new("GeometryNodeMeshCube"), group.nodes.new("NodeGroupOutput")
+    group.links.new(cube.outputs[0], target.inputs[0])
+    modifier = monkey.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    yield
+    monkey.modifiers.remove(modifier)
+    bpy.data.node_groups.remove(group)
+
+
+def _masked(monkey):
+    group = monkey.vertex_groups.new(name="None")
+    modifier = monkey.modifiers.new("Hide All", "MASK")
+    modifier.vertex_group = group.name
+    yield
+    monkey.modifiers.remove(modifier)
+    monkey.vertex_groups.remove(group)
+
+
+def _not_finite(monkey):
+    attribute = monkey.data.attributes["rosy"]
+    vector = attribute.data[7].vector.copy()
+    attribute.data[7].vector = (math.nan, 0.0, 0.0)
+    monkey.data.update()
+    yield
+    attribute = monkey.data.attributes["rosy"]
+    attribute.data[7].vector = vector
+    monkey.data.update()
+
+
+def _wrong_attribute(monkey):
+    monkey.data.attributes.new("weights", "FLOAT", "POINT")
+    monkey.data.rosy.attribute = "weights"
+    monkey.data.update()
+    yield
+    monkey.data.rosy.attribute = "rosy"
+    monkey.data.update()
+
+
+def _missing_picture(monkey):
+    rosy_settings = bpy.context.scene.rosy
+    bpy.context.scene.camera = add_camera("Camera", (0.0, -6.0, 1.0), (1.4, 0.0, 0.0))
+    rosy_settings.look.ink, rosy_settings.look.tone = "hatch", "picture"
+    rosy_settings.tone_picture = str(SHOTS / "no such.png")
+    yield
+    rosy_settings.look.ink, rosy_settings.look.tone = "soft", "light"
+    bpy.data.objects.remove(bpy.context.scene.camera)
+
+
+def _edit_mode(monkey):
+    attributes = monkey.data.attributes
+    attributes.new("painted", "FLOAT_VECTOR", "POINT")
+    monkey.data.rosy.attribute = "painted"
+    bpy.context.view_layer.objects.active = monkey
+    with in_view():
+        bpy.ops.object.mode_set(mode="EDIT")
+    yield
+    with in_view():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    monkey.data.rosy.attribute = "rosy"
+    attributes.remove(attributes["painted"])
+    monkey.select_set(False)
+
+
+def _wireframe(monkey):
+    view()[1].spaces.active.shading.type = "WIREFRAME"
+    yield
+    view()[1].spaces.active.shading.type = "SOLID"
+
+
+def _no_field(monkey):
+    monkey.rosy.include = False
+    monkey.update_tag()
+    yield
+    monkey.rosy.include = True
+    monkey.update_tag()
+
+
+def _raises(name, error):
+    """Return a cause: a method of the renderer raises an error."""
+
+    def cause(monkey):
+        renderer = type(session_module()._session.progressive.renderer)
+        original = getattr(renderer, name)
+
+        def fail(*_, **__):
+            raise error
+
+        setattr(renderer, name, fail)
+        bpy.context.scene.rosy.look.seed += 1
+        yield
+        setattr(renderer, name, original)
+        bpy.context.scene.rosy.look.seed += 1
+
+    return cause
+
+
+#: Causes of a view that shows no field, and words of the message.
+CAUSES = {
+    "remesh": (_remeshed, ("'Suzanne'", "Rebuild", "no attribute 'rosy'")),
+    "skin": (_skinned, ("'Suzanne'", "Skin", "no attribute 'rosy'")),
+    "new geometry": (_new_geometry, ("'Suzanne'", "Nodes", "no attribute 'rosy'")),
+    "mask": (_masked, ("'Suzanne'", "Hide All", "no faces")),
+    "not finite": (_not_finite, ("'Suzanne'", "not finite")),
+    "wrong attribute": (_wrong_attribute, ("'Suzanne'", "'weights'", "found FLOAT on POINT")),
+    "missing picture": (_missing_picture, ("no such.png",)),
+    "edit mode": (_edit_mode, ("'Suzanne'", "edit mode")),
+    "wireframe": (_wireframe, ("wireframe",)),
+    "no field": (_no_field, ("no object with a field",)),
+    "no memory": (_raises("render_texture_task", MemoryError()), ("not enough memory",)),
+    "no memory to upload": (_raises("upload", MemoryError()), ("not enough memory",)),
+}
+
+
+def load_at_rest():
+    """Wait until the window rests, and return the CPU seconds that it takes in each second."""
+    yield 0.7
+    start = time.process_time()
+    yield REST_SECONDS
+    return (time.process_time() - start) / REST_SECONDS
+
+
+def a_view_without_a_field_says_why_and_rests():
+    """Each cause is named in the view and in the panel; nothing is done; later the field is back."""
+    yield from fresh_scene(levels=0)
+    view()[1].spaces.active.show_region_ui = True
+    yield 0.5
+    view()[3].active_panel_category = "RoSy"
+    # Blender's own antialiasing continues over many redraws.
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    print(f"at rest without a live view: {100 * (yield from load_at_rest()):.1f} %")
+    switch("ON")
+    yield from wait_for_final_pictures()
+    print(f"at rest with a live view: {100 * (yield from load_at_rest()):.1f} %")
+    monkey = bpy.data.objects["Suzanne"]
+    shown = {}
+    for name, (cause, words) in CAUSES.items():
+        steps = cause(monkey)
+        next(steps)
+        view()[1].tag_redraw()
+        yield from wait_until(messages)
+        assert len(messages()) == 1 and all(word in messages()[0] for word in words), (
+            f"{name}: {messages()}"
+        )
+        load = yield from load_at_rest()
+        print(f"{name}: {100 * load:.1f} %, {messages()[0]}")
+        shown[name] = load
+        if MANY or name == "remesh":
+            capture(f"live-cause-{name.replace(' ', '-')}", view()[2])
+        next(steps, None)
+        view()[1].tag_redraw()
+        yield from wait_until(lambda: not messages())
+        assert [entry.owner for entry in visible_instances()] == [monkey], name
+    yield from wait_for_final_pictures()
+    assert max(shown.values()) < REST_LOAD, shown
+    bpy.context.preferences.system.viewport_aa = "8"
+    switch("OFF")
+    yield 0.5
+    check_nothing_is_left()
+
+
+def every_long_step_is_named_before_it_begins():
+    """The start of a live view is done in short redraws, and the view says what is being done."""
+    yield from fresh_scene(levels=4)
+    bpy.ops.rosy.preset_apply(preset="cross-hatch")
+    rosy("rosy_addon.gpu.device").release()
+    session_class = session_module().ViewportSession
+    original_draw, original_resolve = session_class._draw, session_class._resolve_topologies
+    seconds, lines = [], []
+
+    def timed(function):
+        def run(self):
+            start = time.monotonic()
+            result = function(self)
+            seconds.append((time.monotonic() - start, (lines or [None])[-1]))
+            return result
+
+        return run
+
+    def note_lines():
+        lines.extend(line for line in messages() if line not in lines)
+        if lines and len(shots) < 2 and "compiling" in lines[-1] + (shots or [""])[-1]:
+            shots.append(lines[-1])
+            capture(f"live-start-{len(shots)}", view()[2])
+
+    shots = []
+    session_class._draw = timed(original_draw)
+    session_class._resolve_topologies = timed(original_resolve)
+    handler = bpy.types.SpaceView3D.draw_handler_add(note_lines, (), "WINDOW", "POST_PIXEL")
+    try:
+        switch("ON")
+        yield from wait_for_final_pictures()
+    finally:
+        bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+        session_class._draw, session_class._resolve_topologies = original_draw, original_resolve
+    print(f"{len(seconds)} steps, the longest {sorted(seconds)[-4:]}, {lines}")
+    for words in ("reading the meshes", "compiling shaders", "preparing the mesh", "tracing"):
+        assert any(words in line for line in lines), f"'{words}' was not shown: {lines}"
+    assert max(seconds)[0] < MAX_STEP_SECONDS, sorted(seconds)[-4:]
+    assert not messages()
+    switch("OFF")
+    yield 0.5
+    check_nothing_is_left()
+
+
+def is_live():
+    return session_module().is_live(view()[1].spaces.active)
+
+
+def the_first_field_is_shown():
+    """Make Field makes its view live once, unless the user or the preferences do not want that."""
+    session_module().stop()
+    preferences().live_first_field = True
+
+    def make_field(name, how="EXEC_DEFAULT"):
+        bpy.ops.mesh.primitive_ico_sphere_add()
+        bpy.context.object.name = name
+        bpy.ops.rosy.field_generate(how, True, kind="axis", degree=2)
+
+    try:
+        for wanted, how in (
+            (True, "INVOKE_DEFAULT"),
+            (True, "EXEC_DEFAULT"),
+            (False, "EXEC_DEFAULT"),
+        ):
+            bpy.ops.wm.read_homefile(use_empty=True)
+            yield 0.5
+            preferences().live_first_field = wanted
+            with in_view():
+                make_field("First", how)
+            yield 0.5
+            assert is_live() == wanted
+        preferences().live_first_field = True
+        with in_view():
+            make_field("Second")
+        assert not is_live(), "the second field came on"
+        bpy.ops.wm.read_homefile(use_empty=True)
+        yield 0.5
+        assert bpy.context.area is None
+        make_field("Script")
+        assert not is_live(), "a script without a view made one live"
+        bpy.ops.wm.read_homefile(use_empty=True)
+        yield 0.5
+        with in_view():
+            make_field("First")
+        assert is_live()
+        switch("OFF")
+        with in_view():
+            bpy.ops.object.delete()
+            make_field("First Again")
+        assert not is_live(), "it came on again although the user had switched it off"
+    finally:
+        preferences().live_first_field = False
+    yield 0.3
+    check_nothing_is_left()
+
+
+def live_views_are_remembered():
+    """A file shows its live views again if the scene says so, and only then."""
+    yield from fresh_scene(levels=0)
+    path = str(SHOTS / "remembered.blend")
+    for remember, live, expected in (
+        (False, True, False),
+        (True, True, True),
+        (True, False, False),
+    ):
+        bpy.context.scene.rosy.remember_live = remember
+        switch("ON" if live else "OFF")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.read_homefile(use_empty=True)
+        yield 0.3
+        assert session_module()._session is None
+        bpy.ops.wm.open_mainfile(filepath=path)
+        yield 0.5
+        assert is_live() == expected, (remember, live)
+    os.remove(path)
+    switch("OFF")
+    yield 0.3
+    check_nothing_is_left()
+
+
 def nothing_leaks():
     """After toggles, undo steps and opened files, the textures and the memory are freed."""
     toggles, loads, undos = (500, 200, 100) if MANY else (4, 5, 3)
@@ -718,6 +1034,10 @@ STEPS = (
     every_frame_is_drawn,
     fallback_to_the_processor,
     bad_fields_are_named,
+    a_view_without_a_field_says_why_and_rests,
+    every_long_step_is_named_before_it_begins,
+    the_first_field_is_shown,
+    live_views_are_remembered,
     nothing_leaks,
     disabled_with_the_extension,
 )

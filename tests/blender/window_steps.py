@@ -34,6 +34,7 @@ def run_steps(*steps):
         steps = [step for step in steps if step.__name__ in ONLY]
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
+    preferences().live_first_field = False
     bpy.app.timers.register(_resume(_run_all(steps)), first_interval=1.0, persistent=True)
 
 
@@ -67,6 +68,11 @@ def _run_all(steps):
 def rosy(name):
     """Return a module of the extension."""
     return sys.modules[f"bl_ext.user_default.rosy.{name}"]
+
+
+def preferences():
+    """Return the preferences of the extension."""
+    return bpy.context.preferences.addons["bl_ext.user_default.rosy"].preferences
 
 
 def view():

@@ -1,0 +1,88 @@
+"""Live views that come on by themselves: with the first field of a scene, and with a file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..errors import RosyError
+from ..viewport import session
+from .preferences import addon_preferences
+
+#: Scenes, by `session_uid`, in which the user has switched a live view off.
+_declined_scenes: set[int] = set()
+
+
+def decline(scene: bpy.types.Scene) -> None:
+    """Note that the user has switched a live view off: none comes on with a field any more."""
+    _declined_scenes.add(scene.session_uid)
+
+
+def start_with_first_field(context: bpy.types.Context) -> None:
+    """Make the context's 3D view live, unless the user does not want that or there is none.
+
+    Raises
+    ------
+    DeviceError
+        If there is no graphics context.
+    """
+    space, preferences = context.space_data, addon_preferences(context)
+    if bpy.app.background or space is None or space.type != "VIEW_3D":
+        return
+    if context.scene.session_uid in _declined_scenes:
+        return
+    if preferences is not None and preferences.live_first_field:
+        session.start(space)
+
+
+@persistent
+def _save_live_views(*_: Any) -> None:
+    """Note in the scenes that remember them which views are live, before a file is saved."""
+    live_views = [
+        f"{index} {screen.name}"
+        for screen in bpy.data.screens
+        for index, area in enumerate(screen.areas)
+        if area.type == "VIEW_3D" and session.is_live(area.spaces.active)
+    ]
+    for scene in bpy.data.scenes:
+        if scene.rosy.remember_live and scene.library is None:
+            scene.rosy.live_views = "\n".join(live_views)
+
+
+@persistent
+def _restore_live_views(*_: Any) -> None:
+    """Make the views live that were live when the file was saved."""
+    for window in bpy.context.window_manager.windows:
+        settings = window.scene.rosy
+        if not settings.remember_live:
+            continue
+        for line in settings.live_views.splitlines():
+            index, screen_name = line.split(" ", 1)
+            screen = bpy.data.screens.get(screen_name)
+            areas = screen.areas[int(index) : int(index) + 1] if screen is not None else ()
+            for area in areas:
+                if area.type == "VIEW_3D":
+                    try:
+                        session.start(area.spaces.active)
+                    except RosyError:
+                        return  # there is no graphics card any more
+
+
+def register() -> None:
+    """Add the handlers that remember live views in files. Without windows there are none."""
+    if not bpy.app.background:
+        bpy.app.handlers.save_pre.append(_save_live_views)
+        bpy.app.handlers.load_post.append(_restore_live_views)
+
+
+def unregister() -> None:
+    """Remove the handlers."""
+    for handlers, handler in (
+        (bpy.app.handlers.save_pre, _save_live_views),
+        (bpy.app.handlers.load_post, _restore_live_views),
+    ):
+        if handler in handlers:
+            handlers.remove(handler)
+    _declined_scenes.clear()

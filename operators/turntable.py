@@ -17,7 +17,7 @@ from ..rosy_addon.progress import Task
 from ..rosy_addon.projection.camera import check_size
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.read_view import read_turntable
-from ..rosy_addon.scene.video import encode_video
+from ..rosy_addon.scene.video import encode_video_task
 from ..rosy_addon.turntable import (
     check_video_path,
     has_ffmpeg,
@@ -108,7 +108,7 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         instance, lights = read_turntable(scene, depsgraph, obj, look)
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
         views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
-        encode = None if has_ffmpeg() else encode_video
+        encode = None if has_ffmpeg() else encode_video_task
         return turntable_task(renderer, views, self.pictures, path, self.rate, encode)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -15,9 +14,10 @@ from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import RosyError
 from .file_io import write_bytes
-from .image_io.gif import gif_bytes
+from .image_io.gif import gif_task
 from .image_io.png import write_png
 from .memory import check_memory
+from .processes import process_task
 from .progress import Progress, Task, subtask
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
@@ -27,9 +27,9 @@ from .render.view_input import ViewInput
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
-#: A function that encodes a video. Its arguments are the folder of pictures, their number and size,
-#: the frames per second, and the file.
-Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
+#: A task that encodes a video. Its arguments are the folder of pictures, their number and size, the
+#: frames per second, and the file.
+Encoder = Callable[[Path, int, tuple[int, int], float, Path], Task[None]]
 
 #: Bytes of memory of a pixel of a .gif: its colors until the end, and its compressed data.
 GIF_BYTES = 4.5
@@ -118,8 +118,7 @@ def turntable_task(
             yield Progress(start, label)
             picture = yield from subtask(renderer.render_task(view), start, stop, label)
             writer.add(picture.rgba)
-        yield Progress(ENCODING_START, "encoding the video")
-        writer.write()
+        yield from subtask(writer.write_task(), ENCODING_START, 1.0, "encoding the video")
     return path
 
 
@@ -139,7 +138,7 @@ class VideoWriter:
 
     def __init__(self, path: Path, fps: float, encode: Encoder | None = None) -> None:
         self._path, self._fps = path, fps
-        self._encode = _encode_with_ffmpeg if encode is None else encode
+        self._encode = _ffmpeg_task if encode is None else encode
         self._is_gif = path.suffix.lower() == ".gif"
         self._temp_folder = tempfile.TemporaryDirectory()
         self._gif_frames: list[np.ndarray] = []
@@ -184,8 +183,12 @@ class VideoWriter:
         write_png(Path(self._temp_folder.name) / f"{self._count:05d}.png", opaque)
         self._count, self._size = self._count + 1, (rgba.shape[1], rgba.shape[0])
 
-    def write(self) -> None:
+    def write_task(self) -> Task[None]:
         """Write the video.
+
+        Yields
+        ------
+        Progress
 
         Raises
         ------
@@ -193,11 +196,11 @@ class VideoWriter:
             If it cannot be encoded or written.
         """
         if self._is_gif:
-            write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
+            write_bytes(self._path, (yield from gif_task(self._gif_frames, self._fps)))
             return
         folder = Path(self._temp_folder.name)
         video_path = folder / "video.mp4"
-        self._encode(folder, self._count, self._size, self._fps, video_path)
+        yield from self._encode(folder, self._count, self._size, self._fps, video_path)
         write_bytes(self._path, video_path.read_bytes())
 
 
@@ -218,17 +221,17 @@ def check_video_path(path: Path) -> None:
         raise RosyError(f"{path}: the name of the video must end in {' or '.join(VIDEO_SUFFIXES)}")
 
 
-def _encode_with_ffmpeg(
+def _ffmpeg_task(
     folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
-) -> None:
+) -> Task[None]:
     """Encode the pictures of a folder as .mp4 with the program ffmpeg. See `Encoder`."""
     command = [
         "ffmpeg", "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
         "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
     ]  # fmt: skip
-    process = subprocess.run(command, capture_output=True, text=True, check=False)
-    if process.returncode:
-        message = (process.stderr.strip().splitlines() or ["it failed"])[-1]
+    status, output = yield from process_task(command, "encoding the video")
+    if status:
+        message = (output.strip().splitlines() or ["it failed"])[-1]
         raise RosyError(f"ffmpeg: {message}")
 
 

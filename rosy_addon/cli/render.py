@@ -129,10 +129,10 @@ def _video_encoder(path: Path) -> Encoder | None:
     if path.suffix.lower() != ".mp4" or has_ffmpeg():
         return None
     try:
-        from ..scene.video import encode_video
+        from ..scene.video import encode_video_task
     except ImportError:
         raise RosyError(f"{path}: an .mp4 needs ffmpeg or Blender; a .gif needs neither") from None
-    return encode_video
+    return encode_video_task
 
 
 def _log_views(views: Iterator[ViewInput], count: int) -> Iterator[ViewInput]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..color import map_colors, to_linear
-from ..progress import Task, run_to_completion, subtask
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .family_hues import family_hues
@@ -84,13 +84,16 @@ def compose_task(
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache)
+    yield Progress(0.0, "finding tones")
     tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
     layers = []
     degrees = np.unique(np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]).tolist()
     for layer_index, degree in enumerate(degrees):
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
+        yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
         images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
+        yield Progress(stop, "drawing the ink")
         layer = _build_layer(field, pixel_look, images)
         entries = field.gbuffer_index
         if is_hatched(look):
@@ -106,6 +109,7 @@ def compose_task(
         layers.append(layer)
     if not is_hatched(look):
         color *= tone_rgb
+    yield Progress(1.0, "drawing the ink")
     rgba = _resolve_pixels(
         gbuffer.pixel, color, alpha, camera.width, camera.height, look.supersampling
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,6 +31,9 @@ MAX_CACHED_PIXELS = 1 << 22
 
 #: Rows or columns that are blurred together. Their sums fit the caches of the processor.
 BLUR_LINES = 32
+
+#: Rows of cells that are hashed at once. Their intermediate results fit into the cache.
+BLOCK_ROWS = 32
 
 #: Sample points along each side of a pixel. Noise is averaged over their square grid.
 TAPS_PER_SIDE = 3
@@ -93,6 +96,23 @@ def image_noise(
     density: float = 0.5,
     high_pass: float = 0.0,
 ) -> np.ndarray:
+    """Make noise that is anchored to the picture, without progress; see `image_noise_task`."""
+    task = image_noise_task(
+        pixel, width, grain, seed, channels, density=density, high_pass=high_pass
+    )
+    return run_to_completion(task)
+
+
+def image_noise_task(
+    pixel: np.ndarray,
+    width: int,
+    grain: float,
+    seed: int,
+    channels: int,
+    *,
+    density: float = 0.5,
+    high_pass: float = 0.0,
+) -> Task[np.ndarray]:
     """Make noise that is anchored to the picture: random binary square cells, filtered to pixels.
 
     Parameters
@@ -121,15 +141,13 @@ def image_noise(
     # Whole tiles do not change while the visible region changes a little, so they stay cached.
     left, right = tile_bounds(int(column.min()), int(column.max()) + 1)
     bottom, top = tile_bounds(int(row[0]), int(row[-1]) + 1)
-    make = (
-        _noise_tiles
-        if (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
-        else _noise_tiles.__wrapped__
-    )
+    is_cached = (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
     tile_index = (row - bottom) * np.int32(right - left) + (column - left)
     noise = np.empty((channels, len(pixel)), dtype=np.float32)
     for channel in range(channels):
-        tiles = make(left, right, bottom, top, grain, seed, channel, density, high_pass)
+        yield Progress(channel / channels, "making noise")
+        args = left, right, bottom, top, grain, seed, channel, density, high_pass
+        tiles = _noise_tiles(*args) if is_cached else (yield from _noise_tiles_task(*args))
         tiles.take(tile_index, out=noise[channel], mode="clip")
     return np.ascontiguousarray(noise.T)
 
@@ -140,7 +158,12 @@ def tile_bounds(start: int, stop: int) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=6)
-def _noise_tiles(
+def _noise_tiles(*args: Any) -> np.ndarray:
+    """Return the result of `_noise_tiles_task`."""
+    return run_to_completion(_noise_tiles_task(*args))
+
+
+def _noise_tiles_task(
     left: int,
     right: int,
     bottom: int,
@@ -150,7 +173,7 @@ def _noise_tiles(
     channel: int,
     density: float,
     high_pass: float,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
     full_margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
     margin = min(full_margin, MAX_MARGIN)
@@ -158,7 +181,8 @@ def _noise_tiles(
     cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
     if high_pass:
         outside = "edge" if margin == full_margin else "mean"
-        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
+        blur_task = gaussian_blur_task(cells, BLUR_FACTOR * high_pass, outside)
+        cells += NOISE_MEAN - (yield from blur_task)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
@@ -179,12 +203,14 @@ def _lattice_noise(
     row = np.arange(bottom, top, dtype=np.float64)[:, None]
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((top - bottom, right - left), dtype=np.float32)
-    for y in taps:
-        for x in taps:
-            px, py = column + x, row + y
-            cell_x = np.floor(cos * px - sin * py).astype(np.int32)
-            cell_y = np.floor(sin * px + cos * py).astype(np.int32)
-            total += hash_bits_2d(cell_x, cell_y, seed, channel, density)
+    for start in range(0, len(row), BLOCK_ROWS):
+        block = slice(start, start + BLOCK_ROWS)
+        for y in taps:
+            for x in taps:
+                px, py = column + x, row[block] + y
+                cell_x = np.floor(cos * px - sin * py).astype(np.int32)
+                cell_y = np.floor(sin * px + cos * py).astype(np.int32)
+                total[block] += hash_bits_2d(cell_x, cell_y, seed, channel, density)
     scale = NOISE_STD / np.sqrt(density * (1 - density))
     return (
         np.float32(NOISE_MEAN - density * scale)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..memory import raise_mmap_threshold
-from ..progress import Task
+from ..progress import Task, run_to_completion, subtask
 from .brute_force import brute_force_task
 from .fast_lic import fast_lic_task
-from .image_noise import image_noise
+from .image_noise import image_noise_task
 from .lic_images import LicImages
 from .look import Look
 from .member_decomposition import member_decomposition_task
@@ -42,13 +42,18 @@ def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> 
     """
     raise_mmap_threshold()
     if noise is None:
-        noise = look_noise(field, look)
+        noise = yield from subtask(look_noise_task(field, look), 0.0, 0.0)
     return (yield from METHODS[look.method](field, look, noise))
 
 
 def look_noise(field: PixelField, look: Look) -> np.ndarray:
     """(P, K) float32 image-space noise of a look at the pixels of a field."""
-    return image_noise(field.pixel, field.width, **noise_args(look))
+    return run_to_completion(look_noise_task(field, look))
+
+
+def look_noise_task(field: PixelField, look: Look) -> Task[np.ndarray]:
+    """Do the same as `look_noise`, in steps."""
+    return image_noise_task(field.pixel, field.width, **noise_args(look))
 
 
 def noise_args(look: Look) -> dict[str, Any]:

@@ -2,11 +2,52 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import bpy
 
 from ..errors import RosyError
+from ..processes import process_task
+from ..progress import Task
+
+#: The folder that contains `rosy_addon`.
+ROOT = Path(__file__).resolve().parents[2]
+
+#: A program for another Blender that calls `encode_video` with arguments that are filled in.
+_ENCODING_PROGRAM = textwrap.dedent("""\
+    import importlib.util, sys
+    from pathlib import Path
+    root = {root!r}
+    spec = importlib.util.spec_from_file_location(
+        "rosy", root + "/__init__.py", submodule_search_locations=[root]
+    )
+    sys.modules["rosy"] = importlib.util.module_from_spec(spec)
+    from rosy.rosy_addon.scene.video import encode_video
+    encode_video(Path({folder!r}), {count}, {size}, {fps}, Path({path!r}))
+    """)
+
+
+def encode_video_task(
+    folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
+) -> Task[None]:
+    """Do the same as `encode_video`. In a window, another Blender does it, so that it can be stopped.
+
+    Closing the task stops it.
+    """
+    if bpy.app.background or not bpy.app.binary_path:
+        encode_video(folder, count, size, fps, path)
+        return
+    program = _ENCODING_PROGRAM.format(
+        root=str(ROOT), folder=str(folder), count=count, size=size, fps=fps, path=str(path)
+    )
+    command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
+    status, output = yield from process_task(
+        [*command, "--python-expr", program], "encoding the video"
+    )
+    if status or not path.is_file():
+        message = (output.strip().splitlines() or ["it failed"])[-1]
+        raise RosyError(f"{path}: this Blender cannot encode a video: {message}")
 
 
 def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:

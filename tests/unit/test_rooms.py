@@ -24,6 +24,7 @@ BASE_ROOMS = {
     "color",
     "settings",
     "cache",
+    "processes",
 }
 
 #: What each room may import besides itself. Modules at the top of the package are rooms, too.
@@ -32,6 +33,7 @@ MAY_IMPORT = {
     "progress": set(),
     "memory": {"errors"},
     "cache": {"progress"},
+    "processes": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
     "file_io": {"errors", "memory"},

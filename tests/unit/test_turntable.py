@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import os
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -15,7 +18,8 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
 from rosy_addon.field.generate import axis_field
-from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
+from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, gif_task, lzw_compress
+from rosy_addon.processes import process_task
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.render.cpu import CpuRenderer
@@ -111,6 +115,42 @@ def test_lights_stay_fixed_while_the_camera_orbits():
         for view in turntable_views(instance, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
     )
     assert dark < 0.05 < 0.2 < lit
+
+
+def test_the_encoder_is_stopped_with_the_task(tmp_path, monkeypatch):
+    """An .mp4 is encoded by another program: in short steps, and closing the task kills it."""
+    surface = icosphere(2)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
+    views = turntable_views(instance, QUICK, 2, (32, 32), (0.0, 0.0))
+    pid_file = tmp_path / "pid"
+
+    def encode(*_):
+        code = (
+            f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
+        )
+        yield from process_task([sys.executable, "-c", code], "encoding")
+
+    task = turntable_task(CpuRenderer(), views, 2, tmp_path / "film.mp4", 12, encode)
+    while not pid_file.exists() or not pid_file.read_text():
+        start = time.monotonic()
+        progress = next(task)
+        assert progress.label != "encoding the video" or time.monotonic() - start < 5
+    task.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid_file.read_text()), 0)
+    assert not (tmp_path / "film.mp4").exists()
+
+
+def test_a_program_that_fails(tmp_path):
+    status, output = run_to_completion(
+        process_task([sys.executable, "-c", "import sys; print('bad pixels'); sys.exit(3)"], "")
+    )
+    assert (status, output.strip()) == (3, "bad pixels")
+
+
+def test_a_gif_is_encoded_frame_by_frame():
+    frames = [np.full((4, 4, 3), value, dtype=np.uint8) for value in (0, 90, 200)]
+    assert [progress.fraction for progress in gif_task(frames, 20)] == [0, 1 / 3, 2 / 3]
 
 
 def test_an_unfinished_video_leaves_no_file(tmp_path):

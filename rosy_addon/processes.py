@@ -1,0 +1,52 @@
+"""Running another program as a task."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+
+from .progress import Progress, Task
+
+#: Seconds of one step of waiting.
+POLL_SECONDS = 0.05
+
+
+def process_task(command: Sequence[str], label: str) -> Task[tuple[int, str]]:
+    """Run a program and wait for its end. Closing the task kills it.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    label : str
+        For the progress.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    status : int
+        Exit status.
+    output : str
+        What the program printed, errors included.
+    """
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
+        )
+        try:
+            while process.poll() is None:
+                yield Progress(0.0, label)
+                try:
+                    process.wait(POLL_SECONDS)
+                except subprocess.TimeoutExpired:
+                    continue
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+        log.seek(0)
+        return process.returncode, log.read().decode(errors="replace")

@@ -1,6 +1,6 @@
 """The operators of the extension, one verb in each file.
 
-`modal_task`, `poll` and `preset_shared` are helpers that operators share.
+`modal_task`, `poll`, `preset_shared` and `reports` are helpers that operators share.
 """
 
 from __future__ import annotations

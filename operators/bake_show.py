@@ -7,6 +7,7 @@ import bpy
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.pictures import show_bake
 from .poll import poll_idle
+from .reports import report_error
 
 
 class ROSY_OT_show(bpy.types.Operator):
@@ -26,8 +27,7 @@ class ROSY_OT_show(bpy.types.Operator):
         try:
             show_bake(context.scene, self.camera)
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         return {"FINISHED"}
 
 

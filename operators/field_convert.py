@@ -8,7 +8,7 @@ from math import pi
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, RosyError, counted, error_text
+from ..rosy_addon.errors import REPORTED_ERRORS, RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
@@ -20,6 +20,17 @@ from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
+from .reports import report_error
+
+#: Items of the new degree; the number of each item is the degree. Not inside the annotation: up to
+#: Python 3.11, a comprehension there cannot see module names.
+DEGREE_ITEMS = [
+    ("KEEP", "Keep", "Keep the degree", 0),
+    *(
+        (f"DEGREE_{degree}", str(degree), f"{counted(degree, 'direction')} at each point", degree)
+        for degree in range(1, MAX_DEGREE + 1)
+    ),
+]
 
 
 class _FieldOperator:
@@ -46,6 +57,14 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         min=0,
         max=MAX_DEGREE,
         default=0,
+    )
+    new_degree: bpy.props.EnumProperty(
+        name="Degree",
+        description="New degree, a multiple or a divisor of the present one",
+        items=DEGREE_ITEMS,
+        get=lambda self: self.degree,
+        set=lambda self, value: setattr(self, "degree", value),
+        options={"SKIP_SAVE"},
     )
     angle: bpy.props.FloatProperty(
         name="Rotate",
@@ -105,13 +124,13 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         return len(converted)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Converted the fields of {counted(result, 'mesh', 'meshes')}")
+        self.report({"INFO"}, f"Converted {counted(result, 'field')}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in ("degree", "angle", "smooth", "magnitude"):
+        for name in ("new_degree", "angle", "smooth", "magnitude"):
             layout.prop(self, name)
         if self.magnitude == "values":
             layout.prop(self, "values")
@@ -125,7 +144,9 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     form: bpy.props.EnumProperty(
-        name="As", items=[(form, name, text) for form, (name, text) in STORAGE_FORMS.items()]
+        name="Store As",
+        description="Form in which the field is stored",
+        items=[(form, name, text) for form, (name, text) in STORAGE_FORMS.items()],
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
@@ -137,11 +158,10 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
             fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
             assign_fields(fields, self.attribute, self.form)
         except REPORTED_ERRORS as error:
-            self.report({"ERROR"}, error_text(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.report(
             {"INFO"},
-            f"Stored the fields of {counted(len(fields), 'mesh', 'meshes')}: {STORAGE_FORMS[self.form][1]}",
+            f"Stored {counted(len(fields), 'field')} as {STORAGE_FORMS[self.form][0]}",
         )
         return {"FINISHED"}
 

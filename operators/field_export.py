@@ -12,6 +12,7 @@ from ..rosy_addon.field.field_io import write_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
+from .reports import report_error
 
 #: File formats by suffix: label and description in the user interface.
 FIELD_FORMATS = {
@@ -57,8 +58,7 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
             field = read_mesh_field(obj.data, surface=surface)
             write_field(path, field, surface)
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.report({"INFO"}, f"Wrote {path}")
         return {"FINISHED"}
 

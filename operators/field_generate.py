@@ -25,6 +25,7 @@ from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
 from ..rosy_addon.ui.generator_settings import generator_setting_names
 from .modal_task import ModalTaskMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
+from .reports import report_warning
 
 #: Labels of generators that are not the capitalized key.
 KIND_LABELS = {"uv": "UV Map"}
@@ -150,7 +151,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         fields = {}
         for index, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
             if note := orientation_warning(surface):
-                self.report({"WARNING"}, note)
+                report_warning(self, note)
             task = generate_task(surface, settings_per_mesh[index], self.degree)
             fields[mesh] = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
         yield Progress(1.0, "counting singularities")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.errors import REPORTED_ERRORS, counted, error_text
+from ..rosy_addon.errors import REPORTED_ERRORS, counted
 from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
 from .poll import poll_editable, selected_mesh_objects, store_fields
+from .reports import report_error, report_warning
 
 
 class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
@@ -31,18 +32,18 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
         default=0,
     )
     mesh_file: bpy.props.StringProperty(
-        name="Its Mesh",
+        name="Mesh File",
         description="Mesh file that the field was made for, if its faces differ from those of this "
         "mesh. The field is transferred by position. If the numbers of faces differ, a mesh file "
         "of the same name in the same folder is used by default",
         subtype="FILE_PATH",
     )
     undefined: bpy.props.EnumProperty(
-        name="Not Finite",
+        name="Bad Vectors",
         description="Treatment of vectors that are NaN or infinite",
         items=[
             ("error", "Refuse", "Report the first one, and import nothing"),
-            ("zero", "Leave Out", "Treat the field as undefined on those faces"),
+            ("zero", "Skip", "Treat the field as undefined on those faces"),
         ],
         default="error",
     )
@@ -61,24 +62,23 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
         return self.invoke_popup(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        mesh = selected_mesh_objects(context)[0].data
+        obj = selected_mesh_objects(context)[0]
         try:
             field, note = load_field(
                 bpy.path.abspath(self.filepath),
-                mesh_surface(mesh),
+                mesh_surface(obj.data),
                 self.degree or None,
                 self.undefined,
                 mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
             )
-            store_fields(self, context, {mesh: field}, self.attribute)
+            store_fields(self, context, {obj.data: field}, self.attribute)
         except REPORTED_ERRORS as error:
-            self.report({"ERROR"}, error_text(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         if note:
-            self.report({"WARNING"}, note)
+            report_warning(self, note)
         self.report(
             {"INFO"},
-            f"Read a field of degree {field.degree} on {counted(len(field.vectors), 'face')} of '{mesh.name}'",
+            f"Read a field of degree {field.degree} on {counted(len(field.vectors), 'face')} of '{obj.name}'",
         )
         return {"FINISHED"}
 

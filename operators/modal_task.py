@@ -12,10 +12,11 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, error_text
+from ..rosy_addon.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.progress import Progress, Task, run_to_completion
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.viewport.view3d import redraw_sidebars
+from .reports import report_error
 
 #: Seconds of work in each slice. Events of the user are handled between slices.
 SLICE_SECONDS = 0.05
@@ -143,9 +144,8 @@ class Job:
         if context.workspace is not None:
             if context.workspace not in self.workspaces:
                 self.workspaces.append(context.workspace)
-            context.workspace.status_text_set(
-                f"RoSy: {progress.label}, {percent} %     ESC: cancel"
-            )
+            label = as_sentence(progress.label)
+            context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
         redraw_sidebars()
 
     def stop(self, reason: str) -> None:
@@ -205,8 +205,7 @@ class ModalTaskMixin:
         try:
             result = run_to_completion(self.make_task(context))
         except REPORTED_ERRORS as error:
-            self.report({"ERROR"}, error_text(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.finish(context, result)
         return {"FINISHED"}
 
@@ -216,8 +215,7 @@ class ModalTaskMixin:
         try:
             self._job = Job(context, self.make_task(context), self.required_data(context))
         except REPORTED_ERRORS as error:
-            self.report({"ERROR"}, error_text(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -231,8 +229,7 @@ class ModalTaskMixin:
                     self.finish(context, job.result)
                     return {"FINISHED"}
             except REPORTED_ERRORS as error:
-                self.report({"ERROR"}, error_text(error))
-                return {"CANCELLED"}
+                return report_error(self, error)
         if job.stop_reason is not None:
             self.report({"INFO"}, f"RoSy stopped, {self.cancel_note}: {job.stop_reason}")
             return {"CANCELLED"}

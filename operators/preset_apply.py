@@ -6,10 +6,11 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.errors import RosyError, as_sentence
 from ..rosy_addon.presets.store import load_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
+from .reports import report_error
 
 
 class ROSY_OT_preset_apply(bpy.types.Operator):
@@ -32,14 +33,13 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
         try:
             return load_preset(properties.preset, user_presets_folder()).description
         except RosyError as error:
-            return str(error)
+            return as_sentence(str(error))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
             preset_library.apply_preset(context.scene.rosy, self.preset)
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         return {"FINISHED"}
 
 

@@ -12,6 +12,7 @@ from ..rosy_addon.presets.store import load_preset, write_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from .preset_shared import PRESET_ARGUMENTS, target_preset
+from .reports import report_error
 
 
 class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
@@ -36,8 +37,7 @@ class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
         try:
             write_preset(path, load_preset(target_preset(self, context), user_presets_folder()))
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.report({"INFO"}, f"Wrote {path}")
         return {"FINISHED"}
 

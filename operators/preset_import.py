@@ -8,6 +8,7 @@ from bpy_extras.io_utils import ImportHelper
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.presets.store import read_preset, save_preset
 from ..rosy_addon.scene.paths import user_presets_folder
+from .reports import report_error
 
 
 class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
@@ -30,8 +31,7 @@ class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
             preset = read_preset(bpy.path.abspath(self.filepath))
             save_preset(preset, user_presets_folder(), replace=self.replace)
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
         return {"FINISHED"}
 

@@ -9,6 +9,7 @@ from ..rosy_addon.presets.store import remove_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from .preset_shared import PRESET_ARGUMENTS, poll_user_presets, target_preset
+from .reports import report_error
 
 
 class ROSY_OT_preset_remove(bpy.types.Operator):
@@ -44,8 +45,7 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
         try:
             remove_preset(key, user_presets_folder())
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         self.report({"INFO"}, f"Deleted preset '{key}'")
         return {"FINISHED"}
 

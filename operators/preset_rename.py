@@ -15,6 +15,7 @@ from .preset_shared import (
     poll_user_presets,
     target_preset,
 )
+from .reports import report_error
 
 
 class ROSY_OT_preset_rename(bpy.types.Operator):
@@ -50,8 +51,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
         try:
             new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         preset_library.rename_references(old, new)
         self.report({"INFO"}, f"Renamed preset '{old}' to '{name}'")
         return {"FINISHED"}

@@ -12,6 +12,7 @@ from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from .preset_shared import DESCRIPTION_ARGUMENTS, draw_name_and_description
+from .reports import report_error
 
 
 class ROSY_OT_preset_save(bpy.types.Operator):
@@ -50,8 +51,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
         try:
             key = save_preset(preset, user_presets_folder(), replace=self.replace)
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         settings.preset_name = key
         self.report({"INFO"}, f"Saved preset '{preset.name}'")
         return {"FINISHED"}

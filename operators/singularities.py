@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, counted, error_text
+from ..rosy_addon.errors import REPORTED_ERRORS, counted
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (
     add_singularity_points,
@@ -13,6 +13,7 @@ from ..rosy_addon.scene.singularity_points import (
 )
 from ..rosy_addon.ui import overlay
 from .poll import poll_active_field, poll_idle, selected_mesh_objects
+from .reports import report_error
 
 
 class ROSY_OT_singularities(bpy.types.Operator):
@@ -45,8 +46,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
         try:
             singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
         except REPORTED_ERRORS as error:
-            self.report({"ERROR"}, error_text(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         _hide(context, objects)
         for obj, singularities in singularities_by_object.items():
             if self.show in ("OVERLAY", "BOTH"):

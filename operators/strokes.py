@@ -16,6 +16,7 @@ from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from .bake import view_camera
 from .modal_task import ModalTaskMixin
 from .poll import poll_has_field, poll_idle
+from .reports import report_warning
 
 
 class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
@@ -66,7 +67,7 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
             f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
         )
         for note in result.notes:
-            self.report({"WARNING"}, note)
+            report_warning(self, note)
 
     def _camera(self, context: bpy.types.Context) -> CameraSource | None:
         """Return the camera of the current view if it is chosen; None for the scene's camera."""

@@ -7,6 +7,7 @@ import bpy
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.ui import live_views
 from ..rosy_addon.viewport import session
+from .reports import report_error
 
 
 class ROSY_OT_viewport(bpy.types.Operator):
@@ -55,8 +56,7 @@ class ROSY_OT_viewport(bpy.types.Operator):
         try:
             session.start(space, self.device.lower())
         except RosyError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return report_error(self, error)
         return {"FINISHED"}
 
 

@@ -6,6 +6,11 @@ import re
 #: change the direction of text. Names in files may contain them.
 UNSAFE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
+#: Names in messages, and a word of the language at the beginning of a message: no name of a file, a
+#: setting or an attribute.
+QUOTED = re.compile("'[^']*'")
+FIRST_WORD = re.compile(r"[a-z-]+(?![\w.])")
+
 
 def escape_unsafe(text: str) -> str:
     """Return a text with escapes, such as ``\\x1b``, for `UNSAFE` characters."""
@@ -41,6 +46,24 @@ def counted(count: int, singular: str, plural: str = "") -> str:
     ('1 face', '2,000 faces', '0 vertices')
     """
     return f"{count:,} {singular if count == 1 else plural or singular + 's'}"
+
+
+def as_sentence(message: str) -> str:
+    """Return a message as the interface shows it: with a capital.
+
+    Messages begin with a small letter, as they follow ``rosy: error:`` on the command line. A path
+    or a name at the beginning stays as it is.
+
+    Examples
+    --------
+    >>> as_sentence("no visible object has a field"), as_sentence("fields/a.rosy: is damaged")
+    ('No visible object has a field', 'fields/a.rosy: is damaged')
+    """
+    head = QUOTED.sub("", message).partition(":")[0]
+    is_path = "/" in head or "\\" in head
+    if is_path or not FIRST_WORD.match(message):
+        return message
+    return message[0].upper() + message[1:]
 
 
 #: The errors that end a command or an operator with a message of one line; see `error_text`.

@@ -145,9 +145,12 @@ class Choice(Setting):
     ----------
     options : mapping of str to str
         Help texts of the options by their stored keys.
+    option_labels : mapping of str to str
+        Names in the interface of the options that are not named after their keys.
     """
 
     options: Mapping[str, str] = field(default_factory=dict)
+    option_labels: Mapping[str, str] = field(default_factory=dict)
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not one of the options."""
@@ -255,9 +258,9 @@ def stage_key(settings: Any, stage: Stage) -> tuple[Any, ...]:
 
 def panel_settings(cls: type, panel: str) -> tuple[str, ...]:
     """Return the names of the settings that a panel shows, from top to bottom."""
-    names: list[str] = []
-    for name, setting in settings_of(cls).items():
-        if setting.panel == panel:
-            before = setting.panel_before
-            names.insert(names.index(before) if before else len(names), name)
+    shown = {name: item for name, item in settings_of(cls).items() if item.panel == panel}
+    names = [name for name, setting in shown.items() if not setting.panel_before]
+    for name, setting in shown.items():
+        if setting.panel_before:
+            names.insert(names.index(setting.panel_before), name)
     return tuple(names)

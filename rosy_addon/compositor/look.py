@@ -134,13 +134,15 @@ class Look:
     taper: bool = switch(
         False,
         "Fade streaks toward their ends. Lines end in points and change less when the view zooms",
+        panel="streaks",
     )
     step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
     grain: float = number(
         1.5,
         0.5,
         256.0,
-        "Size of a noise cell in pixels",
+        "Width of the lines in pixels: the size of a cell of the noise",
+        label="Line Width",
         is_pixel_length=True,
         preview_low=0.75,
         panel="streaks",
@@ -190,6 +192,7 @@ class Look:
             "tensors, or dir0, dir1 and so on, if each is the same line on the whole mesh. In "
             "hatching, lines of other fields get inks by their distance to the guiding angle",
         },
+        option_labels={"one": "Single"},
         panel="colour",
         stage=Stage.SHADING,
     )
@@ -210,6 +213,8 @@ class Look:
         3.1416,
         "Angle in the picture to which the first member is nearest",
         unit="angle",
+        panel="ink",
+        panel_before="layers",
     )
     foreshorten: bool = switch(
         False,
@@ -235,6 +240,8 @@ class Look:
             "length": "The length of the streaks",
             "both": "Color and length",
         },
+        label="Magnitude Drives",
+        option_labels={"none": "Nothing"},
         panel="colour",
     )
     magnitude_range: float = number(
@@ -274,7 +281,9 @@ class Look:
             "lamp": "A lamp above and to the left of the camera",
             "scene": "The lights of the scene",
         },
+        label="Light Source",
         panel="light",
+        panel_label="Source",
         stage=Stage.SHADING,
         applies=_is_lit,
     )
@@ -294,14 +303,16 @@ class Look:
             "image": "An image on the mesh, through its UV map",
             "picture": "A picture of the scene through its camera, such as a render",
         },
+        label="Tone Source",
         panel="tone",
+        panel_label="Source",
         stage=Stage.SHADING,
     )
     tone_lit: bool = switch(
         False,
         "Multiply the tone by the light",
+        label="Multiply by Light",
         panel="tone",
-        panel_label="Light Falls on It",
         stage=Stage.SHADING,
         applies=lambda look: look.tone != "light",
     )
@@ -339,20 +350,22 @@ class Look:
             "soft": "Lighter and darker streaks around the mean, on the shaded surface",
             "hatch": "Lines of ink on paper, whose number and width follow the tone",
         },
+        label="Ink Style",
         panel="ink",
+        panel_label="Style",
         stage=Stage.SHADING,
     )
     ink_colour: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
     ink_ramp: bool = switch(
         False,
-        "Blend the ink to a second color from the shadows to the lights",
-        panel_label="Second Color",
+        "Blend the ink to a second color, the highlight color, from the shadows to the lights",
+        label="Second Color",
         **_ink(_uses_ink_color),
     )
     ink_colour_light: str = color(
         "#b06a3c",
         "Color of the ink in the lights",
-        panel_label="In the Lights",
+        label="Highlight Color",
         **_ink(_uses_ink_ramp),
     )
     ink_middle: float = number(
@@ -360,13 +373,13 @@ class Look:
         0.0,
         0.99,
         "Tone at which the ink has a third color, between the shadows and the lights. 0: none",
-        panel_label="Third at Tone",
+        label="Midtone Position",
         **_ink(_uses_ink_ramp),
     )
     ink_colour_middle: str = color(
         "#6f2d4f",
-        "Third color of the ink",
-        panel_label="Third Color",
+        "Color of the ink at the midtone position",
+        label="Midtone Color",
         **_ink(lambda look: _uses_ink_ramp(look) and look.ink_middle > 0),
     )
     paper_colour: str = color("#ffffff", "Color of the paper", **_ink())

@@ -171,7 +171,7 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
         )
     if raw.domain is None and infer_domain(surface, row_count) is None:
         raise RosyError(
-            f"{source}: contains {counted(row_count, 'row')}, but the mesh {surface.name} has "
+            f"{source}: contains {counted(row_count, 'row')}, but {surface.name} has "
             f"{counted(surface.face_count, 'face')} and "
             f"{counted(len(surface.vertices), 'vertex', 'vertices')}"
         )

@@ -368,8 +368,9 @@ def orientation_warning(surface: Surface) -> str:
     if not count:
         return ""
     return (
-        f"{surface.name}: the faces at {count} edges are oriented inconsistently, so the field is cut "
-        "there: recalculate the normals (not possible for one-sided surfaces such as a Möbius strip)"
+        f"{surface.name}: the faces at {counted(count, 'edge')} are oriented inconsistently, so the "
+        "field is cut there: recalculate the normals (not possible for one-sided surfaces such as "
+        "a Möbius strip)"
     )
 
 

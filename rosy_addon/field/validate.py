@@ -100,7 +100,7 @@ def validated_field(
     if len(vectors) != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
             f"{source}: contains {counted(len(vectors), 'vector')}, "
-            f"but the mesh {surface.name} has {counted(faces, 'face')} and "
+            f"but {surface.name} has {counted(faces, 'face')} and "
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)

@@ -148,9 +148,9 @@ def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Pat
     files = preset_files(user_folder)
     if str(preset) in files:
         return files[str(preset)]
-    for path in files.values():
+    for key, path in files.items():
         with suppress(RosyError):
-            if preset_key(read_preset(path).name) == preset_key(str(preset)):
+            if preset_key(str(preset)) in (key, preset_key(read_preset(path).name)):
                 return path
     user_preset_files(user_folder)  # If it cannot be read, this is the reason.
     raise RosyError(f"there is no preset '{preset}': choose {', '.join(files)}")

@@ -10,7 +10,7 @@ from ..errors import RosyError
 from ..field.surface import mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
-from .meshes import mesh_surface
+from .meshes import mesh_label, mesh_surface
 
 
 def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
@@ -27,7 +27,7 @@ def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     RosyError
         If the attribute is of another type, or a value is not finite.
     """
-    source = f"mesh '{mesh.name}', attribute '{name}'"
+    source = f"{mesh_label(mesh)}, attribute '{name}'"
     attribute = mesh.attributes[name]
     values = field_values(attribute, source, mesh).astype(np.float64)
     if values.ndim == 1:
@@ -58,7 +58,7 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         attribute is not supported, or a value is not finite.
     """
     surface = mesh_surface(mesh)
-    source = f"mesh '{mesh.name}', '{name}'"
+    source = f"{mesh_label(mesh)}, '{name}'"
     attribute = mesh.attributes.get(name)
     if attribute is not None:
         domain, values = attribute.domain, scalar_values(attribute, source)

@@ -11,7 +11,7 @@ from mathutils.geometry import interpolate_bezier
 from ..errors import RosyError
 from .face_values import read_face_vectors
 from .libraries import check_not_missing
-from .meshes import read_attribute
+from .meshes import mesh_label, read_attribute
 
 #: Object types that can guide a field: those with strokes, and all.
 STROKE_TYPES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
@@ -95,13 +95,13 @@ def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     if layer is None:
         if not mesh.uv_layers:
-            raise RosyError(f"mesh '{mesh.name}' has no UV map: add one")
+            raise RosyError(f"{mesh_label(mesh)} has no UV map: add one")
         available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
-        raise RosyError(f"mesh '{mesh.name}' has no UV map '{name}', only {available}")
+        raise RosyError(f"{mesh_label(mesh)} has no UV map '{name}', only {available}")
     values = read_attribute(mesh, layer.name, np.float32, 2)
     if values is None:
         raise RosyError(
-            f"mesh '{mesh.name}': UV map '{layer.name}' cannot be read in edit mode: leave edit mode "
+            f"{mesh_label(mesh)}: UV map '{layer.name}' cannot be read in edit mode: leave edit mode "
             "(Tab) first"
         )
     return values
@@ -121,7 +121,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     """
     if not name or name not in mesh.attributes:
         raise RosyError(
-            f"mesh '{mesh.name}' has no attribute '{name}' to follow: choose a vector attribute"
+            f"{mesh_label(mesh)} has no attribute '{name}' to follow: choose a vector attribute"
         )
     return read_face_vectors(mesh, name)
 

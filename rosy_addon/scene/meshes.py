@@ -26,6 +26,14 @@ EDGE_SELECTION_ATTRIBUTE = ".select_edge"
 REST_ATTRIBUTE = "rest_position"
 
 
+def mesh_label(mesh: bpy.types.Mesh) -> str:
+    """Return a mesh in messages: an object that has it, a selected one if there is one."""
+    users = [obj for obj in bpy.data.objects if obj.data == mesh]
+    if not users:
+        return f"mesh '{mesh.name}'"
+    return f"object '{next((obj for obj in users if obj.select_get()), users[0]).name}'"
+
+
 def mesh_surface(
     mesh: bpy.types.Mesh,
     name: str | None = None,
@@ -41,7 +49,7 @@ def mesh_surface(
     mesh : bpy.types.Mesh
         Original or evaluated. In edit mode, the current state of editing is read.
     name : str, optional
-        Name for messages. By default the name of the mesh.
+        Name for messages. By default `mesh_label`.
     read_rest : bool
         Read the undeformed positions from the attribute `REST_ATTRIBUTE`, if it exists.
     occluder_only : bool
@@ -55,7 +63,7 @@ def mesh_surface(
         If the mesh has no faces (it is empty, or has only points and loose edges), or a coordinate
         is not finite.
     """
-    name = mesh.name if name is None else name
+    name = mesh_label(mesh) if name is None else name
     flush_edit_mode(mesh)
     face_count = len(mesh.polygons)
     if not face_count:
@@ -151,7 +159,9 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
     property_name, label, _ = EDGE_MARKS[mark]
     is_marked = _edge_flags(mesh, property_name)
     if not is_marked.any():
-        raise RosyError(f"mesh '{mesh.name}' has no such edges: {label}")
+        raise RosyError(
+            f"{mesh_label(mesh)} has no edges of this kind ({label}): mark some, or choose another kind"
+        )
     return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[
         is_marked
     ]

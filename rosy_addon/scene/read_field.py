@@ -28,7 +28,7 @@ from .field_attributes import (
     field_values,
     is_face_vector_field,
 )
-from .meshes import flush_edit_mode, mesh_surface
+from .meshes import flush_edit_mode, mesh_label, mesh_surface
 from .rest_shape import follow_mesh
 
 #: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
@@ -61,7 +61,7 @@ def read_mesh_field(
     nonfinite : {"error", "zero"}
         Raise an error if a value is not finite, or treat it as undefined.
     label : str, optional
-        Name of the mesh in messages.
+        Name in messages. By default `mesh_label`.
     cache : Cache, optional
         Keeps surfaces and fields that have not changed since an earlier call.
 
@@ -75,7 +75,7 @@ def read_mesh_field(
     --------
     write_mesh_field : The inverse.
     """
-    label = f"mesh '{mesh.name}'" if label is None else label
+    label = mesh_label(mesh) if label is None else label
     flush_edit_mode(mesh)
     surface = mesh_surface(mesh, label, cache=cache) if surface is None else surface
     field_name = name or attribute_name(mesh)

@@ -288,8 +288,9 @@ class SceneCache:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
+            label = f"object '{obj.name}'"
             return _MeshState(
-                mesh_surface(mesh, obj.name, occluder_only=True, cache=self._cache), None
+                mesh_surface(mesh, label, occluder_only=True, cache=self._cache), None
             )
 
     def _read_evaluated(

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..compositor.look import Look
+from ..errors import as_sentence
 from ..settings import panel_settings, settings_of
 from . import preset_library
 from .sidebar import SidebarPanel, use_property_columns
@@ -49,16 +50,12 @@ TONE_SOURCE_OF_SETTING = {
 #: Properties that hold a name in a collection of the active mesh, with that collection.
 SEARCH_COLLECTIONS = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
 
-#: Labels of the scene's properties that are too long for the sidebar.
-SHORT_LABELS = {"undefined": "Skip Bad Vectors"}
-
 
 class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
     """How fields are drawn."""
 
     bl_label = "Look"
     bl_parent_id = "VIEW3D_PT_rosy"
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = context.scene.rosy
@@ -92,7 +89,7 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
         entry = preset_library.active_entry(settings)
         row = layout.row()
         row.enabled = entry is not None and preset_library.is_changed(settings)
-        button = row.operator("rosy.preset_apply", text="Revert to Preset", icon="LOOP_BACK")
+        button = row.operator("rosy.preset_apply", text="Reset to Preset", icon="LOOP_BACK")
         button.preset = settings.preset_name
         layout.separator()
         layout.operator("rosy.preset_save", text="Save Look as Preset...", icon="ADD")
@@ -111,7 +108,7 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
         export = row.operator("rosy.preset_export", text="Export...", icon="EXPORT")
         export.preset = settings.preset_name
         for error in preset_library.load_errors():
-            layout.label(text=error, icon="ERROR")
+            layout.label(text=as_sentence(error), icon="ERROR")
 
 
 def _wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
@@ -138,9 +135,7 @@ def _make_settings_panel(
             if name == "tone":
                 _draw_tone_source(column, context)
         for name in names:
-            row = column.row()
-            row.active = name != "directory" or settings.store == "SAVED"
-            row.prop(settings, name, text=SHORT_LABELS.get(name))
+            column.prop(settings, name)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 

@@ -53,22 +53,19 @@ def _draw_existing_field(
 ) -> None:
     mesh = obj.data
     box = layout.box().column(align=True)
-    box.label(text=obj.name, icon="OUTLINER_OB_MESH")
-    box.label(text=f"Degree {mesh.rosy.degree} on {counted(len(mesh.polygons), 'face')}")
+    row = box.row()
+    row.label(text=obj.name, icon="OUTLINER_OB_MESH")
+    row.prop(obj.rosy, "include", text="Draw")
     has_attribute = mesh.rosy.attribute in mesh.attributes
-    box.label(
-        text=f"Attribute '{mesh.rosy.attribute}'" if has_attribute else "Attributes dir0, dir1 ..."
-    )
-    box.prop(obj.rosy, "include")
+    name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0, dir1 ..."
+    faces = counted(len(mesh.polygons), "face")
+    box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
     row.operator("rosy.field_import", text="Import", icon="IMPORT")
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
     is_shown = overlay.is_shown(obj.name)
     button = layout.operator(
-        "rosy.singularities",
-        text="Hide Singularities" if is_shown else "Show Singularities",
-        icon="OVERLAY",
-        depress=is_shown,
+        "rosy.singularities", text="Singularities", icon="OVERLAY", depress=is_shown
     )
     button.show = "NONE" if is_shown else "OVERLAY"
     header, body = layout.panel("rosy_convert_field", default_closed=True)
@@ -76,7 +73,7 @@ def _draw_existing_field(
     if body is not None:
         _draw_convert_settings(body, context)
     header, body = layout.panel("rosy_another_field", default_closed=True)
-    header.label(text="Another Field")
+    header.label(text="Make Another Field")
     if body is not None:
         _draw_generator_settings(body, context)
 
@@ -85,7 +82,7 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     """Draw the settings and the button of the conversion, and the menu of storage formats."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
     column = layout.column()
-    for name in ("degree", "angle", "smooth", "magnitude"):
+    for name in ("new_degree", "angle", "smooth", "magnitude"):
         column.prop(settings, name)
     if settings.magnitude == "values":
         column.prop(settings, "values")
@@ -131,7 +128,7 @@ def _draw_picture_section(
             layout.label(text=f"Draws {len(objects)} objects")
     row = layout.row()
     row.scale_y = 1.5
-    row.operator("rosy.bake", text="Bake Again" if bake_infos else "Bake", icon="RENDER_STILL")
+    row.operator("rosy.bake", text=_bake_label(bake_infos), icon="RENDER_STILL")
     row = layout.row(align=True)
     row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
     row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
@@ -141,8 +138,14 @@ def _draw_picture_section(
         layout.operator("rosy.remove", icon="TRASH")
     if bake_infos:
         _draw_view_hints(layout, context, bake_infos)
-    if objects:
         _draw_view_transform_warning(layout, context.scene)
+
+
+def _bake_label(bake_infos: list[BakeInfo]) -> str:
+    """Return the label of the button that bakes a single picture."""
+    if any(bake.frame_range and bake.is_shown for bake in bake_infos):
+        return "Bake Still"
+    return "Bake Again" if bake_infos else "Bake"
 
 
 def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -42,7 +42,7 @@ STROKE_KIND_ITEMS = [
     ("SVG", "SVG File", "SVG file with a layer for each family, for other programs and plotters"),
 ]
 INK_ITEMS = [
-    ("ONE", "One", "One ink for all strokes"),
+    ("ONE", "Single", "One ink for all strokes"),
     ("FAMILIES", "By Family", "One ink for each family of strokes"),
 ]
 #: Viewpoints of strokes. Only one drawing is made at a time, so there is no item for all cameras.
@@ -57,7 +57,7 @@ COLOR_ARGUMENTS = {
     "default": (0.0, 0.0, 0.0),
 }
 IMAGE_FORMAT_ITEMS = [
-    ("BYTE", "8 Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
+    ("BYTE", "8-Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
     ("FLOAT", "Float", "Linear values in an .exr file"),
 ]
 
@@ -70,8 +70,8 @@ def _setting_property(setting: Setting) -> Any:
         "default": setting.default,
     }
     match setting:
-        case Choice(options=options):
-            items = [(option, title(option), text) for option, text in options.items()]
+        case Choice(options=options, option_labels=labels):
+            items = [(key, labels.get(key, title(key)), text) for key, text in options.items()]
             return bpy.props.EnumProperty(items=items, **arguments)
         case Color():
             arguments["default"] = from_hex(setting.default).tolist()
@@ -275,7 +275,7 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Device", description="Device that draws the picture", items=DEVICE_ITEMS
     )
     undefined: bpy.props.BoolProperty(
-        name="Leave Out Bad Vectors",
+        name="Skip Bad Vectors",
         description="Treat vectors that are not finite as undefined, instead of reporting an error",
     )
     tone_attribute: bpy.props.StringProperty(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import bpy
 
+from ..errors import as_sentence
 from . import job_status
 
 #: Mean width of a character, and width of the icon and margins of a row, at a user interface scale
@@ -45,5 +46,6 @@ def draw_wrapped(
 
 def draw_progress(layout: bpy.types.UILayout) -> None:
     """Draw the progress of the running task."""
-    layout.progress(factor=job_status.current.fraction, text=job_status.current.label.capitalize())
+    progress = job_status.current
+    layout.progress(factor=progress.fraction, text=as_sentence(progress.label))
     layout.label(text="Press ESC to cancel")

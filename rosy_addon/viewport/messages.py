@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import blf
 import bpy
 
+from ..errors import as_sentence
+
 #: RGBA, display values.
 _COLOR = 1.0, 0.6, 0.2, 1.0
 
@@ -34,7 +36,7 @@ def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
     rows = [
         row
         for message in messages
-        for row in reversed(textwrap.wrap(f"RoSy: {message}", max_characters))
+        for row in reversed(textwrap.wrap(f"RoSy: {as_sentence(message)}", max_characters))
     ]
     for index, row in enumerate(rows):
         blf.position(0, _LEFT * ui_scale, (_BOTTOM + _LINE_HEIGHT * index) * ui_scale, 0)

@@ -133,7 +133,7 @@ def test_no_faces(scene, camera, vertices, edges, reason):
     obj = add_mesh("Bare", vertices, [], edges)
     obj.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
     assert_refused("object 'Bare'", "no faces", reason)
-    with pytest.raises(RosyError, match="Bare: the mesh has no faces"):
+    with pytest.raises(RosyError, match="object 'Bare': the mesh has no faces"):
         mesh_surface(obj.data)
 
 

@@ -466,7 +466,7 @@ def test_marked_edges(scene, mark):
     mesh = bpy.context.object.data
     for edge in mesh.edges:
         edge.select = edge.use_edge_sharp = edge.use_seam = False
-    with pytest.raises(RosyError, match="has no such edges"):
+    with pytest.raises(RosyError, match="has no edges of this kind"):
         marked_edges(mesh, mark)
     for index in (3, 7):
         setattr(mesh.edges[index], EDGE_MARKS[mark][0], True)
@@ -494,7 +494,7 @@ def test_selected_edges_of_a_mesh_made_by_a_script(scene, repeated):
         faces = [tuple(face.vertices) for face in mesh.polygons]
         mesh = add_mesh("Repeated", vertices, faces, edges * 2).data
         assert len(mesh.edges) == count
-        with pytest.raises(RosyError, match="has no such edges"):
+        with pytest.raises(RosyError, match="has no edges of this kind"):
             marked_edges(mesh, "SELECTED")
     else:
         assert len(marked_edges(mesh, "SELECTED")) == count

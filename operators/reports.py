@@ -1,0 +1,18 @@
+"""Reports of operators: errors and warnings as sentences."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon.errors import as_sentence, error_text
+
+
+def report_error(operator: bpy.types.Operator, error: Exception) -> set[str]:
+    """Report one of `REPORTED_ERRORS`. Return the result of an operator that has failed."""
+    operator.report({"ERROR"}, as_sentence(error_text(error)))
+    return {"CANCELLED"}
+
+
+def report_warning(operator: bpy.types.Operator, message: str) -> None:
+    """Report what the user should know about a result."""
+    operator.report({"WARNING"}, as_sentence(message))

@@ -76,7 +76,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     )
     smooth: bpy.props.FloatProperty(
         name="Smooth",
-        description="Diffuse the field over this fraction of the size of the mesh",
+        description="Smooth the field over this fraction of the size of the mesh",
         min=0.0,
         max=10.0,
         soft_max=0.2,

@@ -20,7 +20,7 @@ FIELD_FORMATS = {
     ".rawfield": ("Raw Field", "One row per face with all directions, for Directional"),
     ".txt": ("Text", "One row per face with all directions, without a header"),
     ".npy": ("NumPy", "An array with one row per face with all directions"),
-    ".obj": ("fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
+    ".obj": ("Fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
     ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
 
@@ -38,6 +38,7 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
     )
     file_format: bpy.props.EnumProperty(
         name="Format",
+        description="Format of the file",
         items=[(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
         default=".rosy",
     )

@@ -28,9 +28,7 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
         return poll_user_presets(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        key = target_preset(self, context)
-        entry = preset_library.entries().get(key)
-        name = key if entry is None else entry.preset.name
+        name = preset_library.preset_name(target_preset(self, context))
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -42,11 +40,12 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         key = target_preset(self, context)
+        name = preset_library.preset_name(key)
         try:
             remove_preset(key, user_presets_folder())
         except RosyError as error:
             return report_error(self, error)
-        self.report({"INFO"}, f"Deleted preset '{key}'")
+        self.report({"INFO"}, f"Deleted preset '{name}'")
         return {"FINISHED"}
 
 

@@ -48,12 +48,13 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         old, name = target_preset(self, context), self.name.strip()
+        old_name = preset_library.preset_name(old)
         try:
             new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
         except RosyError as error:
             return report_error(self, error)
         preset_library.rename_references(old, new)
-        self.report({"INFO"}, f"Renamed preset '{old}' to '{name}'")
+        self.report({"INFO"}, f"Renamed preset '{old_name}' to '{name}'")
         return {"FINISHED"}
 
 

@@ -25,6 +25,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
 
     show: bpy.props.EnumProperty(
         name="Show",
+        description="How the singularities are shown",
         items=[
             ("OVERLAY", "Overlay", "Dots and indices in the 3D view"),
             ("POINTS", "Points", "A point object with an attribute 'index', in units of 1/N"),

@@ -45,6 +45,7 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.mp4;*.gif", options={"HIDDEN"})
     film: bpy.props.EnumProperty(
         name="Format",
+        description="Format of the video",
         items=[(".mp4", "MP4", "H.264"), (".gif", "GIF", "256 colors, for web pages")],
     )
     pictures: bpy.props.IntProperty(
@@ -53,8 +54,22 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
     rate: bpy.props.FloatProperty(
         name="Rate", description="Pictures per second", default=24.0, min=0.1, max=120.0
     )
-    width: bpy.props.IntProperty(name="Width", subtype="PIXEL", default=512, min=16, max=8192)
-    height: bpy.props.IntProperty(name="Height", subtype="PIXEL", default=512, min=16, max=8192)
+    width: bpy.props.IntProperty(
+        name="Width",
+        description="Width of the video",
+        subtype="PIXEL",
+        default=512,
+        min=16,
+        max=8192,
+    )
+    height: bpy.props.IntProperty(
+        name="Height",
+        description="Height of the video",
+        subtype="PIXEL",
+        default=512,
+        min=16,
+        max=8192,
+    )
     elevation: bpy.props.FloatProperty(
         name="Elevation",
         description="Angle of the camera above the horizon",

@@ -19,6 +19,7 @@ class ROSY_OT_viewport(bpy.types.Operator):
 
     show: bpy.props.EnumProperty(
         name="Show",
+        description="Whether this view draws the fields",
         items=[
             ("TOGGLE", "Toggle", "Switch on or off"),
             ("ON", "On", "Draw the fields in this view"),

@@ -127,7 +127,7 @@ class Look:
         40,
         1,
         8000,
-        "Number of streamline steps in each direction",
+        "Length of the streaks: the number of steps in each direction",
         is_pixel_length=True,
         panel="streaks",
     )
@@ -201,7 +201,7 @@ class Look:
         2.5,
         0.0,
         16.0,
-        "Contrast, in addition to the statistical correction",
+        "Contrast of the streaks. 1: as with a single direction",
         panel="streaks",
         panel_before="high_pass",
         stage=Stage.SHADING,

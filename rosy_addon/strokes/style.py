@@ -102,7 +102,7 @@ class StrokeStyle:
         panel_before="gaps",
     )
     outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
-    hidden: bool = switch(False, "Keep strokes that the camera does not see")
+    hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")
     cross_creases: bool = switch(False, "Continue strokes across sharp creases", panel="ends")
 
     def __post_init__(self) -> None:

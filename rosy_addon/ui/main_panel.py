@@ -57,7 +57,7 @@ def _draw_existing_field(
     row.label(text=obj.name, icon="OUTLINER_OB_MESH")
     row.prop(obj.rosy, "include", text="Draw")
     has_attribute = mesh.rosy.attribute in mesh.attributes
-    name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0, dir1 ..."
+    name = f"'{mesh.rosy.attribute}'" if has_attribute else "dir0 ..."
     faces = counted(len(mesh.polygons), "face")
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
@@ -128,7 +128,7 @@ def _draw_picture_section(
             layout.label(text=f"Draws {len(objects)} objects")
     row = layout.row()
     row.scale_y = 1.5
-    row.operator("rosy.bake", text=_bake_label(bake_infos), icon="RENDER_STILL")
+    row.operator("rosy.bake", text=bake_label(bake_infos), icon="RENDER_STILL")
     row = layout.row(align=True)
     row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
     row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
@@ -141,7 +141,7 @@ def _draw_picture_section(
         _draw_view_transform_warning(layout, context.scene)
 
 
-def _bake_label(bake_infos: list[BakeInfo]) -> str:
+def bake_label(bake_infos: list[BakeInfo]) -> str:
     """Return the label of the button that bakes a single picture."""
     if any(bake.frame_range and bake.is_shown for bake in bake_infos):
         return "Bake Still"

@@ -124,6 +124,12 @@ def user_preset_keys() -> list[str]:
     return [key for key, entry in entries().items() if entry.is_user]
 
 
+def preset_name(key: str) -> str:
+    """Return the name of a preset that users see; the key itself if the preset is not found."""
+    entry = entries().get(key)
+    return key if entry is None else entry.preset.name
+
+
 def active_entry(settings: Any) -> PresetEntry | None:
     """Return the preset that the look of ``scene.rosy`` was taken from; None if it is not found."""
     return entries().get(settings.preset_name)

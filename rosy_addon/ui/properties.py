@@ -261,7 +261,7 @@ class RosyScene(bpy.types.PropertyGroup):
     )
     directory: bpy.props.StringProperty(
         name="Folder",
-        description="Folder for saved pictures",
+        description="Folder for saved pictures, and for the frames of animations",
         subtype="DIR_PATH",
         default="//rosy/",
         options=path_property_options(),

@@ -55,7 +55,7 @@ def test_generate_on_all_selected(suzanne):
 def test_errors_of_generate(suzanne):
     before = contents()
     assert "curvature" in error_of(bpy.ops.rosy.field_generate, kind="curvature", degree=3)
-    assert "axis" in error_of(bpy.ops.rosy.field_generate, kind="axis", axis=(0, 0, 0))
+    assert "Axis" in error_of(bpy.ops.rosy.field_generate, kind="axis", axis=(0, 0, 0))
     assert contents() == before
 
 
@@ -107,7 +107,7 @@ def test_errors_of_export(with_field, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("free", "message"), [(10**5, "are free: choose a"), (None, "there is not enough memory")]
+    ("free", "message"), [(10**5, "are free: choose a"), (None, "There is not enough memory")]
 )
 def test_lack_of_memory_is_reported(with_field, monkeypatch, free, message):
     """Whether it is known before, or noticed when the memory is taken."""
@@ -291,7 +291,7 @@ def test_marked_edges_uv_and_vectors_together(suzanne):
 def test_missing_guides(suzanne):
     before = contents()
     generate = bpy.ops.rosy.field_generate
-    assert "there are no guides" in error_of(generate, kind="guided")
+    assert "There are no guides" in error_of(generate, kind="guided")
     assert "'Nobody'" in error_of(generate, kind="guided", guide="Nobody")
     assert "attribute 'wind'" in error_of(
         generate, kind="guided", guides={"ATTRIBUTE"}, vectors="wind"

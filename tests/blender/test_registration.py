@@ -1,7 +1,28 @@
 """Switching the extension off and on again leaves nothing behind and loses nothing."""
 
+import sys
+
 import bpy
 from conftest import EXTENSION
+
+#: Words that are small in titles, and property groups whose properties are controls.
+SMALL_WORDS = {
+    "a",
+    "an",
+    "and",
+    "as",
+    "at",
+    "by",
+    "for",
+    "from",
+    "in",
+    "of",
+    "on",
+    "or",
+    "the",
+    "to",
+}
+VISIBLE_GROUPS = {"RosyLook", "RosyStrokes", "RosyScene", "RosyMesh", "RosyObject"}
 
 ID_TYPES = ("Scene", "Mesh", "Object", "WindowManager", "World", "Material", "Image", "Camera")
 
@@ -76,7 +97,53 @@ def test_settings_survive_off_and_on(with_field):
 
 
 def test_nothing_outside_bpy_is_touched():
-    import sys
-
     assert not [entry for entry in sys.path if "rosy" in entry]
     assert not [name for name in sys.modules if name.startswith(("rosy_addon", "operators"))]
+
+
+def controls():
+    """Yield the description of each operator, and all properties that a user sees, by their owner."""
+    for module in sys.modules[f"{EXTENSION}.operators"].MODULES:
+        for cls in module.CLASSES:
+            if issubclass(cls, bpy.types.Operator):
+                rna = getattr(bpy.ops.rosy, cls.bl_idname.split(".")[1]).get_rna_type()
+                yield (
+                    cls.bl_idname,
+                    rna.description,
+                    [rna.properties[k] for k in cls.__annotations__],
+                )
+    for cls in sys.modules[f"{EXTENSION}.rosy_addon.ui.properties"].CLASSES:
+        if cls.__name__ in VISIBLE_GROUPS:
+            items = [cls.bl_rna.properties[name] for name in cls.__annotations__]
+            yield cls.__name__, None, [item for item in items if item.name != item.identifier]
+
+
+def test_every_control_has_a_label_and_a_tooltip():
+    """As in Blender: title case, and tooltips that do not end with a period."""
+    for owner, description, properties in controls():
+        texts = [] if description is None else [description]
+        for item in properties:
+            if item.is_hidden:
+                continue
+            texts.append(item.description)
+            labels = [item.name]
+            if item.type == "ENUM":
+                labels += [option.name for option in item.enum_items]
+                texts += [option.description for option in item.enum_items]
+            for label in labels:
+                words = [word for word in label.split() if word not in SMALL_WORDS]
+                assert words and not any(word.islower() for word in words), (owner, label)
+                assert "Colour" not in label and "Grey" not in label, (owner, label)
+        for text in texts:
+            assert text and text == text.strip() and not text.endswith("."), (owner, text)
+            assert not text[0].islower(), (owner, text)
+
+
+def test_names_of_presets_are_in_title_case():
+    library = sys.modules[f"{EXTENSION}.rosy_addon.ui.preset_library"]
+    shipped = [entry.preset for entry in library.entries().values() if not entry.is_user]
+    assert len(shipped) > 5
+    for preset in shipped:
+        words = [word for word in preset.name.replace("-", " ").split() if word not in SMALL_WORDS]
+        assert not any(word.islower() for word in words), preset.name
+        assert not preset.description.endswith(".")

@@ -149,7 +149,7 @@ def test_errors(with_stroke_settings, scene, tmp_path):
     assert "view" in error_of(bpy.ops.rosy.strokes, camera="VIEW")
     scene.rosy.strokes.selected = True
     with_stroke_settings.select_set(False)
-    assert "no selected object" in error_of(bpy.ops.rosy.strokes)
+    assert "No selected object" in error_of(bpy.ops.rosy.strokes)
     with_stroke_settings.select_set(True)
     scene.camera = None
     assert "no active camera" in error_of(bpy.ops.rosy.strokes)

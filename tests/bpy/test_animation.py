@@ -24,6 +24,7 @@ from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.file_names import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
+from rosy.rosy_addon.ui.main_panel import bake_label
 from scenes import add_camera, contents, link, pixels, render
 
 ROOT = Path(__file__).parents[2]
@@ -211,6 +212,14 @@ def test_one_sequence_for_each_camera(moving, tmp_path):
     )
     assert [result.camera for result in results] == [moving.camera.name, "Other"]
     assert len(frames_of(tmp_path)) == 4
+
+
+def test_the_button_after_an_animation_bakes_a_still(moving, tmp_path):
+    assert bake_label(list_bakes(moving)) == "Bake"
+    bake_animation(moving, range(4, 5), settings=OutputSettings(folder=tmp_path / "frames"))
+    assert bake_label(list_bakes(moving)) == "Bake Still"
+    bake(moving)
+    assert bake_label(list_bakes(moving)) == "Bake Again"
 
 
 def test_materials_play_the_frames(moving, tmp_path):

@@ -13,8 +13,9 @@ from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.render import picture_memory
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
+from rosy.rosy_addon.scene.face_values import read_face_scalars
 from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vectors
-from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
 from rosy.rosy_addon.scene.write_field import assign_fields, write_mesh_field
@@ -135,6 +136,28 @@ def test_no_faces(scene, camera, vertices, edges, reason):
     assert_refused("object 'Bare'", "no faces", reason)
     with pytest.raises(RosyError, match="object 'Bare': the mesh has no faces"):
         mesh_surface(obj.data)
+
+
+def test_messages_name_the_object_and_not_its_mesh(scene):
+    """A selected object, if several have the mesh; the mesh itself if no object has it."""
+    first, second = add_plane(), add_plane()
+    first.name, second.name, second.data, mesh = "First", "Second", first.data, first.data
+    mesh.name = "Data"
+    for obj, name in ((first, "object 'First'"), (second, "object 'Second'")):
+        first.select_set(obj == first)
+        second.select_set(obj == second)
+        for read in (
+            lambda: read_mesh_field(mesh),
+            lambda: guide_vectors(mesh, "wind"),
+            lambda: read_face_scalars(mesh, "weight"),
+            lambda: marked_edges(mesh, "SHARP"),
+        ):
+            with pytest.raises(RosyError, match=f"^{name}"):
+                read()
+    for obj in (first, second):
+        bpy.data.objects.remove(obj)
+    with pytest.raises(RosyError, match=r"^mesh 'Data' has no attribute 'rosy'"):
+        read_mesh_field(mesh)
 
 
 def test_loose_edges_are_ignored(scene, camera):

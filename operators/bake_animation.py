@@ -13,11 +13,11 @@ from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
 from ..rosy_addon.scene.scene_reader import field_objects
-from .modal_task import ModalTaskMixin
+from .modal_task import DialogTaskMixin
 from .poll import poll_has_field
 
 
-class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
     """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
 
     bl_idname = "rosy.bake_animation"
@@ -34,20 +34,35 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
         "renders each frame",
     )
 
+    directory: bpy.props.StringProperty(
+        name="Folder",
+        description="Folder that was chosen in the file browser",
+        subtype="DIR_PATH",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_has_field(cls, context)
 
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for a folder if the scene has none, as in a file that was never saved."""
+        try:
+            output_folder(context.scene)
+        except RosyError:
+            for name, value in self._frame_settings(context.scene).items():
+                setattr(self, name, value)
+            context.window_manager.fileselect_add(self)
+            return {"RUNNING_MODAL"}
+        return None
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        context.scene.rosy.directory = self.directory
+
     def make_task(self, context: bpy.types.Context) -> Task[list[SequenceResult]]:
         scene = context.scene
-        frame_settings = {
-            name: getattr(self, name) if self.properties.is_property_set(name) else default
-            for name, default in (
-                ("first", scene.frame_start),
-                ("last", scene.frame_end),
-                ("step", scene.frame_step),
-            )
-        }
+        frame_settings = self._frame_settings(scene)
         frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
         if not len(frames):
             raise RosyError(
@@ -58,6 +73,18 @@ class ROSY_OT_bake_animation(ModalTaskMixin, bpy.types.Operator):
         # Frames are saved in the scene's folder, even if single pictures are packed.
         settings = replace(read_output_settings(scene), folder=output_folder(scene))
         return bake_animation_task(scene, frames, cameras=cameras, settings=settings)
+
+    def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
+        """Return the first and last frame and the step: the operator's, by default the scene's."""
+        defaults = {
+            "first": scene.frame_start,
+            "last": scene.frame_end,
+            "step": scene.frame_step,
+        }
+        return {
+            name: getattr(self, name) if self.properties.is_property_set(name) else default
+            for name, default in defaults.items()
+        }
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return field_objects(context.view_layer)

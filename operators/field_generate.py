@@ -8,7 +8,7 @@ from math import pi
 
 import bpy
 
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
@@ -141,24 +141,40 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         return poll_editable(cls, context)
 
     def make_task(self, context: bpy.types.Context) -> Task[str]:
-        """Generate all fields, then store them. Return what was made, for a message."""
-        meshes = list(self.required_data(context))
-        surfaces = [mesh_surface(mesh) for mesh in meshes]
-        settings_per_mesh = [
-            self._generator_settings(context, mesh, surface)
-            for mesh, surface in zip(meshes, surfaces, strict=True)
-        ]
-        fields = {}
-        for index, (mesh, surface) in enumerate(zip(meshes, surfaces, strict=True)):
+        """Generate all fields, then store them. Return what was made, for a message.
+
+        Meshes without features to follow are reported and left out, unless there is no other mesh.
+        """
+        inputs, fields, errors = [], {}, []
+        for mesh in self.required_data(context):
+            surface = mesh_surface(mesh)
+            try:
+                settings = self._generator_settings(context, mesh, surface)
+            except NoFeaturesError as error:
+                errors.append(error)
+                continue
+            inputs.append((mesh, surface, settings))
+        for index, (mesh, surface, settings) in enumerate(inputs):
+            task = generate_task(surface, settings, self.degree)
+            try:
+                fields[mesh] = yield from subtask(
+                    task, index / len(inputs), (index + 1) / len(inputs)
+                )
+            except NoFeaturesError as error:
+                errors.append(error)
+                continue
             if note := orientation_warning(surface):
                 report_warning(self, note)
-            task = generate_task(surface, settings_per_mesh[index], self.degree)
-            fields[mesh] = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
+        if not fields:
+            raise errors[0]
+        for error in errors:
+            report_warning(self, str(error))
         yield Progress(1.0, "counting singularities")
-        notes = self._notes(list(zip(surfaces, fields.values(), strict=True)))
+        surfaces = {mesh: surface for mesh, surface, _ in inputs}
+        notes = self._notes([(surfaces[mesh], field) for mesh, field in fields.items()])
         store_fields(self, context, fields, self.attribute)
-        names = f"'{selected_mesh_objects(context)[0].name}'"
-        target = names if len(meshes) == 1 else counted(len(meshes), "mesh", "meshes")
+        names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
+        target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
 
     def _notes(self, fields: list[tuple[Surface, RosyField]]) -> str:

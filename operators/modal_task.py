@@ -239,3 +239,54 @@ class ModalTaskMixin:
         """Stop the job. Blender calls this if the window is closed or a file is opened."""
         if self._job is not None:
             self._job.stop("the window was closed")
+
+
+class DialogTaskMixin(ModalTaskMixin):
+    """Mixin of operators that may ask the user something before they run their task.
+
+    Blender frees an operator when its dialog or file browser is confirmed. So a second operator, with
+    the answer, does the work.
+    """
+
+    _has_asked = False
+
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Open a dialog or a file browser. Return what that returns; None if there is no need to ask.
+
+        Raises
+        ------
+        RosyError
+            Reported to the user.
+        """
+        raise NotImplementedError
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        """Set the properties of the operator that does the work, so that it need not ask again."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        try:
+            result = self.ask(context, event)
+        except REPORTED_ERRORS as error:
+            return report_error(self, error)
+        if result is None:
+            return super().invoke(context, event)
+        self._has_asked = True
+        return result
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self._has_asked:
+            return super().execute(context)
+        self.take_answer(context)
+        names = type(self).__annotations__
+        settings = {
+            name: getattr(self, name) for name in names if self.properties.is_property_set(name)
+        }
+        operator = getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2])
+        try:
+            result = operator("INVOKE_DEFAULT", **settings)
+        except RuntimeError as error:  # reported by the second operator
+            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+            return {"CANCELLED"}
+        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}

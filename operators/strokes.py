@@ -9,17 +9,22 @@ import bpy
 from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes_task
 from ..rosy_addon.errors import counted
 from ..rosy_addon.progress import Task
-from ..rosy_addon.scene.cameras import CameraSource
+from ..rosy_addon.scene.cameras import CameraSource, render_camera
 from ..rosy_addon.scene.scene_reader import field_objects
-from ..rosy_addon.scene.stroke_objects import remove_strokes, stroke_objects, target_objects
+from ..rosy_addon.scene.stroke_objects import (
+    edited_strokes,
+    remove_strokes,
+    stroke_objects,
+    target_objects,
+)
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from .bake import view_camera
-from .modal_task import ModalTaskMixin
-from .poll import poll_has_field, poll_idle
+from .modal_task import DialogTaskMixin
+from .poll import poll_has_field, poll_idle, sync_suffix
 from .reports import report_warning
 
 
-class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
     """Draw evenly spaced strokes along the fields of the meshes, as seen from the camera"""
 
     bl_idname = "rosy.strokes"
@@ -37,7 +42,17 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
         items=STROKE_CAMERA_ITEMS,
     )
     filepath: bpy.props.StringProperty(
-        name="File", description="Path of the .svg file. Default: the setting of the scene"
+        name="File",
+        description="Path of the .svg file. Default: the setting of the scene",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+    filter_glob: bpy.props.StringProperty(default="*.svg", options={"HIDDEN"})
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+    replace: bpy.props.BoolProperty(
+        name="Replace Edited",
+        description="Do not ask before strokes are replaced that were edited",
+        options={"HIDDEN", "SKIP_SAVE"},
     )
 
     @classmethod
@@ -47,11 +62,46 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
             return False
         return poll_has_field(cls, context)
 
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the path of a file, or before strokes are replaced that the user has edited."""
+        if self._kind(context) == "SVG":
+            if self.properties.is_property_set("filepath"):
+                return None
+            self.filepath = bpy.path.abspath(context.scene.rosy.strokes.filepath)
+            context.window_manager.fileselect_add(self)
+            return {"RUNNING_MODAL"}
+        camera = self._camera(context) or render_camera(context.scene)
+        obj = edited_strokes(context.scene, self._kind(context), camera.name)
+        if obj is None or self.replace:
+            return None
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=f"Replace the strokes of '{obj.name}'?",
+            message="They were edited. Duplicate the object to keep them",
+            confirm_text="Replace",
+            icon="WARNING",
+        )
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        if self._kind(context) == "SVG":
+            context.scene.rosy.strokes.filepath = self.filepath
+        else:
+            self.replace = True
+
+    def check(self, context: bpy.types.Context) -> bool:
+        """Set the suffix of the file name in the file browser."""
+        return sync_suffix(self, ".svg")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show no settings in the file browser: those of the panel apply."""
+
     def make_task(self, context: bpy.types.Context) -> Task[StrokeResult]:
         is_set = self.properties.is_property_set
         return draw_strokes_task(
             context.scene,
-            kind=self.kind if is_set("kind") else None,
+            kind=self._kind(context),
+            collection=context.collection,
             path=self.filepath if is_set("filepath") else None,
             objects=target_objects(context.scene, context.view_layer),
             camera=self._camera(context),
@@ -68,6 +118,11 @@ class ROSY_OT_strokes(ModalTaskMixin, bpy.types.Operator):
         )
         for note in result.notes:
             report_warning(self, note)
+
+    def _kind(self, context: bpy.types.Context) -> str:
+        """Return what to make: the operator's choice, by default the scene's."""
+        is_set = self.properties.is_property_set("kind")
+        return self.kind if is_set else context.scene.rosy.strokes.kind
 
     def _camera(self, context: bpy.types.Context) -> CameraSource | None:
         """Return the camera of the current view if it is chosen; None for the scene's camera."""

@@ -55,6 +55,7 @@ def draw_strokes_task(
     path: Path | str | None = None,
     objects: Sequence[bpy.types.Object] | None = None,
     camera: CameraSource | None = None,
+    collection: bpy.types.Collection | None = None,
     style: StrokeStyle | None = None,
     pen: Pen | None = None,
     size: tuple[int, int] | None = None,
@@ -77,6 +78,8 @@ def draw_strokes_task(
         Objects whose fields are drawn. By default all that have one. Other objects only occlude.
     camera : bpy.types.Object or Camera, optional
         By default the camera of renders.
+    collection : bpy.types.Collection, optional
+        The collection of a new object. By default that of the scene.
     style : StrokeStyle, optional
         By default the settings of the scene.
     pen : Pen, optional
@@ -125,7 +128,7 @@ def draw_strokes_task(
     if kind == "SVG":
         write_svg(path, drawing.strokes, view, pen)
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    obj = store_strokes(scene, kind, drawing, view, pen, _parent_object(scene_data))
+    obj = store_strokes(scene, kind, drawing, view, pen, _parent_object(scene_data), collection)
     return StrokeResult(
         view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
     )

@@ -33,6 +33,10 @@ class NothingInViewError(RosyError):
     """No object with a field is visible from the camera."""
 
 
+class NoFeaturesError(RosyError):
+    """A mesh has no edges that a field can follow."""
+
+
 class DeviceError(RosyError):
     """There is no usable graphics card, or the shaders do not compile on it."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import NoFeaturesError, RosyError
 from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
@@ -178,12 +178,12 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
     if ends is None:
         ends = feature_edges(surface, settings.sharp_angle)
     if not len(ends):
-        raise RosyError(
+        raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
         )
     guides = guides_from_edges(surface, ends, degree)
     if not guides.any():
-        raise RosyError(
+        raise NoFeaturesError(
             f"{surface.name}: on each face, the edges cancel each other in a field of degree "
             f"{degree}: choose another degree"
         )

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..cache import Cache, content_hash
-from ..errors import RosyError
+from ..errors import NoFeaturesError, RosyError
 from ..field.surface import Surface, build_surface, smooth_fans
 
 #: Marks of edges: RNA property, label, and description in the user interface.
@@ -153,13 +153,13 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
 
     Raises
     ------
-    RosyError
+    NoFeaturesError
         If no edge has the mark.
     """
     property_name, label, _ = EDGE_MARKS[mark]
     is_marked = _edge_flags(mesh, property_name)
     if not is_marked.any():
-        raise RosyError(
+        raise NoFeaturesError(
             f"{mesh_label(mesh)} has no edges of this kind ({label}): mark some, or choose another kind"
         )
     return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[

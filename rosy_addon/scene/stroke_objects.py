@@ -19,11 +19,13 @@ from ..projection.camera import Camera
 from ..strokes.pipeline import StrokeDrawing, stroke_geometry
 from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen
+from .compat import is_editable
 from .curves import new_curves
 from .grease_pencil import new_grease_pencil
 from .look_properties import read_settings
 from .owned_data import OWNED_TAG, rollback_on_error
 from .scene_reader import field_objects
+from .stroke_digest import stroke_digest
 
 #: The function that creates the data of each kind of object.
 DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
@@ -77,6 +79,7 @@ def store_strokes(
     camera: Camera,
     pen: Pen,
     owner: bpy.types.Object | None = None,
+    collection: bpy.types.Collection | None = None,
 ) -> bpy.types.Object:
     """Store strokes in an object. Those of the same kind from the same camera are replaced.
 
@@ -93,6 +96,8 @@ def store_strokes(
     pen : Pen
     owner : bpy.types.Object, optional
         Parent of the object. The strokes move with it.
+    collection : bpy.types.Collection, optional
+        The collection of a new object, by default that of the scene. Also if it cannot be changed.
 
     Returns
     -------
@@ -110,11 +115,13 @@ def store_strokes(
         data = DATA_BUILDERS[kind](
             name, geometry, min(scene.frame_start, scene.frame_current), register
         )
-        obj = _find_object(scene, kind, camera.name)
+        record = _find_record(scene, kind, camera.name)
+        obj = None if record is None else record.thing
         if obj is None:
             obj = bpy.data.objects.new(name, data)
             created.append(obj)
-            scene.collection.objects.link(obj)
+            is_usable = collection is not None and is_editable(collection)
+            (collection if is_usable else scene.collection).objects.link(obj)
             obj.visible_shadow = False
             obj.use_grease_pencil_lights = False
     if obj.data != data:
@@ -145,11 +152,22 @@ def remove_strokes(scene: bpy.types.Scene) -> int:
     return len(objects)
 
 
-def _find_object(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Object | None:
-    """Return the recorded object; None if the user has deleted it or given it other data."""
+def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.Object | None:
+    """Return the object that `store_strokes` would replace the strokes of, if they were edited.
+
+    None if there is no such object, or nobody has edited its strokes since they were drawn.
+    """
+    record = _find_record(scene, kind, camera)
+    if record is None or not record.digest or record.digest == stroke_digest(record.thing.data):
+        return None
+    return record.thing
+
+
+def _find_record(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.PropertyGroup | None:
+    """Return the record of an object; None if the user has deleted it or given it other data."""
     for record in scene.rosy.strokes.made:
         if (record.kind, record.name) == (kind, camera) and record.thing in stroke_objects(scene):
-            return record.thing if record.thing.data.get(OWNED_TAG) else None
+            return record if record.thing.data.get(OWNED_TAG) else None
     return None
 
 
@@ -166,6 +184,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
             records.remove(index)
     record = records.add()
     record.name, record.kind, record.thing = camera, kind, obj
+    record.digest = stroke_digest(obj.data)
 
 
 def _delete_object(obj: bpy.types.Object) -> None:

@@ -147,6 +147,7 @@ class RosyStrokeObject(bpy.types.PropertyGroup):
 
     kind: bpy.props.StringProperty()
     thing: bpy.props.PointerProperty(type=bpy.types.Object)
+    digest: bpy.props.StringProperty(description="Digest of the strokes when they were drawn")
 
 
 class RosyStrokes(bpy.types.PropertyGroup):

@@ -51,14 +51,15 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
             if body is not None:
                 _draw_stroke_settings(body, settings, names)
         if settings.kind == "SVG":
-            _draw_stroke_settings(layout, settings, ("filepath", "page", "paper", "plotter"))
+            _draw_stroke_settings(layout, settings, ("page", "paper", "plotter"))
         if job_status.current is not None:
             draw_progress(layout)
             return
         objects = stroke_objects(context.scene)
         row = layout.row()
         row.scale_y = 1.5
-        row.operator("rosy.strokes", icon="GREASEPENCIL")
+        text = "Draw Strokes..." if settings.kind == "SVG" else "Draw Strokes"
+        row.operator("rosy.strokes", text=text, icon="GREASEPENCIL")
         if objects:
             layout.operator("rosy.strokes_remove", icon="TRASH")
             for obj in objects:

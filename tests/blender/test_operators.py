@@ -59,6 +59,28 @@ def test_errors_of_generate(suzanne):
     assert contents() == before
 
 
+def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
+    suzanne.select_set(False)
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.ops.object.shade_smooth()
+    ball = bpy.context.object
+    ball.name, ball.data.name = "Ball", "Data"
+    settings = {"kind": "features", "sharp_angle": 1.0}
+    before = contents()
+    assert "Object 'Ball': has no border or sharp edge" in error_of(
+        bpy.ops.rosy.field_generate, **settings
+    )
+    assert contents() == before
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    ball.select_set(True)
+    assert bpy.ops.rosy.field_generate(**settings) == {"FINISHED"}
+    assert "rosy" in cube.data.attributes and "rosy" not in ball.data.attributes
+    output = capfd.readouterr().out
+    assert "Warning: Object 'Ball': has no border or sharp edge" in output
+    assert "on 6 faces" in output
+
+
 def test_generate_on_an_empty_mesh_names_it(scene):
     empty_object = bpy.data.objects.new("Nothing", bpy.data.meshes.new("Nothing"))
     scene.collection.objects.link(empty_object)

@@ -15,7 +15,7 @@ from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.scene_reader import read_scene
-from rosy.rosy_addon.scene.stroke_objects import remove_strokes, stroke_objects
+from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.strokes.outline import OUTLINE_KINDS
 from rosy.rosy_addon.strokes.style import StrokeStyle
 from rosy.rosy_addon.strokes.svg import Pen
@@ -418,3 +418,50 @@ def test_meshes_without_faces_are_ignored(camera, scene):
     assert result.obj.data.layers[0].frames[0].frame_number == min(
         scene.frame_start, scene.frame_current
     )
+
+
+def move_a_point(data):
+    if data.id_type == "CURVES":
+        data.attributes["position"].data[0].vector.x += 0.1
+    elif has_grease_pencil_drawings():
+        data.layers[0].frames[0].drawing.attributes["position"].data[0].vector.x += 0.1
+    else:
+        data.layers[0].frames[0].strokes[0].points[0].co.x += 0.1
+
+
+def recolor(data):
+    if data.id_type == "CURVES":
+        data.attributes["ink"].data[0].color = (1.0, 0.0, 0.0, 1.0)
+    else:
+        data.materials[0].grease_pencil.color = (1.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("edit", [move_a_point, recolor])
+@pytest.mark.parametrize("kind", ["PENCIL", "CURVES"])
+def test_edited_strokes_are_recognized(monkey, camera, scene, tmp_path, kind, edit):
+    name = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20)).obj.name
+    assert edited_strokes(scene, kind, "Camera") is None
+    path = str(tmp_path / "strokes.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    scene, obj = bpy.context.scene, bpy.data.objects[name]
+    assert edited_strokes(scene, kind, "Camera") is None
+    obj.location.x += 1
+    assert edited_strokes(scene, kind, "Camera") is None
+    edit(obj.data)
+    assert edited_strokes(scene, kind, "Camera") == obj
+    assert edited_strokes(scene, kind, "Other") is None
+    draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=20))
+    assert edited_strokes(scene, kind, "Camera") is None
+
+
+def test_new_strokes_are_put_into_a_collection(monkey, camera, scene):
+    """Strokes that are drawn again stay where they are."""
+    first, second = (bpy.data.collections.new(name) for name in ("First", "Second"))
+    for collection in (first, second):
+        scene.collection.children.link(collection)
+    style = StrokeStyle(spacing=20)
+    obj = draw_strokes(scene, kind="CURVES", style=style, collection=first).obj
+    assert obj.users_collection == (first,)
+    draw_strokes(scene, kind="CURVES", style=style, collection=second)
+    assert obj.users_collection == (first,)

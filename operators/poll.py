@@ -68,11 +68,15 @@ def poll_has_field(operator: type[bpy.types.Operator], context: bpy.types.Contex
 
 
 def sync_suffix(operator: bpy.types.Operator, suffix: str) -> bool:
-    """Set the suffix of an operator's file path. Return whether the path has changed."""
-    filepath = str(Path(operator.filepath).with_suffix(suffix))
-    changed = filepath != operator.filepath
-    operator.filepath = filepath
-    return changed
+    """Set the suffix of an operator's file path. Return whether the path has changed.
+
+    A path without a name is left alone.
+    """
+    path = Path(operator.filepath)
+    if not path.name or path.suffix == suffix:
+        return False
+    operator.filepath = str(path.with_suffix(suffix))
+    return True
 
 
 def store_fields(

@@ -8,6 +8,7 @@ from bpy_extras.io_utils import ImportHelper
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.presets.store import read_preset, save_preset
 from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.viewport.view3d import redraw
 from .reports import report_error
 
 
@@ -33,6 +34,7 @@ class ROSY_OT_preset_import(bpy.types.Operator, ImportHelper):
         except RosyError as error:
             return report_error(self, error)
         self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
+        redraw()
         return {"FINISHED"}
 
 

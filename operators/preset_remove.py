@@ -8,6 +8,7 @@ from ..rosy_addon.errors import RosyError
 from ..rosy_addon.presets.store import remove_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
+from ..rosy_addon.viewport.view3d import redraw
 from .preset_shared import PRESET_ARGUMENTS, poll_user_presets, target_preset
 from .reports import report_error
 
@@ -46,6 +47,7 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
         except RosyError as error:
             return report_error(self, error)
         self.report({"INFO"}, f"Deleted preset '{name}'")
+        redraw()
         return {"FINISHED"}
 
 

@@ -8,6 +8,7 @@ from ..rosy_addon.errors import RosyError
 from ..rosy_addon.presets.store import MAX_NAME_LENGTH, rename_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
+from ..rosy_addon.viewport.view3d import redraw
 from .preset_shared import (
     DESCRIPTION_ARGUMENTS,
     PRESET_ARGUMENTS,
@@ -41,7 +42,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
         entry = preset_library.entries().get(target_preset(self, context))
         if entry is not None:
             self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400)
+        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Rename")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_name_and_description(self.layout, self)
@@ -55,6 +56,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
             return report_error(self, error)
         preset_library.rename_references(old, new)
         self.report({"INFO"}, f"Renamed preset '{old_name}' to '{name}'")
+        redraw()
         return {"FINISHED"}
 
 

@@ -11,6 +11,7 @@ from ..rosy_addon.presets.store import MAX_NAME_LENGTH, Preset, preset_key, save
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
+from ..rosy_addon.viewport.view3d import redraw
 from .preset_shared import DESCRIPTION_ARGUMENTS, draw_name_and_description
 from .reports import report_error
 
@@ -36,7 +37,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
         entry = preset_library.active_entry(context.scene.rosy)
         if entry is not None and entry.is_user:
             self.name, self.sentence = entry.preset.name, entry.preset.description
-        return context.window_manager.invoke_props_dialog(self, width=400)
+        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Save")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -54,6 +55,7 @@ class ROSY_OT_preset_save(bpy.types.Operator):
             return report_error(self, error)
         settings.preset_name = key
         self.report({"INFO"}, f"Saved preset '{preset.name}'")
+        redraw()
         return {"FINISHED"}
 
 

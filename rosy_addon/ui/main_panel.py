@@ -44,8 +44,7 @@ def _draw_field_section(layout: bpy.types.UILayout, context: bpy.types.Context) 
         _draw_existing_field(layout, context, obj)
     else:
         layout.label(text=f"{obj.name} has no field yet")
-        _draw_generator_settings(layout, context)
-        layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
+        _draw_new_field(layout, context)
 
 
 def _draw_existing_field(
@@ -61,10 +60,9 @@ def _draw_existing_field(
     faces = counted(len(mesh.polygons), "face")
     box.label(text=f"Degree {mesh.rosy.degree} on {faces}, {name}")
     row = layout.row(align=True)
-    row.operator("rosy.field_import", text="Import", icon="IMPORT")
     row.operator("rosy.field_export", text="Export", icon="EXPORT")
     is_shown = overlay.is_shown(obj.name)
-    button = layout.operator(
+    button = row.operator(
         "rosy.singularities", text="Singularities", icon="OVERLAY", depress=is_shown
     )
     button.show = "NONE" if is_shown else "OVERLAY"
@@ -75,7 +73,7 @@ def _draw_existing_field(
     header, body = layout.panel("rosy_another_field", default_closed=True)
     header.label(text="Make Another Field")
     if body is not None:
-        _draw_generator_settings(body, context)
+        _draw_new_field(body, context)
 
 
 def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -90,8 +88,8 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
 
 
-def _draw_generator_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings of the generator and its button."""
+def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings of the generator and the buttons that make or import a field."""
     settings = context.window_manager.operator_properties_last("rosy.field_generate")
     column = layout.column()
     column.prop(settings, "kind")
@@ -104,6 +102,7 @@ def _draw_generator_settings(layout: bpy.types.UILayout, context: bpy.types.Cont
     if settings.kind == "curvature" and settings.degree % 2:
         row.enabled = False
         layout.label(text="Curvature: even degrees only", icon="ERROR")
+    layout.operator("rosy.field_import", text="Import a Field File...", icon="IMPORT")
 
 
 def _draw_picture_section(

@@ -346,6 +346,93 @@ def turntable_from_its_file_browser():
     assert path.stat().st_size > 500
 
 
+def press_return():
+    """Press Return in the file browser or the dialog that has opened last."""
+    window = bpy.context.window_manager.windows[-1]
+    x, y = window.width // 2, window.height // 2
+    window.event_simulate(type="RET", value="PRESS", x=x, y=y)
+    window.event_simulate(type="RET", value="RELEASE", x=x, y=y)
+
+
+def browser_params():
+    """Return the settings of the open file browser."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "FILE_BROWSER":
+                return area.spaces.active.params
+    raise AssertionError("there is no file browser")
+
+
+def strokes_from_their_file_browser():
+    """Draw Strokes asks for the name of an .svg file, and remembers it."""
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / "strokes.svg"
+    path.unlink(missing_ok=True)
+    settings = bpy.context.scene.rosy.strokes
+    settings.kind, settings.spacing = "SVG", 30.0
+    with in_view():
+        assert bpy.ops.rosy.strokes("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    yield 1.0
+    params = browser_params()
+    assert params.filename == "strokes.svg"
+    params.directory = str(SHOTS).encode()
+    yield 0.5
+    press_return()
+    yield from wait_until(lambda: path.is_file() and status().current is None)
+    check_idle()
+    assert path.read_text().startswith("<?xml")
+    assert bpy.context.scene.rosy.strokes.filepath == str(path)
+
+
+def animation_asks_for_a_folder():
+    """In a file that was never saved, Animation opens a file browser for the folder."""
+    yield from fresh_scene(size=(64, 48))
+    make_field()
+    folder = SHOTS / "frames"
+    folder.mkdir(exist_ok=True)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 3, 4
+    with in_view():
+        assert bpy.ops.rosy.bake_animation("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+    yield 1.0
+    browser_params().directory = str(folder).encode()
+    yield 0.5
+    press_return()
+    yield from wait_until(lambda: scene.rosy.bakes and status().current is None)
+    check_idle()
+    assert len(list(folder.glob("*.png"))) == 2
+    assert Path(scene.rosy.directory) == folder
+
+
+def edited_strokes_are_replaced_on_request():
+    """Draw Strokes asks first; without an edit it does not."""
+    yield from fresh_scene()
+    make_field()
+    bpy.context.scene.rosy.strokes.spacing = 30.0
+
+    def draw():
+        with in_view():
+            bpy.ops.rosy.strokes("INVOKE_DEFAULT", True)
+
+    draw()
+    yield from wait_until(lambda: bpy.context.scene.rosy.strokes.made and status().current is None)
+    obj = bpy.context.scene.rosy.strokes.made[0].thing
+    assert bpy.data.objects["Suzanne"].users_collection == obj.users_collection
+    first = obj.data
+    draw()
+    yield from wait_until(lambda: obj.data != first and status().current is None)
+    edited = obj.data
+    edited.layers[0].frames[0].drawing.attributes["position"].data[0].vector.x += 1
+    draw()
+    yield 0.5
+    assert obj.data == edited and status().current is None
+    yield from save_screenshot("edited-strokes")
+    press_return()
+    yield from wait_until(lambda: obj.data != edited and status().current is None)
+    check_idle()
+
+
 def stop_when_an_object_is_deleted():
     def delete():
         with in_view():
@@ -411,6 +498,9 @@ run_steps(
     turntable_with_progress,
     turntable_stopped_with_escape,
     turntable_from_its_file_browser,
+    strokes_from_their_file_browser,
+    animation_asks_for_a_folder,
+    edited_strokes_are_replaced_on_request,
     stop_when_an_object_is_deleted,
     stop_on_undo,
     stop_on_a_change_of_scene,

@@ -9,7 +9,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..errors import as_sentence
-from ..settings import panel_settings, settings_of
+from ..settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
 from .sidebar import SidebarPanel, use_property_columns
 
@@ -38,6 +38,10 @@ OUTPUT_SETTINGS = (
 #: Height of a preset's picture in the panel and in the selection, in units of Blender's layout: 128
 #: screen pixels, half the size of the picture, at a resolution scale of 1.
 THUMBNAIL_SCALE = 6.4
+
+#: Number of characters of a label that fits into Blender's own column of labels in a sidebar of default
+#: width, and the fraction of the width for longer ones.
+MAX_LABEL_LENGTH, LONG_LABEL_FACTOR = 15, 0.49
 
 #: Properties of the scene and of objects that belong to a source of the tone, with that source.
 TONE_SOURCE_OF_SETTING = {
@@ -131,7 +135,7 @@ def _make_settings_panel(
             setting = settings_of(Look)[name]
             row = column.row()
             row.active = setting.applies(settings.look)
-            row.prop(settings.look, name, text=setting.panel_label or None)
+            _draw_setting(row, settings.look, setting)
             if name == "tone":
                 _draw_tone_source(column, context)
         for name in names:
@@ -147,6 +151,20 @@ def _make_settings_panel(
         "draw": draw,
     }
     return type(f"VIEW3D_PT_rosy_{suffix}", (SidebarPanel, bpy.types.Panel), namespace)
+
+
+def _draw_setting(row: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting) -> None:
+    """Draw a property of the look, with more room for its label if that is long."""
+    label = setting.panel_label or setting.label
+    if len(label) <= MAX_LABEL_LENGTH or isinstance(setting, Switch):
+        row.prop(look, setting.name, text=label)
+        return
+    split = row.split(factor=LONG_LABEL_FACTOR)
+    label_row = split.row()
+    label_row.alignment = "RIGHT"
+    label_row.label(text=label)
+    split.use_property_split = False
+    split.prop(look, setting.name, text="")
 
 
 def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -280,8 +280,14 @@ def bake_animation(monkey):
     }
     if not monkey.window or monkey.chance(0.3):
         monkey.rosy("bake_animation", **settings)
-    else:
+    elif has_folder():
         yield from modal(monkey, "bake_animation", **settings)
+
+
+def has_folder():
+    """Whether the scene has a folder for frames, so that no file browser asks for one."""
+    directory = bpy.context.scene.rosy.directory
+    return bool(directory.strip()) and not (directory.startswith("//") and not bpy.data.filepath)
 
 
 @action(3, uses_rosy=True)
@@ -334,7 +340,8 @@ def strokes(monkey):
     settings.plotter, settings.paper = monkey.chance(0.3), monkey.chance(0.5)
     kind = monkey.pick(["PENCIL", "CURVES", "SVG"])
     path = monkey.pick([monkey.folder / "a.svg", monkey.folder / "none" / "a.svg", monkey.folder])
-    arguments = {"kind": kind, "camera": "SCENE", "filepath": str(path)}
+    # `replace`, so that no dialog asks.
+    arguments = {"kind": kind, "camera": "SCENE", "filepath": str(path), "replace": True}
     if not monkey.window or monkey.chance(0.3):
         monkey.rosy("strokes", **arguments)
     else:
@@ -388,10 +395,11 @@ def cancel_midway(monkey):
     prepare(monkey)
     scene = bpy.context.scene
     if monkey.window:
+        operators = {"bake": {}, "strokes": {"kind": "CURVES", "replace": True}, "occlusion": {}}
+        operators |= {"bake_animation": {}} if has_folder() else {}
         if monkey.chance(0.7):
-            yield from modal(
-                monkey, monkey.pick(["bake", "strokes", "bake_animation", "occlusion"])
-            )
+            operator = monkey.pick(list(operators))
+            yield from modal(monkey, operator, **operators[operator])
         return
     addon = "rosy_addon"
     settings = rosy(f"{addon}.scene.pictures")

@@ -131,13 +131,13 @@ def save_screenshot(name, height=10_000):
 
 def panel_without_field():
     yield from fresh_scene()
-    yield from save_screenshot("panel-1-no-field", 390)
+    yield from save_screenshot("panel-1-no-field")
 
 
 def panel_with_field():
     yield from fresh_scene(size=(640, 480))
     make_field()
-    yield from save_screenshot("panel-2-field", 450)
+    yield from save_screenshot("panel-2-field")
 
 
 def singularities_as_dots():
@@ -204,7 +204,7 @@ def bake_with_progress():
 def panel_with_picture():
     view()[1].spaces.active.shading.type = "MATERIAL"
     yield 3.0
-    yield from save_screenshot("panel-3-baked", 580)
+    yield from save_screenshot("panel-3-baked")
 
 
 def panel_out_of_date():

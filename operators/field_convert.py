@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 import bpy
 
@@ -31,6 +32,24 @@ DEGREE_ITEMS = [
         for degree in range(1, MAX_DEGREE + 1)
     ),
 ]
+
+
+def _get_degree(operator: bpy.types.OperatorProperties) -> int:
+    return operator.degree
+
+
+def _set_degree(operator: bpy.types.OperatorProperties, degree: int) -> None:
+    operator.degree = degree
+
+
+def _search_values(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    """Return the vertex groups and scalar attributes of the active mesh, by name."""
+    obj = selected_mesh_objects(context)[0]
+    scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
+    names = [
+        attribute.name for attribute in obj.data.attributes if attribute.data_type in scalar_types
+    ]
+    return [*(group.name for group in obj.vertex_groups), *names]
 
 
 class _FieldOperator:
@@ -62,8 +81,8 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         name="Degree",
         description="New degree, a multiple or a divisor of the present one",
         items=DEGREE_ITEMS,
-        get=lambda self: self.degree,
-        set=lambda self, value: setattr(self, "degree", value),
+        get=_get_degree,
+        set=_set_degree,
         options={"SKIP_SAVE"},
     )
     angle: bpy.props.FloatProperty(
@@ -100,7 +119,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     values: bpy.props.StringProperty(
         name="Values",
         description="Name of the attribute or vertex group",
-        search=lambda self, context, typed: _scalar_names(context),
+        search=_search_values,
     )
 
     def make_task(self, context: bpy.types.Context) -> Task[int]:
@@ -172,16 +191,6 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
         layout.prop(self, "form")
         if self.form != "DIRECTIONS":
             layout.prop(self, "attribute")
-
-
-def _scalar_names(context: bpy.types.Context) -> list[str]:
-    """Return the vertex groups and scalar attributes of the active mesh, by name."""
-    obj = selected_mesh_objects(context)[0]
-    scalar_types = {"FLOAT", "INT", "INT8", "BOOLEAN", "FLOAT_COLOR", "BYTE_COLOR"}
-    names = [
-        attribute.name for attribute in obj.data.attributes if attribute.data_type in scalar_types
-    ]
-    return [*(group.name for group in obj.vertex_groups), *names]
 
 
 CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

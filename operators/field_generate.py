@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 import bpy
 
@@ -40,10 +41,19 @@ KIND_ITEMS = [
 ]
 
 
-def _mesh_item_names(context: bpy.types.Context, collection: str) -> list[str]:
-    """Return the names in a collection of the active mesh, such as its UV maps or attributes."""
-    meshes = selected_mesh_objects(context)
-    return [item.name for item in getattr(meshes[0].data, collection)] if meshes else []
+def _search_guides(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    return [obj.name for obj in guide_objects(context.scene.objects)]
+
+
+def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    return [
+        layer.name for obj in selected_mesh_objects(context)[:1] for layer in obj.data.uv_layers
+    ]
+
+
+def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    objects = selected_mesh_objects(context)[:1]
+    return [attribute.name for obj in objects for attribute in obj.data.attributes]
 
 
 class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
@@ -110,19 +120,17 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         name="Object",
         description="Grease Pencil, curve or empty that the field follows. Empty: all that are "
         "selected. An empty guides along its z axis, within its display size",
-        search=lambda self, context, typed: [
-            obj.name for obj in guide_objects(context.scene.objects)
-        ],
+        search=_search_guides,
     )
     uv_map: bpy.props.StringProperty(
         name="UV Map",
         description="UV map that the field follows. Empty: the active one",
-        search=lambda self, context, typed: _mesh_item_names(context, "uv_layers"),
+        search=_search_uv_maps,
     )
     vectors: bpy.props.StringProperty(
         name="Vectors",
         description="Vector attribute on faces, points or corners that the field follows",
-        search=lambda self, context, typed: _mesh_item_names(context, "attributes"),
+        search=_search_attributes,
     )
     axis: bpy.props.FloatVectorProperty(
         name="Axis",

@@ -19,7 +19,7 @@ class ROSY_OT_preset_apply(bpy.types.Operator):
     preset: bpy.props.StringProperty(
         name="Preset",
         description="Name of a preset, or path of a .json file",
-        search=lambda self, context, typed: preset_library.preset_keys(),
+        search=preset_library.search_presets,
         search_options={"SUGGESTION"},
     )
 

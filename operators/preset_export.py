@@ -24,9 +24,7 @@ class ROSY_OT_preset_export(bpy.types.Operator, ExportHelper):
 
     filename_ext = ".json"
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
-    preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: preset_library.preset_keys(), **PRESET_ARGUMENTS
-    )
+    preset: bpy.props.StringProperty(search=preset_library.search_presets, **PRESET_ARGUMENTS)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.filepath = f"{Path(target_preset(self, context)).stem}.json"

@@ -20,9 +20,7 @@ class ROSY_OT_preset_remove(bpy.types.Operator):
     bl_label = "Delete Preset"
     bl_options = {"REGISTER"}
 
-    preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: preset_library.user_preset_keys(), **PRESET_ARGUMENTS
-    )
+    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

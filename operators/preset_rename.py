@@ -26,9 +26,7 @@ class ROSY_OT_preset_rename(bpy.types.Operator):
     bl_label = "Rename Preset"
     bl_options = {"REGISTER"}
 
-    preset: bpy.props.StringProperty(
-        search=lambda self, context, typed: preset_library.user_preset_keys(), **PRESET_ARGUMENTS
-    )
+    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
     name: bpy.props.StringProperty(
         name="Name", description="New name of the preset", maxlen=MAX_NAME_LENGTH
     )

@@ -19,7 +19,7 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         name="Preset",
         description="Initial look of a scene: the name of a preset, or the path of a preset file. "
         "Empty: the default look",
-        search=lambda self, context, typed: preset_library.preset_keys(),
+        search=preset_library.search_presets,
         search_options={"SUGGESTION"},
     )
     directory: bpy.props.StringProperty(

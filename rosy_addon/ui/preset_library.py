@@ -130,6 +130,16 @@ def preset_name(key: str) -> str:
     return key if entry is None else entry.preset.name
 
 
+def search_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
+    """Return the keys of all presets, for the search of a text property."""
+    return preset_keys()
+
+
+def search_user_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
+    """Return the keys of the user's own presets, for the search of a text property."""
+    return user_preset_keys()
+
+
 def active_entry(settings: Any) -> PresetEntry | None:
     """Return the preset that the look of ``scene.rosy`` was taken from; None if it is not found."""
     return entries().get(settings.preset_name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import sys
 import typing
 
 import numpy as np
@@ -35,3 +36,23 @@ def test_blender_can_read_the_properties_of_every_operator():
         # Blender does the same when it registers a class. It prints errors and goes on.
         assert set(inspect.get_annotations(cls)) <= set(typing.get_type_hints(cls))
     assert classes
+
+
+def test_callbacks_of_properties_see_the_names_of_their_module():
+    """A function that is written inside an annotation does not."""
+    modules = importlib.import_module("rosy.operators").MODULES
+    modules += tuple(
+        importlib.import_module(f"rosy.rosy_addon.ui.{name}")
+        for name in ("properties", "preferences")
+    )
+    callbacks = [
+        value
+        for module in modules
+        for cls in module.CLASSES
+        for hint in typing.get_type_hints(cls).values()
+        for value in getattr(hint, "keywords", {}).values()
+        if inspect.isfunction(value)
+    ]
+    assert len(callbacks) > 5
+    for callback in callbacks:
+        assert callback.__globals__ is vars(sys.modules[callback.__module__]), callback

@@ -29,6 +29,7 @@ from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
 from .render.renderer import Renderer
 from .render.view_input import ViewInput
+from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
@@ -175,6 +176,8 @@ def bake_animation_task(
             sequence_results.append(
                 SequenceResult(name, rendered, skipped, sequence, tuple(warnings))
             )
+        if show:
+            update_backdrops(scene)
         return sequence_results
     finally:
         exit_stack.close()

@@ -10,6 +10,7 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
+from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.cameras import CameraSource, render_camera
 from .scene.look_properties import read_look
@@ -93,10 +94,12 @@ def bake_task(
         rendered_views.append(RenderedView(picture, view.camera, drawn_from))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.97, "applying the pictures")
-    return [
+    results = [
         apply_picture(scene, scene_views.scene_data, rendered_view, settings)
         for rendered_view in rendered_views
     ]
+    update_backdrops(scene)
+    return results
 
 
 def bake(

@@ -25,7 +25,7 @@ from ..projection.surface_tone import SurfaceTone
 from .evaluated_field import FieldLayout, read_evaluated_field
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import evaluated_mesh, mesh_surface, read_attribute
-from .owned_data import user_modifiers
+from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .scene_reader import is_field_enabled, lost_field_error, temp_attributes
 from .tone_inputs import ToneRequest, read_tone, tone_image_key
@@ -168,7 +168,7 @@ class SceneCache:
                 continue
             owner = obj.original
             draws_field = has_field(owner) and is_field_enabled(owner)
-            if not draws_field and not include_occluders:
+            if not draws_field and (not include_occluders or owner.get(OWNED_TAG)):
                 continue
             mesh_state = self._read_cached(obj, owner, nonfinite, draws_field)
             if mesh_state is None:

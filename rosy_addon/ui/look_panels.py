@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..compositor.look import Look
+from ..compositor.look import Look, is_hatched
 from ..errors import as_sentence
 from ..settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
@@ -30,6 +30,7 @@ OUTPUT_SETTINGS = (
     "placement",
     "emission",
     "diffuse",
+    "backdrop",
     "store",
     "directory",
     "image_format",
@@ -139,7 +140,9 @@ def _make_settings_panel(
             if name == "tone":
                 _draw_tone_source(column, context)
         for name in names:
-            column.prop(settings, name)
+            row = column.row()
+            row.active = name != "backdrop" or is_hatched(settings.look)
+            row.prop(settings, name)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 

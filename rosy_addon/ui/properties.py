@@ -12,6 +12,7 @@ from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..presets.store import DEFAULT_KEY
+from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
@@ -210,6 +211,10 @@ class RosyStrokes(bpy.types.PropertyGroup):
     }
 
 
+def _show_backdrops(settings: RosyScene, _context: bpy.types.Context) -> None:
+    update_backdrops(settings.id_data)
+
+
 class RosyScene(bpy.types.PropertyGroup):
     """How the fields of a scene are drawn, and the baked pictures."""
 
@@ -271,6 +276,11 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Format",
         description="Bit depth and file format of the picture",
         items=IMAGE_FORMAT_ITEMS,
+    )
+    backdrop: bpy.props.BoolProperty(
+        name="Backdrop",
+        description="Fill the background of cameras that have pictures with the paper of the hatching",
+        update=_show_backdrops,
     )
     device: bpy.props.EnumProperty(
         name="Device", description="Device that draws the picture", items=DEVICE_ITEMS

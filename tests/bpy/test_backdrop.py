@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.color import from_hex, to_linear
 from rosy.rosy_addon.compositor.look import Look
@@ -12,6 +13,7 @@ from rosy.rosy_addon.scene.backdrop import frame_corners, update_backdrops
 from rosy.rosy_addon.scene.bake_records import remove_bakes
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.look_properties import apply_look
+from rosy.rosy_addon.scene.pictures import OutputSettings
 from scenes import contents, pixels, render
 
 PAPER = Look(ink="hatch", paper_colour="#c08040")
@@ -62,6 +64,13 @@ def test_the_switch_shows_and_hides_the_backdrop(hatched):
     remove_bakes(hatched)
     update_backdrops(hatched)
     assert contents() == before
+
+
+def test_animations_have_the_backdrop_of_the_active_camera(hatched, tmp_path):
+    hatched.rosy.backdrop = True
+    bake_animation(hatched, range(1, 2), settings=OutputSettings(folder=tmp_path))
+    (obj,) = backdrops()
+    assert obj.parent == hatched.camera
 
 
 def test_pictures_do_not_depend_on_the_backdrop(hatched):

@@ -219,7 +219,8 @@ def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
     def fail(*_, **__):
         raise MemoryError
 
-    monkeypatch.setattr(scene_cache_module, "read_evaluated_field", fail)
+    for reader in ("read_mesh_field", "read_evaluated_field"):
+        monkeypatch.setattr(scene_cache_module, reader, fail)
     scene_cache = SceneCache()
     assert read(scene_cache) == [] and "not enough memory" in scene_cache.errors["Suzanne"]
 

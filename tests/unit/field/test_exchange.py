@@ -179,7 +179,7 @@ DAMAGED = {
     "b.txt": ("1 2\n3 4\n", "has 2 numbers per row"),
     "c.txt": ("", "contains no numbers"),
     "d.txt": ("1 2 x\n", "d.txt:1: expected a number (part of a vector), found 'x'"),
-    "e.txt": ("1 2 3\n", "contains 1 row, but the mesh"),
+    "e.txt": ("1 2 3\n", "contains 1 row, but sphere has"),
     "f.npy": ("hello", "is not a valid .npy file"),
 }
 

@@ -818,6 +818,54 @@ def a_view_without_a_field_says_why_and_rests():
     check_nothing_is_left()
 
 
+def two_windows_with_two_scenes_rest():
+    """Two scenes share a mesh with modifiers, and have reference pictures of their own."""
+    yield from fresh_scene(levels=1)
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    first_scene, monkey = bpy.context.scene, bpy.data.objects["Suzanne"]
+    second_scene = bpy.data.scenes.new("Second")
+    second_scene.collection.objects.link(monkey)
+    image = bpy.data.images.new("gray", 8, 8)
+    for scene in (first_scene, second_scene):
+        scene.camera = None
+        scene.render.resolution_x = scene.render.resolution_y = 64
+        camera = add_camera("Camera", (0.0, -6.0, 1.0), (math.radians(80), 0.0, 0.0))
+        if camera.name not in scene.objects:
+            scene.collection.objects.link(camera)
+        scene.camera = camera
+        path = str(SHOTS / f"tone {scene.name}.png")
+        image.filepath_raw, image.file_format = path, "PNG"
+        image.save()
+        scene.rosy.look.ink, scene.rosy.look.tone = "hatch", "picture"
+        scene.rosy.tone_picture = path
+    switch("ON")
+    with in_view():
+        bpy.ops.wm.window_new_main()
+    yield 0.5
+    window = bpy.context.window_manager.windows[-1]
+    window.scene = second_scene
+    area = max(window.screen.areas, key=lambda area: area.width * area.height)
+    area.type = "VIEW_3D"
+    yield 0.3
+    session_module().start(area.spaces.active)
+    yield from wait_for_final_pictures()
+    yield 1.0
+    load = yield from load_at_rest()
+    print(f"two windows at rest: {100 * load:.1f} %")
+    layers = session_module()._session.layers._layers
+    drawn = {key[0]: [entry.owner for entry in layer.instances] for key, layer in layers.items()}
+    assert drawn == {first_scene.name: [monkey], "Second": [monkey]}, drawn
+    assert load < REST_LOAD
+    with bpy.context.temp_override(window=window):
+        bpy.ops.wm.window_close()
+    for scene in (first_scene, second_scene):
+        os.remove(scene.rosy.tone_picture)
+    bpy.context.preferences.system.viewport_aa = "8"
+    session_module().stop()
+    yield 0.5
+    check_nothing_is_left()
+
+
 def every_long_step_is_named_before_it_begins():
     """The start of a live view is done in short redraws, and the view says what is being done."""
     yield from fresh_scene(levels=4)
@@ -1035,6 +1083,7 @@ STEPS = (
     fallback_to_the_processor,
     bad_fields_are_named,
     a_view_without_a_field_says_why_and_rests,
+    two_windows_with_two_scenes_rest,
     every_long_step_is_named_before_it_begins,
     the_first_field_is_shown,
     live_views_are_remembered,

@@ -9,8 +9,9 @@ from shapes import from_triangles, icosphere, plane, torus
 from rosy_addon.field.analysis import angle_errors, dirichlet_energy, error_statistics
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.frames import normalize
-from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import describe_fields
 
 
 def rotating_field(surface, degree, rate):
@@ -69,3 +70,16 @@ def test_errors_are_angles_to_the_nearest_member(degree, error_of):
     assert np.isnan(partial[:10]).all() and np.isfinite(partial[10:]).all()
     assert np.isclose(error_statistics(ball, partial)["compared"], 1 - 10 / ball.face_count)
     assert "cannot be compared" in error_of(angle_errors, ball, field, axis_field(ball, 12))
+
+
+def test_fields_are_described():
+    """A smoothest 4-RoSy on a sphere has 8 singularities; two faces are undefined."""
+    sphere = icosphere(3)
+    field = generate(sphere, GeneratorSettings("smoothest"), 4)
+    assert describe_fields([(sphere, field)], count_singularities=True) == "8 singularities"
+    assert describe_fields([(sphere, field)], count_singularities=False) == ""
+    vectors = field.vectors.copy()
+    vectors[[3, 70]] = 0
+    fields = [(sphere, field), (sphere, RosyField(4, vectors))]
+    note = describe_fields(fields, count_singularities=False)
+    assert note == "2 faces without a direction"

@@ -1200,6 +1200,19 @@ def test_meshes_stay_on_the_card(device):
     assert not card.resources.texture_count
 
 
+def test_nothing_is_compiled_or_sent_after_the_preparation(device):
+    card = GpuRenderer(device)
+    instance = ball(4)
+    labels = [progress.label for progress in card.prepare_task([instance], "smooth")]
+    assert any("preparing the mesh" in label for label in labels)
+    (mesh,), programs = card.resources.meshes, dict(device._programs)
+    assert set(programs) >= {shader.name for shader in passes.ALL_PASSES}
+    items = card.upload([instance], "smooth")
+    render_texture(card, items, view(), LOOK)
+    assert items[0].mesh is mesh and device._programs == programs
+    assert not list(card.prepare_task([instance], "smooth"))
+
+
 def test_cameras_of_odd_sizes(card):
     for size in ((1, 1), (3, 200), (200, 3), (257, 129)):
         camera = view(size)

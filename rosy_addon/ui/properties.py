@@ -302,7 +302,7 @@ class RosyScene(bpy.types.PropertyGroup):
         options=path_property_options(),
     )
     remember_live: bpy.props.BoolProperty(
-        name="Remember in the File",
+        name="Remember in File",
         description="Save which views are live with the file, and show them again when it is opened",
     )
     live_views: bpy.props.StringProperty(

@@ -146,6 +146,8 @@ def _draw_dots() -> None:
         positions = _offset_points(obj, singularities)
         for sign, fill_color in COLOR_BY_SIGN.items():
             points = positions[np.sign(singularities.index) == sign]
+            if not len(points):  # Blender makes no batch without vertices
+                continue
             # The outline first, slightly behind the dot.
             for radius, depth_offset, color in (
                 (DOT_DIAMETER / 2 + 2, DOT_DIAMETER / 2, OUTLINE_COLOR),

@@ -163,6 +163,19 @@ def singularities_as_dots():
     assert np.abs(count_dots("panel-7-hidden") - without).max() < 100
 
 
+def no_singularities_to_show():
+    """The overlay of a field without singularities draws nothing, and prints no error."""
+    yield from fresh_scene()
+    with in_view():
+        bpy.ops.mesh.primitive_plane_add()
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="axis", degree=4, axis=(1, 0, 0))
+        assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
+    overlay = rosy("rosy_addon.ui.overlay")
+    shown = overlay.is_shown(bpy.context.object.name)
+    yield from save_screenshot("panel-8-none")
+    assert shown
+
+
 def count_dots(name):
     """Return how many pixels of the 3D view in a screenshot are orange and blue like dots."""
     image = bpy.data.images.load(str(SHOTS / f"window-{name}.png"))
@@ -509,6 +522,7 @@ run_steps(
     panel_without_field,
     panel_with_field,
     singularities_as_dots,
+    no_singularities_to_show,
     bake_with_progress,
     panel_with_picture,
     panel_out_of_date,

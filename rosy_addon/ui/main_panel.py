@@ -120,7 +120,7 @@ def _draw_picture_section(
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
     _redraw_later(MESH_STATES.seconds_to_wait())
     for bake in bake_infos:
-        _draw_bake_info(layout, bake, several=len(bake_infos) > 1)
+        _draw_bake_info(layout, context, bake, several=len(bake_infos) > 1)
     if objects:
         layout.prop(context.scene.rosy, "camera")
         if len(objects) > 1:
@@ -163,7 +163,9 @@ def draw_overlay_popover(popover: bpy.types.Menu, context: bpy.types.Context) ->
     _draw_live_toggle(popover.layout, context)
 
 
-def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -> None:
+def _draw_bake_info(
+    layout: bpy.types.UILayout, context: bpy.types.Context, bake: BakeInfo, several: bool
+) -> None:
     box = layout.box().column(align=True)
     box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
     row = box.row()
@@ -175,11 +177,10 @@ def _draw_bake_info(layout: bpy.types.UILayout, bake: BakeInfo, several: bool) -
     elif several:
         row.operator("rosy.show", text="Show").camera = bake.camera
     if bake.stale_reason:
-        box.label(text="Out of date:", icon="ERROR")
-        box.label(text=bake.stale_reason)
+        draw_wrapped(box, context, [f"Out of date: {bake.stale_reason}"], "ERROR")
     elif bake.unknown_reason:
-        box.label(text="Not known to be up to date:", icon="QUESTION")
-        box.label(text=bake.unknown_reason)
+        reason = f"Not known to be up to date: {bake.unknown_reason}"
+        draw_wrapped(box, context, [reason], "QUESTION")
     elif bake.frame_range:
         box.label(text="Up to date at this frame", icon="CHECKMARK")
     else:

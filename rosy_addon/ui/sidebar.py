@@ -33,15 +33,20 @@ def use_property_columns(layout: bpy.types.UILayout) -> None:
 
 
 def draw_wrapped(
-    layout: bpy.types.UILayout, context: bpy.types.Context, messages: Sequence[str]
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    messages: Sequence[str],
+    icon: str = "INFO",
 ) -> None:
-    """Draw messages, each in as many lines as the width of the region needs."""
+    """Draw messages as sentences, each in as many lines as the width of the region needs."""
     width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
     for message in messages:
         column = layout.column(align=True)
-        rows = textwrap.wrap(message, max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS))
+        rows = textwrap.wrap(
+            as_sentence(message), max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS)
+        )
         for index, row in enumerate(rows):
-            column.label(text=row, icon="BLANK1" if index else "INFO")
+            column.label(text=row, icon="BLANK1" if index else icon)
 
 
 def draw_progress(layout: bpy.types.UILayout) -> None:

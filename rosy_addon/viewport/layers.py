@@ -156,7 +156,9 @@ class LayerStates:
         bool
             Whether everything was read.
         """
-        self._is_resolving, deadline = True, time.monotonic() + SLICE_SECONDS
+        deadline = time.monotonic() + SLICE_SECONDS
+        _evaluate_windows()  # notes the changes of the user; the others are temporary attributes
+        self._is_resolving = True
         try:
             for window in bpy.context.window_manager.windows:
                 layer = self.get(window.scene, window.view_layer)
@@ -172,11 +174,12 @@ class LayerStates:
                     return False
             return True
         finally:
-            self._flush_own_changes()
+            _evaluate_windows()
             self._is_resolving = False
 
-    def _flush_own_changes(self) -> None:
-        """Evaluate all windows, so that no temporary attribute is taken for a change later."""
-        for window in bpy.context.window_manager.windows:
-            with bpy.context.temp_override(window=window):
-                bpy.context.evaluated_depsgraph_get()
+
+def _evaluate_windows() -> None:
+    """Evaluate the scenes of all windows, so that handlers are told of all changes so far."""
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):
+            bpy.context.evaluated_depsgraph_get()

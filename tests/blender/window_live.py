@@ -818,6 +818,22 @@ def a_view_without_a_field_says_why_and_rests():
     check_nothing_is_left()
 
 
+def changes_before_a_resolving_are_noted():
+    """Meshes are read in a timer, which evaluates the scene. A change just before must not be lost."""
+    yield from fresh_scene(levels=0)
+    switch("ON")
+    yield from wait_for_final_pictures()
+    steps = _remeshed(bpy.data.objects["Suzanne"])
+    next(steps)
+    session_module()._session._resolve_topologies()
+    yield from wait_until(messages)
+    next(steps, None)
+    session_module()._session._resolve_topologies()
+    yield from wait_until(lambda: not messages())
+    switch("OFF")
+    yield 0.3
+
+
 def two_windows_with_two_scenes_rest():
     """Two scenes share a mesh with modifiers, and have reference pictures of their own."""
     yield from fresh_scene(levels=1)
@@ -1080,6 +1096,7 @@ STEPS = (
     fallback_to_the_processor,
     bad_fields_are_named,
     a_view_without_a_field_says_why_and_rests,
+    changes_before_a_resolving_are_noted,
     two_windows_with_two_scenes_rest,
     every_long_step_is_named_before_it_begins,
     the_first_field_is_shown,

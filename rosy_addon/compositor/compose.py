@@ -23,10 +23,11 @@ from .hatching import (
 )
 from .image_noise import NOISE_MEAN
 from .lic import METHODS, lic_task
-from .lic_images import LicImages, relative_magnitude
+from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
+from .per_pixel_lic import pixel_blocks
 from .picture import DegreeLayer, Picture
 from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
@@ -93,19 +94,26 @@ def compose_task(
         yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
         images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
-        yield Progress(stop, "drawing the ink")
         layer = _build_layer(field, pixel_look, images)
-        entries = field.gbuffer_index
+        part_look = (
+            with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
+        )
+        tone = modulation = None
         if is_hatched(look):
-            tone = np.clip(tone_rgb[entries].mean(axis=1), 0, 1)
+            tone = np.clip(tone_rgb[field.gbuffer_index].mean(axis=1), 0, 1)
             modulation = yield from subtask(
                 _line_modulation_task(stages, field, pixel_look, tone), stop, stop
             )
-            color[entries], alpha[entries] = render_hatching(
-                field, images, pixel_look, tone, modulation
-            )
-        else:
-            color[entries] = _colorize(field, layer, pixel_look)
+        for block in pixel_blocks(len(field.pixel)):
+            yield Progress(stop, "drawing the ink")
+            part, part_images = field.part(block), images.part(block)
+            entries = part.gbuffer_index
+            if modulation is None:
+                color[entries] = _colorize(part, part_images, layer.tone[block], part_look)
+            else:
+                color[entries], alpha[entries] = render_hatching(
+                    part, part_images, part_look, tone[block], modulation.part(block)
+                )
         layers.append(layer)
     if not is_hatched(look):
         color *= tone_rgb
@@ -158,7 +166,7 @@ def compose_planar(
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = replace(look, supersampling=1)
     layer = _build_layer(field, look, run_to_completion(lic_task(field, look, noise)))
-    color = _colorize(field, layer, look)
+    color = _colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
     return Picture(
         _resolve_pixels(field.pixel, color, opaque, field.width, field.height, 1), (layer,)
@@ -217,16 +225,19 @@ def _build_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLaye
     return DegreeLayer(field.degree, field.pixel, images, tone)
 
 
-def _colorize(field: PixelField, layer: DegreeLayer, look: Look) -> np.ndarray:
-    """(P, 3) or (P, 1) linear colors of a layer: gray, or colored by magnitude or by family."""
+def _colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
+    """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude or by family.
+
+    (P, K) `tone` is that of `DegreeLayer`.
+    """
     hue = None
     if colors_magnitude(look):
         hue = map_colors(relative_magnitude(field, look), look.colour_map)
     elif look.hue == "families":
-        hue = family_hues(field, layer.images, look)
+        hue = family_hues(field, images, look)
     if hue is None:
-        return to_linear(layer.tone)
-    return to_linear(hue * (1 + COLOR_CONTRAST * (layer.tone - NOISE_MEAN)))
+        return to_linear(tone)
+    return to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
 
 
 def _resolve_pixels(

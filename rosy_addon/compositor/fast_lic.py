@@ -198,21 +198,12 @@ def _crop_rows(field: PixelField, extent: slice) -> PixelField:
     """The pixels of some rows. Streamlines end at the first and the last row."""
     if extent.stop - extent.start == len(field.pixel):
         return field
-    row = field.pixel[extent] // np.int32(field.width)
-    mask = field.neighbor_mask[extent].copy()
+    rows = field.part(extent)
+    row = rows.pixel // np.int32(field.width)
+    mask = rows.neighbor_mask.copy()
     mask[row == row[0]] &= ALL_NEIGHBORS << 3 & ALL_NEIGHBORS
     mask[row == row[-1]] &= ALL_NEIGHBORS >> 3
-    return replace(
-        field,
-        pixel=field.pixel[extent],
-        representation=field.representation[extent],
-        screen_jacobian=None if field.screen_jacobian is None else field.screen_jacobian[extent],
-        neighbor_mask=mask,
-        channels={channel: values[extent] for channel, values in field.channels.items()},
-        gbuffer_index=np.arange(len(field.pixel))[extent]
-        if isinstance(field.gbuffer_index, slice)
-        else field.gbuffer_index[extent],
-    )
+    return replace(rows, neighbor_mask=mask)
 
 
 class _LineAverages:

@@ -71,6 +71,16 @@ class LineModulation(NamedTuple):
     line_tones: np.ndarray | None = None
     outline: np.ndarray | None = None
 
+    def part(self, extent: slice) -> LineModulation:
+        """Return the modulation at some of the pixels."""
+        breaks, grain, tones, outline = self
+        return LineModulation(
+            None if breaks is None else breaks.part(extent),
+            None if grain is None else grain[:, extent],
+            None if tones is None else tones[:, extent],
+            None if outline is None else outline[extent],
+        )
+
 
 def render_hatching(
     field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation

@@ -42,6 +42,15 @@ class LicImages:
     effective_samples: np.ndarray
     first_set_weight: np.ndarray
 
+    def part(self, extent: slice) -> LicImages:
+        """Return the images at some of the pixels."""
+        return LicImages(
+            self.members[:, extent],
+            self.blend[extent],
+            self.effective_samples[extent],
+            self.first_set_weight[extent],
+        )
+
     def blended_with(self, other: LicImages, weight: np.ndarray) -> LicImages:
         """Blend with a second set of images, given the (P,) weight of this set, 0 to 1."""
         return replace(
@@ -114,7 +123,16 @@ def step_limits(field: PixelField, look: Look) -> np.ndarray | None:
 
 def relative_magnitude(field: PixelField, look: Look) -> np.ndarray:
     """(P,) float32: rho relative to `Look.magnitude_range`, at most 1."""
-    rho = np.abs(field.representation)
-    max_magnitude = look.magnitude_range or float(rho.max(initial=0.0)) or 1.0
-    limit = np.float32(max(max_magnitude, MIN_COMPONENT))
-    return np.minimum(rho, limit) / limit
+    limit = np.float32(with_magnitude_range(look, field).magnitude_range)
+    return np.minimum(np.abs(field.representation), limit) / limit
+
+
+def with_magnitude_range(look: Look, field: PixelField) -> Look:
+    """Return a look with the range of magnitudes of a field, if it has none of its own.
+
+    Parts of the field can then be drawn one by one.
+    """
+    largest = look.magnitude_range
+    if not largest:
+        largest = float(np.abs(field.representation).max(initial=0.0)) or 1.0
+    return replace(look, magnitude_range=max(largest, MIN_COMPONENT))

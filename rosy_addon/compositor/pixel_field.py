@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from functools import cached_property
 
@@ -80,6 +80,19 @@ class PixelField:
     def family_count(self) -> int:
         """Number of families of lines. 1 if the field does not distinguish its lines."""
         return next((number for kind, number in self.channels if kind == "family"), 1)
+
+    def part(self, extent: slice) -> PixelField:
+        """Return the field at some of the pixels. Its `neighbor_mask` is that of all pixels."""
+        index = self.gbuffer_index
+        return replace(
+            self,
+            pixel=self.pixel[extent],
+            representation=self.representation[extent],
+            screen_jacobian=None if self.screen_jacobian is None else self.screen_jacobian[extent],
+            neighbor_mask=self.neighbor_mask[extent],
+            channels={channel: values[extent] for channel, values in self.channels.items()},
+            gbuffer_index=extent if isinstance(index, slice) else index[extent],
+        )
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:
         """Compute the directions of the field that belong to members of the RoSy.

@@ -67,7 +67,7 @@ STEP_BYTES = 24
 STATISTICS_BYTES = 100_000_000
 
 #: Bytes of a visible sample while its color is computed: gray; colored; by magnitude; hatched.
-GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 135
+GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 50
 
 #: Bytes of a shadow map of a light, while it is made.
 SHADOW_MAP_BYTES = 110_000_000
@@ -171,6 +171,8 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     if has_overshoot(look):
         tones = 4 * (lines + 6) * visible
         lic = max(lic, images + tones + _sheets_bytes(view, look, coverage, lines, 3))
+    has_surface_grain = has_paper_grain(look) and look.anchor == "surface"
+    paper_grain = images + SURFACE_NOISE_BYTES * visible if has_surface_grain else 0
     # What LIC has freed is used again, if its arrays are small.
     kept = KEPT_FRACTION * lic if 8 * visible < MMAP_THRESHOLD_BYTES else 0
     # The rows without visible samples are never written to, so they take no memory.
@@ -182,6 +184,7 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
             gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles,
             gbuffer + shadow_maps,
             lic,
+            paper_grain,
             images + STATISTICS_BYTES,
             images + _color_bytes(look, lines, noise_channels) * visible,
             max(colored, kept) + sample_rows + downsampled,

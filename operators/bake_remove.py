@@ -5,7 +5,6 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.errors import counted
-from ..rosy_addon.scene.backdrop import update_backdrops
 from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from .poll import poll_idle
 
@@ -28,7 +27,6 @@ class ROSY_OT_remove(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         removed = remove_bakes(context.scene)
-        update_backdrops(context.scene)
         self.report(
             {"INFO"},
             f"Removed {counted(removed.images, 'picture')} from "

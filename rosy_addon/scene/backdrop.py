@@ -9,7 +9,7 @@ from mathutils import Matrix
 from ..color import from_hex, to_linear
 from ..compositor.look import is_hatched
 from ..projection.camera import Camera
-from .cameras import camera_of_object
+from .cameras import FRAME_CAMERAS, camera_of_object
 from .compat import has_nodes_by_default
 from .look_properties import read_look
 from .owned_data import delete_owned, rollback_on_error
@@ -51,7 +51,7 @@ def update_backdrops(scene: bpy.types.Scene) -> None:
     if not scene.rosy.backdrop or not is_hatched(look):
         return
     cameras = dict.fromkeys(
-        scene.camera if record.name == scene.name else scene.objects.get(record.name)
+        scene.camera if record.view == FRAME_CAMERAS else record.camera
         for record in scene.rosy.bakes
     )
     for camera in cameras:

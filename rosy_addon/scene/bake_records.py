@@ -17,7 +17,8 @@ import numpy as np
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..projection.camera import Camera
-from .cameras import CameraSource, frame_camera
+from .backdrop import update_backdrops
+from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
 from .look_properties import read_look
 from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
@@ -35,9 +36,6 @@ from .staleness import MESH_STATES, difference
 
 #: Prefix of the names of RoSy's images and materials. The name of the camera follows.
 NAME_PREFIX = "RoSy "
-
-#: In place of the view of a record: its frames are from the cameras that render them.
-FRAME_CAMERAS = "frame cameras"
 
 
 @dataclass(frozen=True)
@@ -371,7 +369,7 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 def remove_bakes(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None
 ) -> RemovalCounts:
-    """Remove baked pictures from a scene. Fields and files of saved pictures are kept.
+    """Remove baked pictures and their backdrops from a scene. Fields and saved files are kept.
 
     Parameters
     ----------
@@ -391,6 +389,7 @@ def remove_bakes(
         _clean_unused_meshes()
     needed = set() if objects is None else _needed_materials(set(found) - set(targets))
     images, materials = _remove_records(scene, needed)
+    update_backdrops(scene)
     unused = delete_unused()
     return RemovalCounts(
         len(targets),

@@ -12,6 +12,9 @@ from .libraries import check_object_type
 #: Camera name of pictures that are drawn from a 3D view.
 VIEW_NAME = "3D View"
 
+#: In place of the view of a record of pictures: its frames are from the cameras that render them.
+FRAME_CAMERAS = "frame cameras"
+
 #: The camera of a picture: a camera object of the scene, or a `Camera`, for example of a 3D view.
 CameraSource = bpy.types.Object | Camera
 

@@ -78,7 +78,7 @@ def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
     assert "rosy" in cube.data.attributes and "rosy" not in ball.data.attributes
     output = capfd.readouterr().out
     assert "Warning: Object 'Ball': has no border or sharp edge" in output
-    assert "on 6 faces" in output
+    assert "on 'Cube'" in output
 
 
 def test_generate_on_an_empty_mesh_names_it(scene):

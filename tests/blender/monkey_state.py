@@ -175,7 +175,8 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
         return
     state[f"{path}/basis"] = (
         obj.data and obj.data.name,
-        obj.parent and not is_owned(obj.parent) and obj.parent.name,
+        # An object that the user has parented to one of RoSy's loses that parent with it.
+        obj.parent.name if obj.parent and not is_owned(obj.parent) else None,
         None if obj.animation_data else _plain(obj.matrix_basis),
         _plain(obj.matrix_parent_inverse),
         obj.hide_render,

@@ -71,6 +71,8 @@ def follow_mesh(
         `vectors` itself if there is nothing to turn. Vectors that were changed since, by a script
         for example, stay as they are; see `carried_vectors` for others that do.
     """
+    if not _has_rest_shape(mesh, name):
+        return vectors
     rest_name, check_name = _attribute_names(name)
     stored_positions = read_attribute(mesh, rest_name, np.float32, 3)
     checks = read_attribute(mesh, check_name, np.float32, 1)
@@ -86,6 +88,16 @@ def follow_mesh(
     carried = carried_vectors(surface.in_rest_shape(), stored_positions, vectors)
     is_stored = is_stored.reshape(-1, *(1 for _ in vectors.shape[1:]))
     return np.where(is_stored, carried, vectors)
+
+
+def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
+    """Whether both attributes exist as they were stored. Users can convert them to other types."""
+    types = ("POINT", VECTOR_TYPE), ("FACE", ANGLE_TYPE)
+    attributes = (mesh.attributes.get(hidden) for hidden in _attribute_names(name))
+    return all(
+        attribute is not None and (attribute.domain, attribute.data_type) == expected
+        for attribute, expected in zip(attributes, types, strict=True)
+    )
 
 
 def _checks(vectors: np.ndarray) -> np.ndarray:

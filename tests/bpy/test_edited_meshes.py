@@ -144,6 +144,19 @@ def test_an_unchanged_mesh_reads_what_was_stored(scene, monkey):
     assert hidden == [".rosy_rest", ".rosy_check"]
 
 
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("change", ["remove", "convert"])
+def test_a_field_without_its_rest_shape_is_read_as_it_is(scene, monkey, index, change):
+    mesh, stored = monkey.data, member_vectors(monkey.data)
+    name = (".rosy_rest", ".rosy_check")[index]
+    mesh.attributes.remove(mesh.attributes[name])
+    if change == "convert":
+        mesh.attributes.new(name, "FLOAT_COLOR", ("POINT", "FACE")[index])
+    monkey.location.x = 1.0
+    apply_transform(monkey)
+    np.testing.assert_array_equal(read_mesh_field(mesh).vectors.astype("f4"), stored)
+
+
 @pytest.fixture
 def broken(scene, monkey):
     """A monkey whose field has lost its frame, and cannot be repaired, beside a good one."""

@@ -23,7 +23,7 @@ import numpy as np
 from .cache import Cache, content_hash
 from .compositor.look import Look
 from .errors import RosyError
-from .file_io import check_folder, check_writable, read_bytes, write_bytes
+from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
@@ -117,6 +117,7 @@ def bake_animation_task(
     if settings.folder is None:
         raise RosyError("frames need a folder: choose Output > Store > In a Folder")
     check_folder(settings.folder)
+    remove_leftovers(settings.folder)
     frames = list(frames)
     original_frame = scene.frame_current + scene.frame_subframe
     original_camera = scene.camera

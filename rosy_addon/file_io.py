@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import platform
+import re
 import secrets
 import stat
+import time
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +23,12 @@ HEAD_BYTES = 4096
 #: Bytes at the beginning of a text file in which words and lines are counted, and bytes of memory
 #: that each takes while the file is parsed.
 COUNTED_BYTES, WORD_MEMORY, LINE_MEMORY = 1 << 16, 110, 200
+
+#: Names of temporary files: the machine and the process that writes them, and a random number.
+TEMPORARY_NAME = re.compile(r"\.rosy-(?P<host>[0-9a-f]{8})-(?P<pid>\d{1,10})-[0-9a-f]{16}(\.\w+)?$")
+
+#: Age in seconds of a temporary file that nothing writes to any more.
+LEFTOVER_SECONDS = 24 * 3600
 
 
 def read_bytes(
@@ -145,7 +155,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     check_writable(path)
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".rosy-{secrets.token_hex(8)}{target.suffix}")
+    remove_leftovers(target.parent)
+    token = f"{_host_token()}-{os.getpid()}-{secrets.token_hex(8)}"
+    temporary = target.with_name(f".rosy-{token}{target.suffix}")
     try:
         yield temporary
         if target.exists():
@@ -156,6 +168,42 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise RosyError(f"{path}: cannot be written: {os_error_text(error)}") from error
         raise
+
+
+def remove_leftovers(folder: str | os.PathLike[str]) -> None:
+    """Delete the temporary files in a folder whose process was killed while it wrote them.
+
+    Those of processes that are running, or may run on another machine, are kept, unless they are
+    older than `LEFTOVER_SECONDS`.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            match = TEMPORARY_NAME.match(entry.name)
+            if match is None:
+                continue
+            with suppress(OSError):
+                age = time.time() - entry.stat(follow_symlinks=False).st_mtime
+                is_own_host = match["host"] == _host_token()
+                if age > LEFTOVER_SECONDS or (is_own_host and not _is_running(int(match["pid"]))):
+                    os.unlink(entry.path)
+
+
+def _host_token() -> str:
+    """Return a token of this machine."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _is_running(pid: int) -> bool:
+    """Whether a process of this machine is running, or may be."""
+    if os.name != "posix":
+        return True  # elsewhere the signal 0 ends a process
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:

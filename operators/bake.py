@@ -15,7 +15,7 @@ from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
 from .modal_task import ModalTaskMixin
 from .poll import poll_has_field
-from .reports import report_warning
+from .reports import report_warnings
 
 
 class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
@@ -42,8 +42,7 @@ class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: list[BakeResult]) -> None:
         names = ", ".join(f"'{picture.camera}'" for picture in result)
         self.report({"INFO"}, f"Baked from {names}")
-        for note in dict.fromkeys(note for picture in result for note in picture.warnings):
-            report_warning(self, note)
+        report_warnings(self, (text for picture in result for text in picture.warnings))
 
     def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:
         """Return the cameras to bake from: the operator's choice, by default the scene's."""

@@ -15,6 +15,7 @@ from ..rosy_addon.scene.pictures import output_folder, read_output_settings
 from ..rosy_addon.scene.scene_reader import field_objects
 from .modal_task import DialogTaskMixin
 from .poll import poll_has_field
+from .reports import report_warnings
 
 
 class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
@@ -95,8 +96,7 @@ class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
                 {"INFO"},
                 f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
             )
-        for warning in dict.fromkeys(text for sequence in result for text in sequence.warnings):
-            self.report({"WARNING"}, warning)
+        report_warnings(self, (text for sequence in result for text in sequence.warnings))
 
 
 CLASSES = (ROSY_OT_bake_animation,)

@@ -13,6 +13,7 @@ from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.scene.write_field import assign_fields
 from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
+from .reports import report_warning
 
 
 def selected_mesh_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -110,9 +111,9 @@ def store_fields(
     try:
         apply_preferences(context)
     except RosyError as error:
-        operator.report({"WARNING"}, f"RoSy's preferences: {error}")
+        report_warning(operator, f"RoSy's preferences: {error}")
     if is_first:
         try:
             live_views.start_with_first_field(context)
         except RosyError as error:
-            operator.report({"WARNING"}, f"no live view: {error}")
+            report_warning(operator, f"no live view: {error}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 
 from ..rosy_addon.errors import as_sentence, error_text
@@ -16,3 +18,9 @@ def report_error(operator: bpy.types.Operator, error: Exception) -> set[str]:
 def report_warning(operator: bpy.types.Operator, message: str) -> None:
     """Report what the user should know about a result."""
     operator.report({"WARNING"}, as_sentence(message))
+
+
+def report_warnings(operator: bpy.types.Operator, messages: Iterable[str]) -> None:
+    """Report each of several messages once."""
+    for message in dict.fromkeys(messages):
+        report_warning(operator, message)

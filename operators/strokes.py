@@ -21,7 +21,7 @@ from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from .bake import view_camera
 from .modal_task import DialogTaskMixin
 from .poll import poll_has_field, poll_idle, sync_suffix
-from .reports import report_warning
+from .reports import report_warnings
 
 
 class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
@@ -116,8 +116,7 @@ class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
             {"INFO"},
             f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
         )
-        for note in result.notes:
-            report_warning(self, note)
+        report_warnings(self, result.notes)
 
     def _kind(self, context: bpy.types.Context) -> str:
         """Return what to make: the operator's choice, by default the scene's."""

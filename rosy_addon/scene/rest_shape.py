@@ -40,13 +40,13 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
     vectors = read_attribute(mesh, name, np.float32, 3)
     positions = read_attribute(mesh, "position", np.float32, 3)
     try:
-        rest = get_or_create_attribute(mesh, rest_name, VECTOR_TYPE, "POINT")
-        check = get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
+        get_or_create_attribute(mesh, rest_name, VECTOR_TYPE, "POINT")
+        get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
     except RosyError:
         return
-    rest.data.foreach_set("vector", positions.ravel())
-    check = mesh.attributes[check_name]  # the new attribute may have moved the others
-    check.data.foreach_set("value", _checks(vectors).astype(np.float32))
+    # Only now: a new attribute may move the others in memory.
+    mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
+    mesh.attributes[check_name].data.foreach_set("value", _checks(vectors).astype(np.float32))
 
 
 def follow_mesh(

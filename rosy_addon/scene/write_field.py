@@ -121,9 +121,9 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
         attribute = get_or_create_attribute(mesh, name, VECTOR_TYPE)
         attribute.data.foreach_set("vector", field.vectors.astype(np.float32).ravel())
     if attribute.data_type == VECTOR_TYPE:
-        attribute_name = attribute.name
-        store_rest_shape(mesh, attribute_name)
-        attribute = mesh.attributes[attribute_name]  # new attributes may have moved it
+        stored_name = attribute.name
+        store_rest_shape(mesh, stored_name)
+        attribute = mesh.attributes[stored_name]  # new attributes may have moved it
     if has_rosy_properties():
         mesh.rosy.degree = field.degree
         if attribute.name == name:

@@ -99,6 +99,7 @@ def surface_noise_task(
         With the mean `NOISE_MEAN`, as for `image_noise`.
     """
     rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.3)
+    units = instance_units(gbuffer, pixel)
     instance_hash = instance_hashes(gbuffer.instance_names)
     # The variance of a mean along a streamline is proportional to the size of cells. The factor
     # keeps it at that of cells of the size `grain`.
@@ -107,11 +108,12 @@ def surface_noise_task(
     for block in pixel_blocks(len(gbuffer.pixel)):
         yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), "making noise")
         block_rest = rest.block(block)
-        scale = cell_scale(gbuffer, block, block_rest.pixel_size, pixel, smallest / grain)
+        instance_id = gbuffer.instance_id[block]
+        scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
         size = np.maximum(block_rest.pixel_size * scale, 1e-30)
         level = np.log2(size * np.float32(grain * LATTICE_SCALE))
         lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
-        block_hash = instance_hash[gbuffer.instance_id[block]]
+        block_hash = instance_hash[instance_id]
         _accumulate_octaves(total[:, block], lattice, level, block_hash, seed, density)
         total[:, block] *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     if high_pass:
@@ -119,37 +121,50 @@ def surface_noise_task(
     return np.ascontiguousarray(total.T) + np.float32(NOISE_MEAN)
 
 
-def cell_scale(
-    gbuffer: GBuffer, pixels: slice, size: np.ndarray, pixel_size: float, min_scale: float
-) -> np.ndarray | np.float32:
-    """Compute the factor by which lengths on screen differ from their values in pixels.
+def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
+    """Return the unit of lengths in the object space of each mesh instance.
 
     Parameters
     ----------
     gbuffer : GBuffer
         With its mesh instances.
-    pixels : slice
-        The n pixels to compute it for.
+    unit : float
+        In Blender units. It replaces a pixel as the unit of lengths; 0 keeps pixels.
+
+    Returns
+    -------
+    (B,) float32 ndarray, or None if `unit` is 0
+    """
+    if not unit:
+        return None
+    return np.array(
+        [unit / matrix_scale(instance.matrix) for instance in gbuffer.instances], dtype=np.float32
+    )
+
+
+def cell_scale(
+    units: np.ndarray | None, instance_id: np.ndarray, size: np.ndarray, min_scale: float
+) -> np.ndarray | np.float32:
+    """Compute the factor by which lengths on screen differ from their values in pixels.
+
+    Parameters
+    ----------
+    units : (B,) float32 ndarray or None
+        From `instance_units`.
+    instance_id : (n,) int ndarray
+        The mesh instances of n pixels.
     size : (n,) float32 ndarray
         `RestCoordinates.pixel_size` of these pixels.
-    pixel_size : float
-        Size in Blender units that replaces a pixel as the unit of lengths. 0 keeps pixels.
     min_scale : float
         Lower bound of the factor.
 
     Returns
     -------
-    (n,) float32 ndarray, or 1 if `pixel_size` is 0
+    (n,) float32 ndarray, or 1 if lengths are in pixels
     """
-    if not pixel_size:
+    if units is None:
         return np.float32(1)
-    instance_scale = np.array(
-        [pixel_size / matrix_scale(instance.matrix) for instance in gbuffer.instances],
-        dtype=np.float32,
-    )
-    return np.maximum(
-        instance_scale[gbuffer.instance_id[pixels]] / np.maximum(size, 1e-30), np.float32(min_scale)
-    )
+    return np.maximum(units[instance_id] / np.maximum(size, 1e-30), np.float32(min_scale))
 
 
 def _accumulate_octaves(

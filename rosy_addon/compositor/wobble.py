@@ -15,11 +15,11 @@ import numpy as np
 from ..deterministic_trig import cos_sin, unit_phasor
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.rest_coordinates import RestCoordinates, rest_coordinates_task
+from ..projection.rest_coordinates import rest_coordinates_task
 from .look import Look, is_hatched
 from .look_units import cell_size_args
 from .pixel_field import PixelField
-from .surface_noise import cell_scale
+from .surface_noise import cell_scale, instance_units
 
 #: Number of plane waves in the sum.
 WAVE_COUNT = 7
@@ -83,8 +83,9 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     """
     count = len(gbuffer.pixel)
     wavelength = np.float32(look.grain * MEAN_WAVELENGTH_GRAINS)
-    rest = None
+    cell_size, rest = cell_size_args(look), None
     if look.anchor == "surface":
+        units = instance_units(gbuffer, cell_size["pixel"])
         rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.5)
     angle = np.empty(count, dtype=np.float32)
     for start in range(0, count, BLOCK_PIXELS):
@@ -95,20 +96,13 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
             position = np.stack([column, row, 0 * row]).astype(np.float32)
             size = np.ones(len(row), dtype=np.float32)
         else:
-            position, size = _rest_position(gbuffer, block, rest.block(block), look)
+            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.grain
+            instance_id = gbuffer.instance_id[block]
+            scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
+            position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
         level = np.log2(np.maximum(size, 1e-30) * wavelength)
         angle[block] = _wave_sum(position, level)
     return np.float32(WOBBLE_STD) * angle
-
-
-def _rest_position(
-    gbuffer: GBuffer, pixels: slice, rest: RestCoordinates, look: Look
-) -> tuple[np.ndarray, np.ndarray]:
-    """(3, n) float32 positions of n pixels on the rest shapes, and (n,) sizes of pixels there."""
-    cell_size = cell_size_args(look)
-    min_scale = cell_size["smallest"] / look.grain
-    scale = cell_scale(gbuffer, pixels, rest.pixel_size, cell_size["pixel"], min_scale)
-    return rest.at_offset(0, 0), rest.pixel_size * scale
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:

@@ -19,7 +19,7 @@ from .frame import Frame
 from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
 
 #: Label of all steps of this stage.
-STEP_LABEL = "drawing noise"
+STEP_LABEL = "making noise"
 
 
 def noise_task(frame: Frame) -> Task[None]:

@@ -31,5 +31,5 @@ def unregister() -> None:
     operators.unregister()
     ui.unregister()
     cache.BAKE_CACHE.clear()
-    staleness.MESH_STATES.clear()
+    staleness.SCENE_STATES.clear()
     device.release()

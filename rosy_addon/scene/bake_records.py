@@ -32,7 +32,7 @@ from .picture_nodes import (
 )
 from .picture_state import PictureState, SceneState
 from .read_view import scene_depsgraph
-from .staleness import MESH_STATES, difference
+from .staleness import SCENE_STATES, difference
 
 #: Prefix of the names of RoSy's images and materials. The name of the camera follows.
 NAME_PREFIX = "RoSy "
@@ -235,7 +235,7 @@ def list_bakes(
         material for obj in baked_objects(scene) for material in _shown_materials(obj)
     }
     if for_panel and not recorded:
-        MESH_STATES.clear()
+        SCENE_STATES.clear()
     reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
     infos = []
     for record in recorded:
@@ -271,7 +271,7 @@ class _PresentReasons:
         self.automatic_device = automatic_device
         self.depsgraph = scene_depsgraph(scene)
         self.scene_state = (
-            MESH_STATES.get(scene, self.depsgraph)
+            SCENE_STATES.get(scene, self.depsgraph)
             if for_panel
             else SceneState(scene, self.depsgraph)
         )
@@ -341,14 +341,14 @@ def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
     Objects of collections that the scene instances are included.
     """
+    baked = [
+        obj for obj in bpy.data.objects if removable_modifiers(obj) or has_applied_picture(obj.data)
+    ]
+    if not baked:  # as at most redraws of a panel before the first bake
+        return []
     own = _reached_objects(scene)
     others = {obj for other in bpy.data.scenes if other != scene for obj in _reached_objects(other)}
-    return [
-        obj
-        for obj in bpy.data.objects
-        if (obj in own or obj not in others)
-        and (removable_modifiers(obj) or has_applied_picture(obj.data))
-    ]
+    return [obj for obj in baked if obj in own or obj not in others]
 
 
 def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
@@ -433,9 +433,11 @@ def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
     )
     if is_editing:
         bpy.ops.object.mode_set(mode="OBJECT")
-    yield
-    if is_editing:
-        bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        yield
+    finally:
+        if is_editing:
+            bpy.ops.object.mode_set(mode="EDIT")
 
 
 def _needed_materials(objects: set[bpy.types.Object]) -> set[bpy.types.Material]:

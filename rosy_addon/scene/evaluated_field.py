@@ -53,6 +53,10 @@ class FieldLayout:
         indices = range(self.degree if self.has_deviations else 0)
         return [self.name, *(f"{self.name}_{index}" for index in indices)]
 
+    def is_on(self, mesh: bpy.types.Mesh) -> bool:
+        """Return whether an evaluated mesh has all attributes; modifiers may have lost them."""
+        return all(name in mesh.attributes for name in self.attribute_names)
+
 
 def add_temp_field(mesh: bpy.types.Mesh, field: RosyField, name: str) -> FieldLayout:
     """Store a field in temporary attributes on the faces of a mesh, and return their layout."""

@@ -82,7 +82,7 @@ def mesh_surface(
             if occluder_only
             else read_attribute(mesh, "sharp_face", bool, 1)
         ),
-        "corner_normal": _read_collection(mesh.corner_normals, "vector", np.float32, 3),
+        "corner_normal": read_collection(mesh.corner_normals, "vector", np.float32, 3),
         "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
     }
 
@@ -119,7 +119,7 @@ def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
         is_smooth = sharp_faces is None or not sharp_faces.any()
         parts += [_sharp_edges(mesh), None if is_smooth else sharp_faces]
         if mesh.has_custom_normals:
-            parts.append(_read_collection(mesh.corner_normals, "vector", np.float32, 3))
+            parts.append(read_collection(mesh.corner_normals, "vector", np.float32, 3))
     return content_hash(*parts)
 
 
@@ -183,7 +183,7 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
     if attribute is None or not len(attribute.data):  # in edit mode, attributes are empty
         return None
     key = "vector" if attribute.data_type in ("FLOAT_VECTOR", "FLOAT2") else "value"
-    return _read_collection(attribute.data, key, dtype, columns)
+    return read_collection(attribute.data, key, dtype, columns)
 
 
 def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -206,8 +206,8 @@ def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     if not len(mesh.loop_triangles):
         return {}
     return {
-        "triangles": _read_collection(mesh.loop_triangles, "loops", np.int32, 3),
-        "triangle_face": _read_collection(mesh.loop_triangle_polygons, "value", np.int32),
+        "triangles": read_collection(mesh.loop_triangles, "loops", np.int32, 3),
+        "triangle_face": read_collection(mesh.loop_triangle_polygons, "value", np.int32),
     }
 
 
@@ -249,11 +249,11 @@ def _attribute_or_collection(
     """
     values = read_attribute(mesh, attribute, dtype, columns)
     if values is None or len(values) != len(collection):
-        return _read_collection(collection, key, dtype, columns)
+        return read_collection(collection, key, dtype, columns)
     return values
 
 
-def _read_collection(
+def read_collection(
     collection: bpy.types.bpy_prop_collection, key: str, dtype: type, columns: int = 1
 ):
     """Return a property of all items: (n, columns), or (n,) for one column."""

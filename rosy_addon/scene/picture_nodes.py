@@ -200,8 +200,14 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
 
 def image_of_material(material: bpy.types.Material) -> bpy.types.Image | None:
     """Return the image that a material of `new_material` shows; None if it shows none."""
+    node = _image_node(material)
+    return None if node is None else node.image
+
+
+def _image_node(material: bpy.types.Material) -> bpy.types.Node | None:
+    """Return the node of the image of a material; None if there is none."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
-    return next((node.image for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
+    return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
 
 def _clip_rows(matrix: np.ndarray) -> np.ndarray:
@@ -326,10 +332,7 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
 def _is_picture(material: bpy.types.Material | None) -> bool:
     """Whether RoSy created a material for a picture, and not for strokes."""
     return (
-        material is not None
-        and bool(material.get(OWNED_TAG))
-        and material.node_tree is not None
-        and any(node.bl_idname == "ShaderNodeTexImage" for node in material.node_tree.nodes)
+        material is not None and bool(material.get(OWNED_TAG)) and _image_node(material) is not None
     )
 
 

@@ -24,7 +24,7 @@ from .cameras import CameraSource, camera_of_object, render_camera, render_size,
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .lights import rendered_lights
 from .look_properties import read_look
-from .meshes import evaluated_mesh, shape_digest, vertex_positions
+from .meshes import evaluated_mesh, read_attribute, shape_digest, vertex_positions
 from .owned_data import user_modifiers
 from .scene_reader import field_objects, rendered_instances
 from .tone_inputs import (
@@ -355,9 +355,7 @@ def _field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
             parts.append(None)
             continue
         is_vector = attribute.data_type == VECTOR_TYPE
-        values = np.empty(len(attribute.data) * (3 if is_vector else 1), dtype=np.float32)
-        attribute.data.foreach_get("vector" if is_vector else "value", values)
-        parts += [attribute.domain, values]
+        parts += [attribute.domain, read_attribute(mesh, name, np.float32, 3 if is_vector else 1)]
     return parts
 
 

@@ -12,7 +12,7 @@ transformed, and slides over one that deforms.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -269,10 +269,7 @@ def apply_picture(
         rendered_view.drawn_from,
         size=(width, height),
     )
-    # Now the old groups refer to the new picture, and are replaced as a whole.
-    for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group, recorded_materials())
-    delete_unused()
+    _show_on_objects(objects, node_groups)
     return BakeResult(
         name,
         image,
@@ -322,9 +319,19 @@ def apply_sequence(
         size=(sequence.width, sequence.height),
         frame_range=f"{sequence.first} to {sequence.last}",
     )
-    # Now the old groups refer to the new picture, and are replaced as a whole.
+    _show_on_objects(objects, node_groups)
+
+
+def _show_on_objects(
+    objects: Sequence[bpy.types.Object], node_groups: Sequence[bpy.types.NodeTree]
+) -> None:
+    """Show a picture that is recorded, by a node group for each object, and delete older groups.
+
+    The older groups refer to the new picture by now, so they are replaced as a whole.
+    """
+    materials = recorded_materials()
     for obj, node_group in zip(objects, node_groups, strict=True):
-        set_picture_modifier(obj, node_group, recorded_materials())
+        set_picture_modifier(obj, node_group, materials)
     delete_unused()
 
 
@@ -346,6 +353,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
     if record is None:
         names = ", ".join(f"'{camera_name(other)}'" for other in scene.rosy.bakes) or "none"
         raise RosyError(f"no picture was baked from camera '{camera}', only from {names}")
+    materials = recorded_materials()
     for obj in baked_objects(scene):
         projections = {}
         for modifier in removable_modifiers(obj):
@@ -354,7 +362,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
             matrix = projections[record.material]
             node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
             node_group[OWNED_TAG] = True
-            set_picture_modifier(obj, node_group, recorded_materials())
+            set_picture_modifier(obj, node_group, materials)
 
 
 def _object_to_clip_matrices(

@@ -364,9 +364,7 @@ class SceneCache:
                 if obj.type != "MESH" or obj.original != owner:
                     continue
                 with evaluated_mesh(obj) as mesh:
-                    if mesh is None or any(
-                        name not in mesh.attributes for name in layout.attribute_names
-                    ):
+                    if mesh is None or not layout.is_on(mesh):
                         continue
                     surface = mesh_surface(mesh, label, read_rest=True, cache=self._cache)
                     key = owner.name, _topology_hash(surface, mesh, owner.data)

@@ -217,9 +217,7 @@ class _SceneReader:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
-            if layout is None or any(
-                name not in mesh.attributes for name in layout.attribute_names
-            ):
+            if layout is None or not layout.is_on(mesh):
                 return (
                     mesh_surface(mesh, obj.name, occluder_only=True, cache=self.cache),
                     None,

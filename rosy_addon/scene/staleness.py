@@ -104,12 +104,12 @@ class SceneStateCache:
 
 
 #: The cache of the panels of one Blender process. Cleared by `unregister`.
-MESH_STATES = SceneStateCache()
+SCENE_STATES = SceneStateCache()
 
 
 def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> None:
     """Handler of `_WATCHED_EVENTS`. After an undo there is no depsgraph."""
-    MESH_STATES.note_changes(depsgraph)
+    SCENE_STATES.note_changes(depsgraph)
 
 
 def difference(recorded: PictureState, present: PictureState, camera: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from ..cache import content_hash
 from .compat import has_grease_pencil_drawings
 from .curves import INK_ATTRIBUTE
+from .meshes import read_collection
 
 #: Attributes that make up a stroke. Others, such as selections, may change without an edit.
 STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
@@ -53,12 +54,13 @@ def _attribute_parts(attributes: Any, offsets: Any) -> Iterator[object]:
     position = attributes.get("position")
     if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
         return
-    yield _read(offsets, "value", 1)
+    yield read_collection(offsets, "value", np.float32)
     for name in STROKE_ATTRIBUTES:
         attribute = attributes.get(name)
         if attribute is not None:
             yield name
-            yield _read(attribute.data, *_VALUES_BY_TYPE.get(attribute.data_type, ("value", 1)))
+            key, columns = _VALUES_BY_TYPE.get(attribute.data_type, ("value", 1))
+            yield read_collection(attribute.data, key, np.float32, columns)
 
 
 def _legacy_parts(frame: Any) -> Iterator[object]:
@@ -66,11 +68,4 @@ def _legacy_parts(frame: Any) -> Iterator[object]:
     for stroke in frame.strokes:
         yield stroke.line_width, stroke.material_index
         for name, columns in LEGACY_POINT_PROPERTIES.items():
-            yield _read(stroke.points, name, columns)
-
-
-def _read(collection: Any, key: str, columns: int) -> np.ndarray:
-    """Return the values of all items in a collection, as float32."""
-    values = np.empty(columns * len(collection), dtype=np.float32)
-    collection.foreach_get(key, values)
-    return values
+            yield read_collection(stroke.points, name, np.float32, columns)

@@ -10,7 +10,7 @@ from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.scene_reader import field_objects
-from ..scene.staleness import MESH_STATES
+from ..scene.staleness import SCENE_STATES
 from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
@@ -118,7 +118,7 @@ def _draw_picture_section(
         draw_progress(layout)
         return
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
-    _redraw_later(MESH_STATES.seconds_to_wait())
+    _redraw_later(SCENE_STATES.seconds_to_wait())
     for bake in bake_infos:
         _draw_bake_info(layout, context, bake, several=len(bake_infos) > 1)
     if objects:

@@ -493,7 +493,7 @@ def watched(monkeypatch):
     monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 0.0)
     monkeypatch.setattr(staleness, "TTL_READINGS", 0.0)
     yield
-    staleness.MESH_STATES.clear()
+    staleness.SCENE_STATES.clear()
 
 
 def given(scene):
@@ -653,8 +653,8 @@ def test_a_large_scene_is_read_again_only_after_changes(tmp_path, watched, monke
         bpy.context.view_layer.update()
         (info,) = list_bakes(scene, for_panel=True)
         assert info.stale_reason == ("'Plain' was moved" if len(reads) == 2 else "")
-        assert staleness.MESH_STATES.seconds_to_wait() > 0 or len(reads) == 2
+        assert staleness.SCENE_STATES.seconds_to_wait() > 0 or len(reads) == 2
     assert len(bpy.app.handlers.depsgraph_update_post) == handlers
-    staleness.MESH_STATES.clear()
+    staleness.SCENE_STATES.clear()
     assert len(bpy.app.handlers.depsgraph_update_post) == handlers - 1
-    assert not staleness.MESH_STATES.seconds_to_wait()
+    assert not staleness.SCENE_STATES.seconds_to_wait()

@@ -293,8 +293,12 @@ def stop_with_escape():
     yield from check_interruption(press_escape, screenshot="baking")
 
 
-def start_turntable(path, pictures, size=(160, 120)):
-    """Start a turntable, as its file browser does after the choice of a file."""
+def start_turntable(name, pictures, size=(160, 120)):
+    """Start a turntable in a fresh scene, as after the choice of a file. Return its path."""
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / name
+    path.unlink(missing_ok=True)
     with in_view():
         started = bpy.ops.rosy.turntable(
             "INVOKE_DEFAULT", True, skip_browser=True, filepath=str(path), film=path.suffix,
@@ -303,14 +307,11 @@ def start_turntable(path, pictures, size=(160, 120)):
     assert started == {"RUNNING_MODAL"}
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.01)
     assert status().current is not None, "the turntable ended before its progress could be observed"
+    return path
 
 
 def turntable_with_progress():
-    yield from fresh_scene()
-    make_field()
-    path = SHOTS / "turntable.gif"
-    path.unlink(missing_ok=True)
-    yield from start_turntable(path, 8)
+    path = yield from start_turntable("turntable.gif", 8)
     fractions = []
     while status().current is not None:
         fractions.append(status().current.fraction)
@@ -321,10 +322,7 @@ def turntable_with_progress():
 
 
 def turntable_stopped_with_escape():
-    yield from fresh_scene()
-    make_field()
-    path = SHOTS / "stopped.gif"
-    yield from start_turntable(path, 20, (1920, 1080))
+    path = yield from start_turntable("stopped.gif", 20, (1920, 1080))
     start = time.monotonic()
     press_escape()
     yield from wait_until(lambda: status().current is None)
@@ -338,11 +336,7 @@ def turntable_stopped_with_escape():
 
 def turntable_encoded_by_another_blender():
     """Without ffmpeg another Blender encodes an .mp4, and this one handles its events."""
-    yield from fresh_scene()
-    make_field()
-    path = SHOTS / "encoded.mp4"
-    path.unlink(missing_ok=True)
-    yield from start_turntable(path, 3)
+    path = yield from start_turntable("encoded.mp4", 3)
     ticks = 0
     while status().current is not None:
         ticks += status().current.label == "encoding the video"

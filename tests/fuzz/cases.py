@@ -67,9 +67,8 @@ class Case:
     @property
     def is_stopped(self) -> bool:
         """Whether the run ends at a moment that differs from one run to the next."""
-        return (
-            self.interrupt_after is not None or self.kill_after is not None
-        ) or self.kill_when_writing
+        is_timed = self.interrupt_after is not None or self.kill_after is not None
+        return is_timed or self.kill_when_writing
 
     def may_write(self, name: str) -> bool:
         """Whether the run may write a file."""

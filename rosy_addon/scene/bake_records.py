@@ -420,7 +420,8 @@ def _remove_records(scene: bpy.types.Scene, needed: set[bpy.types.Material]) -> 
         records.remove(index)
         materials += 0 if _is_recorded(material) else delete_owned(material)
         images += 0 if _is_recorded(image) else delete_owned(image)
-        if camera is not None and not camera.users:  # only the record kept it after it was deleted
+        # Only the record kept it after it was deleted. Not every reference counts as a user.
+        if camera is not None and not bpy.data.user_map(subset={camera})[camera]:
             bpy.data.objects.remove(camera)
     return images, materials
 

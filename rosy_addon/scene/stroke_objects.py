@@ -143,7 +143,10 @@ def stroke_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def remove_strokes(scene: bpy.types.Scene) -> int:
-    """Delete all stroke objects that RoSy created in a scene. Return their number."""
+    """Delete all stroke objects that RoSy created in a scene. Return their number.
+
+    Other scenes that show the same objects lose them, too.
+    """
     objects = stroke_objects(scene)
     for record in scene.rosy.strokes.made:
         if record.thing is not None:

@@ -288,7 +288,7 @@ _STROKES = (
     "owned/grease_pencils*",
     "owned/hair_curves/*",
     "owned/curves/*",
-    "scenes/SCENE/rosy/made/*",
+    "scenes/*/rosy/made/*",  # a linked copy of the scene shows the same objects
 )
 MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_generate": _FIELD,

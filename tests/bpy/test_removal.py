@@ -265,6 +265,19 @@ def test_an_appended_object_takes_part_in_the_next_bake(tmp_path):
     assert len([image for image in bpy.data.images if image.get("rosy_made")]) == 1
 
 
+def test_a_camera_that_is_still_in_use_stays():
+    """Blender does not count the camera of a scene, nor the target of a constraint, as a user."""
+    scene = build()
+    bake(scene, cameras=scene_cameras(scene))
+    first, second = obj("Camera"), obj("Second")
+    for camera in (first, second):
+        scene.collection.objects.unlink(camera)
+    scene.camera = first
+    remove_bakes(scene)
+    assert scene.camera == first
+    assert "Second" not in bpy.data.objects
+
+
 def test_a_linked_object_is_left_alone(tmp_path):
     scene = build()
     bake(scene)

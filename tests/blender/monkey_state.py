@@ -93,11 +93,12 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
     for scene in bpy.data.scenes:
         _add_scene(state, scene)
     view_layer = bpy.context.view_layer
+    active = view_layer.objects.active
     state["context"] = (
         bpy.context.scene.name,
         view_layer.name,
         bpy.context.mode,
-        view_layer.objects.active and view_layer.objects.active.name,
+        None if active is None or is_owned(active) else active.name,
         sorted(
             obj.name for obj in view_layer.objects if obj and obj.select_get() and not is_owned(obj)
         ),

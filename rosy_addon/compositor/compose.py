@@ -33,7 +33,7 @@ from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
-from .target_tone import ReferenceRender, target_tone
+from .target_tone import ReferenceRender, target_tone_task
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
 BLOCK_PIXELS = 1 << 14
@@ -85,8 +85,8 @@ def compose_task(
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache)
-    yield Progress(0.0, "finding tones")
-    tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
+    tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
+    tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
     layers = []
     degrees = np.unique(np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]).tolist()
     for layer_index, degree in enumerate(degrees):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from ..cache import Cache
 from ..field.frames import dot, normalize
+from ..progress import Task, run_to_completion
 from ..projection.gbuffer import GBuffer
-from ..projection.shadow_maps import light_cameras, shadow_visibility
+from ..projection.shadow_maps import light_cameras, shadow_visibility_task
 from .look import Look
 
 
@@ -53,7 +55,10 @@ def lights_of(look: Look, lights: Sequence[Light]) -> Sequence[Light]:
 
 
 def diffuse(
-    gbuffer: GBuffer, look: Look, lights: Sequence[Light] = (), cache: Cache | None = None
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    visibility: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
     """Compute the diffuse lighting of each pixel by Lambert's law.
 
@@ -64,8 +69,8 @@ def diffuse(
         Its `light`, `shadows` and `shading` are used. With a `shading` of 0 all pixels are 1.
     lights : sequence of Light
         Lights of the scene in the space of the camera. Used if the light of the look is "scene".
-    cache : Cache, optional
-        Stores the shadows of lights.
+    visibility : sequence of (P,) ndarray, optional
+        By default that of `light_visibility_task`.
 
     Returns
     -------
@@ -78,11 +83,13 @@ def diffuse(
         cosine = np.maximum(dot(gbuffer.normal, gbuffer.view_direction), 0)
         light = np.repeat(cosine[:, None], 3, axis=1)
     else:
+        if visibility is None:
+            visibility = run_to_completion(light_visibility_task(gbuffer, look, lights))
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
-        for source in lights_of(look, lights):
+        for index, source in enumerate(lights_of(look, lights)):
             irradiance = _lambert(gbuffer, source)
-            if look.shadows:
-                irradiance = irradiance * _shadow_factor(gbuffer, source, cache)
+            if visibility:
+                irradiance = irradiance * visibility[index]
             light += irradiance[:, None] * source.colour
     return (1 - look.shading + look.shading * light).astype(np.float32)
 
@@ -99,14 +106,36 @@ def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
     )
 
 
-def _shadow_factor(gbuffer: GBuffer, light: Light, cache: Cache | None) -> np.ndarray:
-    """(P,) fraction of a light that reaches each pixel. It does not depend on the look."""
+def light_visibility_task(
+    gbuffer: GBuffer, look: Look, lights: Sequence[Light] = (), cache: Cache | None = None
+) -> Task[list[np.ndarray]]:
+    """Compute the fraction of each light that reaches each pixel.
 
-    def compute() -> np.ndarray:
-        cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, light.vector)
-        return shadow_visibility(gbuffer, cameras)
+    Parameters
+    ----------
+    gbuffer, look, lights
+        As for `diffuse`.
+    cache : Cache, optional
+        Stores the results, which do not depend on the other settings of the look.
 
-    if cache is None:
-        return compute()
-    vector = np.asarray(light.vector, dtype=np.float64).tobytes()
-    return cache.get_or_create(("shadow", gbuffer, light.kind, vector), compute)
+    Returns
+    -------
+    list of (P,) float32 ndarray
+        Of each of the `lights_of` the look. Empty if nothing casts shadows.
+    """
+    if look.shading == 0 or not look.shadows:
+        return []
+    cache = Cache() if cache is None else cache
+    visibility = []
+    for light in lights_of(look, lights):
+        vector = np.asarray(light.vector, dtype=np.float64)
+        cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
+        visibility.append(
+            (
+                yield from cache.get_or_create_task(
+                    ("shadow", gbuffer, light.kind, vector.tobytes()),
+                    functools.partial(shadow_visibility_task, gbuffer, cameras),
+                )
+            )
+        )
+    return visibility

@@ -10,12 +10,14 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
 from ..projection.tone_sampling import surface_tones
 from .look import Look
-from .shading import Light, diffuse
+from .per_pixel_lic import pixel_blocks
+from .shading import Light, diffuse, light_visibility_task
 
 #: Minimum difference between the tones that become white and black.
 MIN_TONE_RANGE = 1e-3
@@ -88,8 +90,18 @@ def target_tone(
     look: Look,
     lights: Sequence[Light] = (),
     reference: ReferenceRender | None = None,
-    cache: Cache | None = None,
 ) -> np.ndarray:
+    """Return the target tone of each pixel, without progress reports; see `target_tone_task`."""
+    return run_to_completion(target_tone_task(gbuffer, look, lights, reference))
+
+
+def target_tone_task(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light] = (),
+    reference: ReferenceRender | None = None,
+    cache: Cache | None = None,
+) -> Task[np.ndarray]:
     """Compute the target tone of each pixel.
 
     Parameters
@@ -114,14 +126,33 @@ def target_tone(
     RosyError
         If the source of the tone does not exist; see `check_tone`.
     """
+    if look.tone != "light":
+        check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
+    visibility = yield from light_visibility_task(gbuffer, look, lights, cache)
+    tone = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
+    for block in pixel_blocks(len(tone)):
+        yield Progress(block.start / len(tone), "finding tones")
+        block_visibility = [of_light[block] for of_light in visibility]
+        part = gbuffer.part(block)
+        tone[block] = _block_tone(part, look, lights, reference, block_visibility)
+    return tone
+
+
+def _block_tone(
+    gbuffer: GBuffer,
+    look: Look,
+    lights: Sequence[Light],
+    reference: ReferenceRender | None,
+    visibility: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Compute `target_tone` for a part of the pixels, with the `light_visibility_task` there."""
     if look.tone == "light":
-        return apply_tone_curve(diffuse(gbuffer, look, lights, cache), look)
-    check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
+        return apply_tone_curve(diffuse(gbuffer, look, lights, visibility), look)
     source_tone = reference.sample(gbuffer) if look.tone == "picture" else surface_tones(gbuffer)
     missing = np.isnan(source_tone)
     tone = np.repeat(apply_tone_curve(source_tone, look)[:, None], 3, axis=1)
     if look.tone_lit or missing.any():
-        light = diffuse(gbuffer, look, lights, cache)
+        light = diffuse(gbuffer, look, lights, visibility)
         tone = tone * light if look.tone_lit else tone
         tone[missing] = light[missing]
     return tone

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 
 import numpy as np
@@ -114,3 +114,13 @@ class GBuffer:
             object.__setattr__(self, "geometric_normal", self.normal)
         if self.front_facing is None:
             object.__setattr__(self, "front_facing", np.ones(len(self.pixel), dtype=bool))
+
+    def part(self, extent: slice) -> GBuffer:
+        """Return the G-buffer of some of the pixels, without a copy."""
+        arrays = {
+            name: value[extent]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray)
+        }
+        channels = {channel: values[extent] for channel, values in self.channels.items()}
+        return replace(self, **arrays, channels=channels)

@@ -23,7 +23,7 @@ from .camera import Camera, pixel_rays
 from .corner_field import CornerField, cached_corner_field_task
 from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
-from .rasterizer import Fragments, rasterize
+from .rasterizer import Fragments, rasterize_task
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
 BLOCK_PIXELS = 1 << 14
@@ -92,9 +92,8 @@ def project_task(
     check_instances(instances, camera, display)
     raise_mmap_threshold()
     yield Progress(0.0, "finding visible pixels")
-    visible = _visible_pixels(instances, camera)
-    yield Progress(0.3, "finding visible pixels")
-    gbuffer = _allocate_gbuffer(instances, camera, visible)
+    visible = yield from subtask(_visible_pixels_task(instances, camera), 0.0, 0.3)
+    gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.4)
     count = len(gbuffer.pixel)
     pixels_done = 0
     for instance_id in visible.visible_ids:
@@ -216,7 +215,7 @@ class _VisiblePixels:
         return len(self.visible_ids) == 1
 
 
-def _visible_pixels(instances: Sequence[MeshInstance], camera: Camera) -> _VisiblePixels:
+def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[_VisiblePixels]:
     """Find the pixels where the nearest surface has a field.
 
     Raises
@@ -224,7 +223,7 @@ def _visible_pixels(instances: Sequence[MeshInstance], camera: Camera) -> _Visib
     NothingInViewError
         If there is none.
     """
-    fragments, first_triangle = rasterize_instances(instances, camera)
+    fragments, first_triangle = yield from rasterize_instances_task(instances, camera)
     if len(instances) == 1:
         if not len(fragments.pixel):
             raise_nothing_in_view(instances, camera)
@@ -232,27 +231,38 @@ def _visible_pixels(instances: Sequence[MeshInstance], camera: Camera) -> _Visib
             fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
         )
     instance_has_field = np.array([instance.field is not None for instance in instances])
-    instance_id = (np.searchsorted(first_triangle, fragments.triangle, side="right") - 1).astype(
-        np.int32
-    )
+    instance_id, triangle = np.empty((2, len(fragments.pixel)), dtype=np.int32)
+    for start in range(0, len(instance_id), BLOCK_PIXELS):
+        yield Progress(1.0, "finding visible pixels")
+        block = slice(start, start + BLOCK_PIXELS)
+        all_triangles = fragments.triangle[block]
+        instance_id[block] = np.searchsorted(first_triangle, all_triangles, side="right") - 1
+        triangle[block] = all_triangles - first_triangle[instance_id[block]]
     has_field = instance_has_field[instance_id]
     if not has_field.any():
         raise_nothing_in_view(instances, camera)
     if not has_field.all():
         field_pixels = np.flatnonzero(has_field)
-        fragments, instance_id = (
-            Fragments(*(values[field_pixels] for values in fragments)),
-            instance_id[field_pixels],
-        )
+        instance_id, triangle = instance_id[field_pixels], triangle[field_pixels]
+        collected = []
+        for values in fragments:
+            yield Progress(1.0, "finding visible pixels")
+            collected.append(values[field_pixels])
+        fragments = Fragments(*collected)
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
-    return _VisiblePixels(
-        fragments, instance_id, fragments.triangle - first_triangle[instance_id], visible_ids
-    )
+    return _VisiblePixels(fragments, instance_id, triangle, visible_ids)
 
 
 def rasterize_instances(
     instances: Sequence[MeshInstance], camera: Camera
 ) -> tuple[Fragments, np.ndarray]:
+    """Rasterize mesh instances, without progress reports; see `rasterize_instances_task`."""
+    return run_to_completion(rasterize_instances_task(instances, camera))
+
+
+def rasterize_instances_task(
+    instances: Sequence[MeshInstance], camera: Camera
+) -> Task[tuple[Fragments, np.ndarray]]:
     """Rasterize all mesh instances together.
 
     Returns
@@ -268,7 +278,10 @@ def rasterize_instances(
         triangles.append(instance.surface.triangle_vertex + np.int32(vertex_offset))
         vertex_offset += len(instance.surface.vertices)
     first_triangle = np.cumsum([0, *map(len, triangles[:-1])]).astype(np.int32)
-    return rasterize(clip.T, np.concatenate(triangles), camera.width, camera.height), first_triangle
+    fragments = yield from rasterize_task(
+        clip.T, np.concatenate(triangles), camera.width, camera.height
+    )
+    return fragments, first_triangle
 
 
 def _to_clip_space(instance: MeshInstance, camera: Camera) -> np.ndarray:
@@ -296,9 +309,9 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
     )
 
 
-def _allocate_gbuffer(
+def _new_gbuffer_task(
     instances: Sequence[MeshInstance], camera: Camera, visible: _VisiblePixels
-) -> GBuffer:
+) -> Task[GBuffer]:
     """Return a G-buffer whose normals and representation are not yet initialized."""
     count = len(visible.instance_id)
     fragments = visible.fragments
@@ -312,6 +325,7 @@ def _allocate_gbuffer(
         face[pixels] = instances[instance_id].surface.triangle_face.take(visible.triangle[pixels])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
     for start in range(0, count, BLOCK_PIXELS):
+        yield Progress(start / count, "finding visible pixels")
         block = slice(start, start + BLOCK_PIXELS)
         x, y = pixel_rays(camera, fragments.pixel[block])
         position[block, 2] = _z_at_depth(camera, x, y, fragments.depth[block])

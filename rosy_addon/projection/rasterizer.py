@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion, subtask
+
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
 BLOCK_SIZE = 1 << 14
 
@@ -21,7 +23,10 @@ BLOCK_SIZE = 1 << 14
 COLUMN_MASK = 0xFFFF
 
 #: Largest size of the depth buffer, in pixels. Larger frames are rasterized in bands of rows.
-MAX_BAND_PIXELS = 1 << 24
+MAX_BAND_PIXELS = 1 << 22
+
+#: Label of all steps.
+STEP_LABEL = "finding visible pixels"
 
 
 class Fragments(NamedTuple):
@@ -114,6 +119,13 @@ class _Spans(NamedTuple):
 def rasterize(
     clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
 ) -> Fragments:
+    """Return the fragments of triangles, without progress reports; see `rasterize_task`."""
+    return run_to_completion(rasterize_task(clip_vertices, triangles, width, height))
+
+
+def rasterize_task(
+    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
+) -> Task[Fragments]:
     """Find the nearest triangle at the center of every pixel.
 
     Both sides of a triangle are drawn. Of triangles at exactly the same depth, the one with the
@@ -141,11 +153,14 @@ def rasterize(
     band_rows = max(1, MAX_BAND_PIXELS // width)
     for row_start in range(0, height, band_rows):
         row_stop = min(row_start + band_rows, height)
-        band = _rasterize_rows(screen, clipped, width, row_start, row_stop)
+        rasterize_rows = _rasterize_rows_task(screen, clipped, width, row_start, row_stop)
+        band = yield from subtask(rasterize_rows, 0.7 * row_start / height, 0.7 * row_stop / height)
         for values, collected in zip(band, (pixel, triangle, depth), strict=True):
             collected.append(values)
     pixel, triangle = np.concatenate(pixel), np.concatenate(triangle)
-    weights, front_facing = _barycentrics(clip_vertices, triangles, pixel, triangle, width, height)
+    weights, front_facing = yield from subtask(
+        _barycentrics_task(clip_vertices, triangles, pixel, triangle, width, height), 0.7, 1.0
+    )
     return Fragments(pixel, triangle, weights, front_facing, np.concatenate(depth))
 
 
@@ -251,9 +266,9 @@ def _to_screen(vertices: np.ndarray, width: int, height: int) -> _ScreenVertices
     return _ScreenVertices(x, y, z * inverse_w, row << 16 | column)
 
 
-def _rasterize_rows(
+def _rasterize_rows_task(
     screen: _ScreenVertices, clipped: _ClippedTriangles, width: int, row_start: int, row_stop: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Rasterize the rows from `row_start` up to, but not including, `row_stop`.
 
     Returns
@@ -274,6 +289,7 @@ def _rasterize_rows(
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
             for span_block in _block_slices(spans.count):
+                yield Progress(start / len(clipped.triangle), STEP_LABEL)
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
                 )
@@ -513,14 +529,14 @@ def _depth_plane(a: _ScreenCorner, b: _ScreenCorner, c: _ScreenCorner) -> tuple[
     return slope_x, slope_y, a.depth - slope_x * a.x - slope_y * a.y, min_depth, max_depth
 
 
-def _barycentrics(
+def _barycentrics_task(
     vertices: np.ndarray,
     triangles: np.ndarray,
     pixel: np.ndarray,
     triangle: np.ndarray,
     width: int,
     height: int,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Compute perspective-correct barycentric coordinates at pixel centers, in unclipped triangles.
 
     Uses homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
@@ -540,6 +556,7 @@ def _barycentrics(
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
     for start in range(0, len(pixel), BLOCK_SIZE):
+        yield Progress(start / len(pixel), STEP_LABEL)
         block = slice(start, start + BLOCK_SIZE)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5

@@ -14,9 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..field.frames import normalize
+from ..progress import Progress, Task, run_to_completion, subtask
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
 from .gbuffer import GBuffer, MeshInstance
-from .project import rasterize_instances
+from .project import rasterize_instances_task
 
 #: Default width and height of a shadow map, in pixels.
 SHADOW_MAP_SIZE = 2048
@@ -31,6 +32,9 @@ NORMAL_BIAS_PIXELS = 3.2
 #: Least distance of a point light from the center of the receivers for which a single shadow map is
 #: used, in radii of the receivers. Nearer lights use six.
 SINGLE_VIEW_MIN_RADII = 1.3
+
+#: Label of all steps.
+STEP_LABEL = "casting shadows"
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
 BLOCK_PIXELS = 1 << 15
@@ -146,8 +150,13 @@ def _point_cameras(
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
-    """Return the (H, W) float32 depth of the nearest surface along the camera axis; inf if none."""
-    fragments, _ = rasterize_instances(instances, camera)
+    """Return a depth map, without progress reports; see `depth_map_task`."""
+    return run_to_completion(depth_map_task(instances, camera))
+
+
+def depth_map_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[np.ndarray]:
+    """(H, W) float32 depth of the nearest surface along the camera axis; inf if there is none."""
+    fragments, _ = yield from rasterize_instances_task(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
     if camera.is_perspective:
@@ -158,7 +167,12 @@ def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.nd
 
 
 def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray:
-    """Return the visibility of a light at the pixels of a G-buffer.
+    """Return the visibility of a light, without progress reports; see `shadow_visibility_task`."""
+    return run_to_completion(shadow_visibility_task(gbuffer, cameras))
+
+
+def shadow_visibility_task(gbuffer: GBuffer, cameras: Sequence[Camera]) -> Task[np.ndarray]:
+    """Compute the visibility of a light at the pixels of a G-buffer.
 
     Parameters
     ----------
@@ -174,9 +188,14 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     """
     rotation, translation = gbuffer.camera.view[:3, :3], gbuffer.camera.view[:3, 3]
     result = np.ones(len(gbuffer.pixel), dtype=np.float32)
-    for camera in cameras:
-        depth_map = render_depth_map(gbuffer.instances, camera)
+    for index, camera in enumerate(cameras):
+        rendered, done = (index + 0.5) / len(cameras), (index + 1) / len(cameras)
+        depth_map = yield from subtask(
+            depth_map_task(gbuffer.instances, camera), index / len(cameras), rendered, STEP_LABEL
+        )
         for start in range(0, len(result), BLOCK_PIXELS):
+            fraction = rendered + (done - rendered) * start / len(result)
+            yield Progress(fraction, STEP_LABEL)
             block = slice(start, start + BLOCK_PIXELS)
             points = (gbuffer.position[block] - translation) @ rotation
             result[block] *= visibility_from(

@@ -82,6 +82,7 @@ class Cache:
             total += _array_bytes(key, visited) + _array_bytes(self._entries[key], visited)
             if total > self._max_bytes:
                 del self._entries[key]
+                self._used.discard(key)
 
     def evict_unused(self) -> None:
         """Evict entries that were neither stored nor returned since the last call."""

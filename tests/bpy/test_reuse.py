@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import pytest
 from rosy.rosy_addon.bake import bake
@@ -181,6 +183,20 @@ def test_the_least_recently_used_entries_are_evicted():
         False,
         True,
     ]
+
+
+def test_evicted_entries_are_not_kept_alive():
+    """Keys hold G-buffers and meshes."""
+
+    class Mesh:
+        pass
+
+    cache, mesh = Cache(max_bytes=0), Mesh()
+    cache.put(mesh, np.zeros(10))
+    reference = weakref.ref(mesh)
+    del mesh
+    cache.evict_over_limit()
+    assert not len(cache) and reference() is None
 
 
 def test_a_shared_array_counts_once():

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Task
+from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
 from .lic_images import LicImages, LineTracer, convolve_members_task
 from .look import Look
-from .per_pixel_lic import DirectionSampler, direction_table, interpolate_direction
-from .pixel_field import PixelField, all_members
+from .per_pixel_lic import DirectionSampler, direction_table_task, interpolate_direction
+from .pixel_field import PixelField, all_members, neighbor_table_task
 
 
 def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
@@ -31,17 +32,28 @@ def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[L
     -------
     LicImages
     """
-    member_directions = np.zeros((len(field.pixel) + 1, field.degree), dtype=np.complex64)
-    direction_tables = np.zeros((len(field.pixel) + 1, field.degree, 4), dtype=np.float32)
-    for index, member in enumerate(all_members(field, look.guiding_angle)):
-        member_directions[:-1, index] = member
-        screen_direction = field.to_screen(field.member_direction(member), look.foreshorten)
-        direction_tables[:, index] = direction_table(field, screen_direction, member)
+    count, degree = len(field.pixel), field.degree
+    neighbors = yield from subtask(neighbor_table_task(field), 0.0, 0.0)
+    member_directions = np.zeros((count + 1, degree), dtype=np.complex64)
+    screen_directions = np.empty((count, degree), dtype=np.complex64)
+    for block in pixel_blocks(count):
+        yield Progress(0.0, "finding directions")
+        part = field.part(block)
+        for index, member in enumerate(all_members(part, look.guiding_angle)):
+            member_directions[block, index] = member
+            in_plane = part.member_direction(member)
+            screen_directions[block, index] = part.to_screen(in_plane, look.foreshorten)
+    direction_tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
+    for index in range(degree):
+        table_task = direction_table_task(
+            screen_directions[:, index], member_directions[:-1, index], degree, neighbors
+        )
+        direction_tables[:, index] = yield from subtask(table_task, 0.0, 0.0)
     tracers = [
         _best_match_tracer(member_directions, direction_tables, member)
         for member in range(field.line_count)
     ]
-    return (yield from convolve_members_task(field, look, noise, tracers))
+    return (yield from convolve_members_task(field, look, noise, neighbors, tracers))
 
 
 def _best_match_tracer(
@@ -54,7 +66,7 @@ def _best_match_tracer(
     member_directions : (P + 1, N) complex64 ndarray
         Members in the view plane, where they are matched. Row P is 0.
     direction_tables : (P + 1, N, 4) float32 ndarray
-        A `direction_table` of each member, on screen.
+        The table of `direction_table_task` of each member, on screen.
     member : int
     """
 

@@ -27,11 +27,10 @@ import numpy as np
 
 from ..deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
+from ..progress import Progress, Task, run_to_completion
+from ..projection.pixel_blocks import pixel_blocks
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, normalized
-
-#: Pixels per block. Their data fit the cache of a processor core.
-BLOCK_PIXELS = 1 << 14
 
 #: The largest integer in `Covering.state_table`.
 INT16_MAX = 32767
@@ -165,6 +164,11 @@ def member_lines(field: PixelField) -> np.ndarray:
 
 
 def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering:
+    """Return the covering of a field, without progress reports; see `build_covering_task`."""
+    return run_to_completion(build_covering_task(field, look, noise))
+
+
+def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[Covering]:
     """Build the covering of a pixel field. Sheet 0 is the member nearest to the guiding angle.
 
     Parameters
@@ -196,8 +200,8 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         np.float32(INT16_MAX / max_slope),
     ]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
-    for start in range(0, count, BLOCK_PIXELS):
-        block = slice(start, min(start + BLOCK_PIXELS, count))
+    for block in pixel_blocks(count):
+        yield Progress(block.start / count, "finding directions")
         block_cells = cell_of_pixel[block]
         right, up = _noise_gradient(cell_noise, block_cells, width, field.neighbor_mask[block])
         right, up = right * quantize[2], up * quantize[2]

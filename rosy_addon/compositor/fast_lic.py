@@ -16,23 +16,26 @@ from dataclasses import replace
 import numpy as np
 
 from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .covering import (
     ALL_NEIGHBORS,
-    BLOCK_PIXELS,
     SINK_CELL,
     Covering,
-    build_covering,
+    build_covering_task,
     member_lines,
     rows_as_scalars,
     scatter_rows,
 )
 from .filter_kernel import full_sample_count
 from .image_noise import NOISE_MEAN
-from .lic_images import LicImages, step_limits
+from .lic_images import LicImages, lic_images_task, step_limits_task
 from .look import Look
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
+
+#: Label of most steps.
+STEP_LABEL = "tracing streamlines"
 
 #: Streamlines that are traced together, in both directions at once.
 BATCH_SIZE = 5120
@@ -89,11 +92,14 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     line = member_lines(field)
     members = np.empty((len(line), count, channels), dtype=np.float32)
     effective_samples = np.empty(count, dtype=np.float32)
-    step_limit = step_limits(field, look)
+    step_limit = yield from subtask(step_limits_task(field, look), 0.0, 0.0)
     overlap_sums = None
     for extent, core, overlap_stop in _strips(field, look):
+        start, stop = core.start / count, core.stop / count
         strip_field = _crop_rows(field, extent)
-        covering = build_covering(strip_field, look, noise[extent])
+        covering = yield from subtask(
+            build_covering_task(strip_field, look, noise[extent]), start, start
+        )
         cells = covering.cell_of_pixel[core.start - extent.start :]
         core_cells, overlap_cells = np.split(
             cells[: overlap_stop - core.start], [core.stop - core.start]
@@ -104,17 +110,19 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
         coverage_task = _cover_all_lines_task(
             covering, averages, look, _pixels_to_cells(step_limit, extent, covering)
         )
-        yield from subtask(coverage_task, core.start / count, core.stop / count)
+        yield from subtask(coverage_task, start, stop)
         core_sums = averages.gather(core_cells, line)
+        yield Progress(stop, STEP_LABEL)
         _blend_strips(
             core_sums, overlap_sums, strip_field.pixel[core.start - extent.start :] // field.width
         )
-        _write_averages(core_sums, look, members[:, core])
+        for line_sums, member in zip(core_sums, members, strict=True):
+            yield Progress(stop, STEP_LABEL)
+            _write_averages(line_sums, look, member[core])
+        yield Progress(stop, STEP_LABEL)
         effective_samples[core] = core_sums[:, :, -1].mean(axis=0)
         overlap_sums = averages.gather(overlap_cells, line)
-    return LicImages(
-        members, members.mean(axis=0), effective_samples, np.ones(count, dtype=np.float32)
-    )
+    return (yield from subtask(lic_images_task(members, effective_samples), 1.0, 1.0))
 
 
 def _pixels_to_cells(
@@ -150,21 +158,17 @@ def _blend_strips(core_sums: np.ndarray, overlap_sums: np.ndarray | None, row: n
     )
 
 
-def _write_averages(core_sums: np.ndarray, look: Look, members: np.ndarray) -> None:
-    """Write (M, n, K) averages of equal variance, from (M, n, K + 1) sums and samples."""
+def _write_averages(line_sums: np.ndarray, look: Look, member: np.ndarray) -> None:
+    """Write (n, K) averages of equal variance, from the (n, K + 1) sums and samples of a line."""
     full_samples = np.float32(full_sample_count(look) - 0.5)
-    for line, member in zip(core_sums, members, strict=True):
-        for start in range(0, len(line), BLOCK_PIXELS):
-            sums, effective_samples = (
-                line[start : start + BLOCK_PIXELS, :-1],
-                line[start : start + BLOCK_PIXELS, -1].copy(),
-            )
-            mean = member[start : start + BLOCK_PIXELS]
-            np.divide(sums, effective_samples[:, None], out=mean)
-            mean *= np.float32(CONTRAST_MATCH)
-            mean += np.float32(NOISE_MEAN)
-            if effective_samples.min() < full_samples:
-                mean[...] = normalize_variance(mean, effective_samples, look)
+    for block in pixel_blocks(len(line_sums)):
+        sums, effective_samples = line_sums[block, :-1], line_sums[block, -1].copy()
+        mean = member[block]
+        np.divide(sums, effective_samples[:, None], out=mean)
+        mean *= np.float32(CONTRAST_MATCH)
+        mean += np.float32(NOISE_MEAN)
+        if effective_samples.min() < full_samples:
+            mean[...] = normalize_variance(mean, effective_samples, look)
 
 
 def _strips(field: PixelField, look: Look) -> Iterator[tuple[slice, slice, int]]:
@@ -288,7 +292,7 @@ def _cover_all_lines_task(
         for batch_seeds in _batches(seeds, batch_size):
             averages.write(batch.trace(batch_seeds))
             covered_steps += batch.covered_steps
-            yield Progress(1 - len(missing) / total, "tracing streamlines")
+            yield Progress(1 - len(missing) / total, STEP_LABEL)
         missing = averages.missing_lines()
         if len(missing) <= MAX_UNCOVERED_FRACTION * total:
             break
@@ -300,13 +304,14 @@ def _cover_all_lines_task(
             )
         ]
     for forward, left in FILL_OFFSETS:
+        yield Progress(0.9, STEP_LABEL)
         missing = averages.copy_from(missing, covering.neighbor_line(missing, forward, left))
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
     batch_size = min(_batch_size(look.length), len(missing))
     batch = StreamlineBatch(covering, look, step_limit, 0, batch_size)
     for batch_seeds in _batches(missing, batch_size):
         averages.write(batch.trace(batch_seeds))
-        yield Progress(0.95, "tracing streamlines")
+        yield Progress(0.95, STEP_LABEL)
 
 
 def _batch_size(half_length: int) -> int:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from ..progress import Progress, Task
+from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .filter_kernel import kernel_weights
 from .look import Look
-from .per_pixel_lic import DirectionSampler, integrate_noise, pixel_blocks
+from .per_pixel_lic import DirectionSampler, integrate_noise
 from .pixel_field import PixelField
 
 #: Takes a block of pixels, and returns samplers for the directions of the streamlines of one
@@ -51,19 +52,24 @@ class LicImages:
             self.first_set_weight[extent],
         )
 
-    def blended_with(self, other: LicImages, weight: np.ndarray) -> LicImages:
-        """Blend with a second set of images, given the (P,) weight of this set, 0 to 1."""
-        return replace(
-            self,
-            blend=other.blend + weight[:, None] * (self.blend - other.blend),
-            effective_samples=other.effective_samples
-            + weight * (self.effective_samples - other.effective_samples),
-            first_set_weight=weight,
-        )
+
+def lic_images_task(members: np.ndarray, effective_samples: np.ndarray) -> Task[LicImages]:
+    """Blend member images. Parameters as in `LicImages`."""
+    blend = np.empty(members.shape[1:], dtype=np.float32)
+    for block in pixel_blocks(len(blend)):
+        yield Progress(block.start / len(blend), "blending lines")
+        blend[block] = members[:, block].mean(axis=0)
+    return LicImages(
+        members, blend, effective_samples, np.ones(len(effective_samples), dtype=np.float32)
+    )
 
 
 def convolve_members_task(
-    field: PixelField, look: Look, noise: np.ndarray, tracers: Sequence[LineTracer]
+    field: PixelField,
+    look: Look,
+    noise: np.ndarray,
+    neighbors: np.ndarray,
+    tracers: Sequence[LineTracer],
 ) -> Task[LicImages]:
     """Trace a streamline of each member through every pixel, and average the noise along it.
 
@@ -73,6 +79,8 @@ def convolve_members_task(
     look : Look
         In pixels of the frame. Its `length`, `taper`, `step` and `magnitude` are used.
     noise : (P, K) float32 ndarray
+    neighbors : (9, P + 1) int32 ndarray
+        From `pixel_field.neighbor_table_task`.
     tracers : sequence of M functions
         One per member image.
 
@@ -81,7 +89,7 @@ def convolve_members_task(
     LicImages
     """
     count, channels = noise.shape
-    step_limit = step_limits(field, look)
+    step_limit = yield from subtask(step_limits_task(field, look), 0.0, 0.0)
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
@@ -90,8 +98,8 @@ def convolve_members_task(
             block_limit = None if step_limit is None else step_limit[block]
             (forward_sum, forward), (backward_sum, backward) = (
                 integrate_noise(
-                    field,
                     block,
+                    neighbors,
                     direction_at,
                     padded_noise,
                     look.length,
@@ -109,16 +117,19 @@ def convolve_members_task(
             fraction = (member + block.stop / count) / len(tracers)
             yield Progress(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
-    return LicImages(
-        members, members.mean(axis=0), effective_samples, np.ones(count, dtype=np.float32)
-    )
+    return (yield from subtask(lic_images_task(members, effective_samples), 1.0, 1.0))
 
 
-def step_limits(field: PixelField, look: Look) -> np.ndarray | None:
-    """(P,) steps in each direction if they depend on the magnitude, None otherwise."""
+def step_limits_task(field: PixelField, look: Look) -> Task[np.ndarray | None]:
+    """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if look.magnitude not in ("length", "both"):
         return None
-    return np.rint(look.length * relative_magnitude(field, look)).astype(np.int32)
+    look = with_magnitude_range(look, field)
+    limits = np.empty(len(field.pixel), dtype=np.int32)
+    for block in pixel_blocks(len(limits)):
+        yield Progress(block.start / len(limits), "tracing streamlines")
+        limits[block] = np.rint(look.length * relative_magnitude(field.part(block), look))
+    return limits
 
 
 def relative_magnitude(field: PixelField, look: Look) -> np.ndarray:

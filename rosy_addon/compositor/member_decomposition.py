@@ -6,13 +6,16 @@ TVCG 17(7), 2011, section 4.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from ..progress import Task, subtask
+from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
 from .lic_images import LicImages, LineTracer, convolve_members_task
 from .look import Look
-from .per_pixel_lic import direction_table, interpolate_direction
-from .pixel_field import PixelField, all_members, blend_weights
+from .per_pixel_lic import direction_table_task, interpolate_direction
+from .pixel_field import PixelField, all_members, blend_weights, neighbor_table_task
 
 
 def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
@@ -34,16 +37,31 @@ def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) 
     -------
     LicImages
     """
+    neighbors = yield from subtask(neighbor_table_task(field), 0.0, 0.0)
     angle = look.guiding_angle
-    first_task = convolve_members_task(field, look, noise, _tracers(field, look, angle))
+    first_task = _one_set_task(field, look, noise, neighbors, angle)
     if field.degree == 1 or look.weights == "none":
         return (yield from first_task)
-    second_task = convolve_members_task(
-        field, look, noise, _tracers(field, look, angle + np.pi / field.degree)
-    )
-    first_images = yield from subtask(first_task, 0.0, 0.5)
-    second_images = yield from subtask(second_task, 0.5, 1.0)
-    return first_images.blended_with(second_images, _first_set_weight(field, look))
+    first = yield from subtask(first_task, 0.0, 0.5)
+    second_task = _one_set_task(field, look, noise, neighbors, angle + np.pi / field.degree)
+    second = yield from subtask(second_task, 0.5, 1.0)
+    for block in pixel_blocks(len(field.pixel)):
+        yield Progress(1.0, "blending lines")
+        weight = _first_set_weight(field.part(block), look)
+        second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
+        second.effective_samples[block] += weight * (
+            first.effective_samples[block] - second.effective_samples[block]
+        )
+        first.first_set_weight[block] = weight
+    return replace(first, blend=second.blend, effective_samples=second.effective_samples)
+
+
+def _one_set_task(
+    field: PixelField, look: Look, noise: np.ndarray, neighbors: np.ndarray, angle: float
+) -> Task[LicImages]:
+    """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
+    tracers = yield from subtask(_tracers_task(field, look, neighbors, angle), 0.0, 0.0)
+    return (yield from convolve_members_task(field, look, noise, neighbors, tracers))
 
 
 def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
@@ -57,26 +75,31 @@ def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
     return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
 
 
-def _tracers(field: PixelField, look: Look, angle: float) -> list[LineTracer]:
+def _tracers_task(
+    field: PixelField, look: Look, neighbors: np.ndarray, angle: float
+) -> Task[list[LineTracer]]:
     """Make tracers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
-    if not look.view_plane:
-        screen_members = _screen_space_members(field, angle)
-        return [
-            _direction_tracer(direction_table(field, direction, direction))
-            for direction in screen_members
-        ]
-    members = all_members(field, angle)[: field.line_count]
-    directions = [
-        field.to_screen(field.member_direction(member), look.foreshorten) for member in members
-    ]
-    return [
-        _direction_tracer(direction_table(field, direction, member))
-        for direction, member in zip(directions, members, strict=True)
-    ]
+    count = len(field.pixel)
+    members, directions = np.empty((2, field.line_count, count), dtype=np.complex64)
+    for block in pixel_blocks(count):
+        yield Progress(block.start / count, "finding directions")
+        part = field.part(block)
+        if look.view_plane:
+            members[:, block] = all_members(part, angle)[: field.line_count]
+            for member, direction in zip(members, directions, strict=True):
+                in_plane = part.member_direction(member[block])
+                direction[block] = part.to_screen(in_plane, look.foreshorten)
+        else:
+            members[:, block] = directions[:, block] = _screen_space_members(part, angle)
+    tracers = []
+    for member, direction in zip(members, directions, strict=True):
+        table = yield from direction_table_task(direction, member, field.degree, neighbors)
+        tracers.append(_direction_tracer(table))
+    return tracers
 
 
 def _direction_tracer(table: np.ndarray) -> LineTracer:
-    """Make a tracer along one vector field on screen, given its `direction_table`."""
+    """Make a tracer along one vector field on screen, given its `direction_table_task`."""
 
     def forward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
         return interpolate_direction(table.take(entry, axis=0), offset)

@@ -2,46 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
-from .pixel_field import PixelField
-
-#: Streamlines per block, one per pixel. Their state, about 40 bytes each, fits the cache of a
-#: processor core.
-BLOCK_PIXELS = 16384
+from ..progress import Progress, Task
+from ..projection.pixel_blocks import pixel_blocks
+from .pixel_field import NEIGHBOR_OFFSETS, normalized
 
 #: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def pixel_blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most `BLOCK_PIXELS` that cover `count` pixels."""
-    for start in range(0, count, BLOCK_PIXELS):
-        yield slice(start, min(start + BLOCK_PIXELS, count))
-
-
-def direction_table(field: PixelField, directions: np.ndarray, member: np.ndarray) -> np.ndarray:
+def direction_table_task(
+    direction: np.ndarray, member: np.ndarray, degree: int, neighbors: np.ndarray
+) -> Task[np.ndarray]:
     """Build a table of directions and the gradients of their angles, for `interpolate_direction`.
+
+    The gradients are differences of linked neighbors.
 
     Parameters
     ----------
-    field : PixelField
-    directions : (P,) complex64 ndarray
+    direction : (P,) complex64 ndarray
         Directions on screen.
     member : (P,) complex64 ndarray
-        The same directions in the view plane.
+        The same directions in the view plane. A neighbor that differs by more than half the angle
+        between members is on another member, and is ignored.
+    degree : int
+        Degree of the field.
+    neighbors : (9, P + 1) int32 ndarray
+        From `pixel_field.neighbor_table_task`.
 
     Returns
     -------
     (P + 1, 4) float32 ndarray
-        x and y of the direction, then of the gradient of its angle. Row P is 0.
+        x and y of the direction, then of the gradient of its angle: d angle / dx and d angle / dy,
+        radians per pixel. Row P is 0.
     """
-    table = np.zeros((len(directions) + 1, 4), dtype=np.float32)
-    gradient = field.angle_gradient(directions, member)
-    table[:-1, 0], table[:-1, 1] = directions.real, directions.imag
-    table[:-1, 2], table[:-1, 3] = gradient.real, gradient.imag
+    count = len(direction)
+    table = np.zeros((count + 1, 4), dtype=np.float32)
+    table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
+    unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
+    for block in pixel_blocks(count):
+        yield Progress(0.3 * block.start / count, "finding directions")
+        unit_direction[block] = normalized(direction[block])
+        unit_member[block] = normalized(member[block])
+    min_cosine = np.cos(np.pi / max(degree, 2))
+    for block in pixel_blocks(count):
+        yield Progress(0.3 + 0.7 * block.start / count, "finding directions")
+        conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
+        gradient_sines = []
+        for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            neighbor = neighbors[NEIGHBOR_OFFSETS.index(offset), block]
+            rotation = unit_direction.take(neighbor) * conjugate
+            same_member = (unit_member.take(neighbor) * member_conjugate).real > min_cosine
+            gradient_sines.append(np.where(same_member & (rotation.real > 0), rotation.imag, 0))
+        left, right, below, above = gradient_sines
+        table[block, 2], table[block, 3] = 0.5 * (right - left), 0.5 * (above - below)
     return table
 
 
@@ -71,8 +88,8 @@ def interpolate_direction(rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
 
 
 def integrate_noise(
-    field: PixelField,
     block: slice,
+    neighbors: np.ndarray,
     direction_at: DirectionSampler,
     noise: np.ndarray,
     length: int,
@@ -88,9 +105,10 @@ def integrate_noise(
 
     Parameters
     ----------
-    field : PixelField
     block : slice
         Pixels of the field.
+    neighbors : (9, P + 1) int32 ndarray
+        From `pixel_field.neighbor_table_task`.
     direction_at : function
         Takes the (B,) int32 entries of the streamlines, P for those that have ended, and their
         (B, 2) float32 offsets from the centers of those pixels. Returns their (B, 2) float32
@@ -114,8 +132,8 @@ def integrate_noise(
     samples : (B,) float32 ndarray
         Number of these samples.
     """
-    end = len(field.pixel)
-    neighbors = field.neighbors.reshape(-1)
+    end = neighbors.shape[1] - 1
+    neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)

@@ -12,9 +12,11 @@ from ..deterministic_trig import unit_phasor
 from ..field.directional_field import evaluate_harmonics
 from ..field.rosy_field import check_degree
 from ..field.symmetry import FieldSymmetry
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
+from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_neighbors import neighbor_masks_task, screen_jacobians
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -112,22 +114,6 @@ class PixelField:
         member = member.astype(np.complex128)
         return normalized(member * evaluate_harmonics(self.harmonics, member))
 
-    @cached_property
-    def neighbors(self) -> np.ndarray:
-        """(9, P + 1) int32 indices into the list after a step to each of `NEIGHBOR_OFFSETS`.
-
-        The index is P where streamlines end, and in column P. There is one row per offset, because
-        a streamline mostly steps in one direction and then reads adjacent elements of a row.
-        """
-        count = len(self.pixel)
-        entry = np.full(self.height * self.width, count, dtype=np.int32)
-        entry[self.pixel] = np.arange(count, dtype=np.int32)
-        table = np.full((9, count + 1), count, dtype=np.int32)
-        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
-            linked = np.flatnonzero(self.neighbor_mask >> bit & 1)
-            table[bit, linked] = entry[self.pixel[linked] + (dy * self.width + dx)]
-        return table
-
     def to_screen(self, member: np.ndarray, foreshorten: bool = False) -> np.ndarray:
         """Project directions from the view plane to the screen.
 
@@ -153,34 +139,6 @@ class PixelField:
         direction = x * member.real + y * member.imag
         return direction.astype(np.complex64) if foreshorten else normalized(direction)
 
-    def angle_gradient(self, direction: np.ndarray, member: np.ndarray) -> np.ndarray:
-        """Compute the gradient of the angle of directions from differences of linked neighbors.
-
-        Parameters
-        ----------
-        direction : (P,) complex64 ndarray
-            Directions on screen.
-        member : (P,) complex64 ndarray
-            The same directions in the view plane. A neighbor that differs by more than half the
-            angle between members is on another member, and is ignored.
-
-        Returns
-        -------
-        (P,) complex64 ndarray
-            d angle / dx + i d angle / dy, radians per pixel.
-        """
-        direction, member = (np.append(normalized(a), np.complex64(0)) for a in (direction, member))
-        conjugate, member_conjugate = direction[:-1].conj(), member[:-1].conj()
-        min_cosine = np.cos(np.pi / max(self.degree, 2))
-        gradient_sines = []
-        for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-            neighbor = self.neighbors[NEIGHBOR_OFFSETS.index(offset), :-1]
-            rotation = direction.take(neighbor) * conjugate
-            same_member = (member.take(neighbor) * member_conjugate).real > min_cosine
-            gradient_sines.append(np.where(same_member & (rotation.real > 0), rotation.imag, 0))
-        left, right, below, above = gradient_sines
-        return 0.5 * ((right - left) + 1j * (above - below)).astype(np.complex64)
-
 
 def normalized(values: np.ndarray) -> np.ndarray:
     """Scale complex numbers to the modulus 1, as complex64. 0 stays 0."""
@@ -189,9 +147,40 @@ def normalized(values: np.ndarray) -> np.ndarray:
     return np.divide(values, norm, out=values, where=norm > 0).astype(np.complex64)
 
 
+def neighbor_table_task(field: PixelField) -> Task[np.ndarray]:
+    """Tabulate the neighbors of the pixels of a field.
+
+    Returns
+    -------
+    (9, P + 1) int32 ndarray
+        Indices into the list of pixels after a step to each of `NEIGHBOR_OFFSETS`. The index is P
+        where streamlines end, and in column P. There is one row per offset, because a streamline
+        mostly steps in one direction and then reads adjacent elements of a row.
+    """
+    count = len(field.pixel)
+    entry = np.full(field.height * field.width, count, dtype=np.int32)
+    entry[field.pixel] = np.arange(count, dtype=np.int32)
+    table = np.full((9, count + 1), count, dtype=np.int32)
+    for block in pixel_blocks(count):
+        yield Progress(block.start / count, "finding neighbors")
+        pixel, mask = field.pixel[block], field.neighbor_mask[block]
+        for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
+            linked = np.flatnonzero(mask >> bit & 1)
+            table[bit, block.start + linked] = entry[pixel[linked] + (dy * field.width + dx)]
+    return table
+
+
 def surface_pixel_field(
     gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
 ) -> PixelField:
+    """Return a pixel field, without progress reports; see `surface_pixel_field_task`."""
+    task = surface_pixel_field_task(gbuffer, degree, crease_angle, cross_creases)
+    return run_to_completion(task)
+
+
+def surface_pixel_field_task(
+    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
+) -> Task[PixelField]:
     """Extract the field of one degree from a G-buffer.
 
     Parameters
@@ -209,21 +198,27 @@ def surface_pixel_field(
     PixelField
         The pixels whose mesh instances have a field of that degree.
     """
-    mask = neighbor_masks(gbuffer, crease_angle, cross_creases)
-    axes = screen_jacobians(gbuffer)
+    count = len(gbuffer.pixel)
+    mask = yield from subtask(neighbor_masks_task(gbuffer, crease_angle, cross_creases), 0.0, 0.5)
+    jacobians = np.empty((2, count), dtype=np.complex64).T
+    for block in pixel_blocks(count):
+        yield Progress(0.5 + 0.4 * block.start / count, "finding directions")
+        jacobians[block] = screen_jacobians(gbuffer.part(block))
     selected = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id] == degree
     selected = slice(None) if selected.all() else np.flatnonzero(selected)
     z = gbuffer.representation[selected]
     pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
     if not z.all():
-        mask = _mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+        mask_task = _mask_undefined_task(mask, pixel, camera.width, camera.height, z != 0)
+        mask = yield from subtask(mask_task, 0.9, 1.0)
+    yield Progress(1.0, "finding directions")
     return PixelField(
         degree=degree,
         width=camera.width,
         height=camera.height,
         pixel=pixel,
         representation=z,
-        screen_jacobian=axes[selected],
+        screen_jacobian=jacobians[selected],
         neighbor_mask=mask,
         channels=_channels_of_degree(
             {channel: values[selected] for channel, values in gbuffer.channels.items()}
@@ -283,13 +278,15 @@ def planar_pixel_field(
         pixel=pixel,
         representation=z,
         screen_jacobian=None,
-        neighbor_mask=_mask_undefined(all_neighbors, pixel, width, height, z != 0),
+        neighbor_mask=run_to_completion(
+            _mask_undefined_task(all_neighbors, pixel, width, height, z != 0)
+        ),
     )
 
 
-def _mask_undefined(
+def _mask_undefined_task(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Clear the bits of neighbor masks that lead from or to undefined pixels.
 
     Parameters
@@ -300,15 +297,22 @@ def _mask_undefined(
         Of the frame. Pixels beyond it are undefined.
     defined : (P,) bool ndarray
     """
-    is_defined = np.zeros(height * width, dtype=bool)
-    is_defined[pixel] = defined
-    is_defined = is_defined.reshape(height, width)
-    padded = np.pad(is_defined, 1).astype(np.uint16)
-    # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
-    row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
-    open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
-    open_bits *= is_defined
-    return mask & open_bits.ravel()[pixel]
+    is_defined = np.zeros((height + 2, width + 2), dtype=bool)
+    row, column = np.divmod(pixel, np.int32(width))
+    is_defined[row + 1, column + 1] = defined
+    result = np.empty_like(mask)
+    band_rows = max(BLOCK_PIXELS // width, 1)
+    for start in range(0, height, band_rows):
+        yield Progress(start / height, "finding neighbors")
+        padded = is_defined[start : start + band_rows + 2].astype(np.uint16)
+        # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
+        row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
+        open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
+        open_bits *= padded[1:-1, 1:-1]
+        first_pixels = np.array([start, start + band_rows], dtype=np.int64) * width
+        band = slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+        result[band] = mask[band] & open_bits[row[band] - start, column[band]]
+    return result
 
 
 def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:

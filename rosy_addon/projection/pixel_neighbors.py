@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import dot_components, transport_components, view_frame
+from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer
 
 #: Pixels per block. Bounds memory, and fits the caches of the processor.
@@ -62,7 +63,14 @@ def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
 
 
 def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarray:
-    """Return, for each pixel, the neighbors to which a streamline may step.
+    """Return the neighbor masks, without progress reports; see `neighbor_masks_task`."""
+    return run_to_completion(neighbor_masks_task(gbuffer, crease_angle, cross_creases))
+
+
+def neighbor_masks_task(
+    gbuffer: GBuffer, crease_angle: float, cross_creases: bool
+) -> Task[np.ndarray]:
+    """Find, for each pixel, the neighbors to which a streamline may step.
 
     Parameters
     ----------
@@ -102,7 +110,9 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
     width = int(column.max()) + 2
     min_normal_cosine = None if cross_creases else np.float32(np.cos(crease_angle))
     band_rows = max(BLOCK_PIXELS // width, 1)
-    for row_start in range(int(row[0]), int(row[-1]) + 1, band_rows):
+    first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
+    for row_start in range(first_row, first_row + row_count, band_rows):
+        yield Progress((row_start - first_row) / row_count, "finding neighbors")
         # The grid has one more row: the first row of the next band, or an empty row.
         first, stop = np.searchsorted(
             row, np.array([row_start, row_start + band_rows + 1], row.dtype)

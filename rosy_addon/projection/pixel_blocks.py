@@ -1,0 +1,18 @@
+"""Blocks of pixels: the unit in which long lists of pixels are processed.
+
+A block bounds the memory of intermediate results, fits the caches of the processor, and is short
+enough to be a step of a task.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+#: Pixels per block.
+BLOCK_PIXELS = 1 << 14
+
+
+def pixel_blocks(count: int) -> Iterator[slice]:
+    """Yield slices of at most `BLOCK_PIXELS` that cover `count` pixels."""
+    for start in range(0, count, BLOCK_PIXELS):
+        yield slice(start, min(start + BLOCK_PIXELS, count))

@@ -11,7 +11,9 @@ from ..cache import Cache
 from ..color import map_colors, to_linear
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .contrast import blend_gain, scale_contrast, supersampling_gain
+from .covering import scatter_rows
 from .family_hues import family_hues
 from .hatching import (
     LineModulation,
@@ -26,17 +28,13 @@ from .lic import METHODS, lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
 from .look_units import look_in_pixels, supersampled_look
-from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
-from .per_pixel_lic import pixel_blocks
+from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
 from .picture import DegreeLayer, Picture
 from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
 from .target_tone import ReferenceRender, target_tone_task
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 14
 
 #: Contrast of streaks in colored pictures, relative to gray pictures.
 COLOR_CONTRAST = 1.5
@@ -94,13 +92,13 @@ def compose_task(
         yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
         images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
-        layer = _build_layer(field, pixel_look, images)
+        layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
         part_look = (
             with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
         )
         tone = modulation = None
         if is_hatched(look):
-            tone = np.clip(tone_rgb[field.gbuffer_index].mean(axis=1), 0, 1)
+            tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
             modulation = yield from subtask(
                 _line_modulation_task(stages, field, pixel_look, tone), stop, stop
             )
@@ -117,9 +115,12 @@ def compose_task(
         layers.append(layer)
     if not is_hatched(look):
         color *= tone_rgb
-    yield Progress(1.0, "drawing the ink")
-    rgba = _resolve_pixels(
-        gbuffer.pixel, color, alpha, camera.width, camera.height, look.supersampling
+    rgba = yield from subtask(
+        _resolve_pixels_task(
+            gbuffer.pixel, color, alpha, camera.width, camera.height, look.supersampling
+        ),
+        1.0,
+        1.0,
     )
     return Picture(rgba, tuple(layers))
 
@@ -165,12 +166,21 @@ def compose_planar(
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = replace(look, supersampling=1)
-    layer = _build_layer(field, look, run_to_completion(lic_task(field, look, noise)))
+    images = run_to_completion(lic_task(field, look, noise))
+    layer = run_to_completion(_layer_task(field, look, images))
     color = _colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
-    return Picture(
-        _resolve_pixels(field.pixel, color, opaque, field.width, field.height, 1), (layer,)
-    )
+    rgba_task = _resolve_pixels_task(field.pixel, color, opaque, field.width, field.height, 1)
+    return Picture(run_to_completion(rgba_task), (layer,))
+
+
+def _mean_tone_task(tone_rgb: np.ndarray) -> Task[np.ndarray]:
+    """(P,) float32 tones from 0 to 1: the means of the three channels of (P, 3) tones."""
+    tone = np.empty(len(tone_rgb), dtype=np.float32)
+    for block in pixel_blocks(len(tone)):
+        yield Progress(block.start / len(tone), "finding tones")
+        tone[block] = np.clip(tone_rgb[block].mean(axis=1), 0, 1)
+    return tone
 
 
 def _line_modulation_task(
@@ -184,7 +194,7 @@ def _line_modulation_task(
         paper_grain = yield from _paper_grain_task(stages, field, look)
     if has_overshoot(look):
         line_tones = yield from _tone_along_lines_task(field, look, tone)
-    outline = stages.outline(field, look) if has_outline(look) else None
+    outline = (yield from stages.outline_task(field, look)) if has_outline(look) else None
     return LineModulation(break_images, paper_grain, line_tones, outline)
 
 
@@ -194,13 +204,17 @@ def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> T
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.
-    ones = np.ones_like(tone)
-    images = yield from METHODS[look.method](
-        field, overshoot_look, np.stack([tone, ones, ones], axis=1)
-    )
-    centered = images.members - np.float32(NOISE_MEAN)
-    means = NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
-    return np.clip(means, 0, 1)
+    channels = np.ones((len(tone), 3), dtype=np.float32)
+    channels[:, 0] = tone
+    images = yield from METHODS[look.method](field, overshoot_look, channels)
+    means = np.empty(images.members.shape[:2], dtype=np.float32)
+    for block in pixel_blocks(len(tone)):
+        yield Progress(1.0, "finding tones")
+        centered = images.members[:, block] - np.float32(NOISE_MEAN)
+        means[:, block] = (
+            NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
+        )
+    return np.clip(means, 0, 1, out=means)
 
 
 def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> Task[np.ndarray]:
@@ -208,20 +222,30 @@ def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> T
     if look.anchor == "picture":
         subpixels = look.supersampling
         grain = look.grain / subpixels
-        return picture_paper_grain(
-            field.pixel, field.width, grain, look.seed, subpixels, field.line_count
+        return (
+            yield from picture_paper_grain_task(
+                field.pixel, field.width, grain, look.seed, subpixels, field.line_count
+            )
         )
-    heights = (yield from stages.surface_paper_grain_task(field, look)) - np.float32(NOISE_MEAN)
-    heights /= np.float32(look_streak_statistics(look).paper_grain_std)
-    return heights.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
+    noise = yield from stages.surface_paper_grain_task(field, look)
+    std = np.float32(look_streak_statistics(look).paper_grain_std)
+    channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
+    heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
+    for block in pixel_blocks(len(noise)):
+        yield Progress(1.0, "drawing the paper grain")
+        heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / std).T[channel]
+    return heights
 
 
-def _build_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLayer:
+def _layer_task(field: PixelField, look: Look, images: LicImages) -> Task[DegreeLayer]:
     """Build the layer of one degree: its blend, with the contrast of one image times the gain."""
-    gain = look.gain * blend_gain(field.line_count, images.effective_samples, look)
-    if look.supersampling > 1:
-        gain *= np.float32(supersampling_gain(look))
-    tone = scale_contrast(images.blend, gain[:, None])
+    supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
+    tone = np.empty_like(images.blend)
+    for block in pixel_blocks(len(tone)):
+        yield Progress(block.start / len(tone), "blending lines")
+        effective_samples = images.effective_samples[block]
+        gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
+        tone[block] = scale_contrast(images.blend[block], gain[:, None])
     return DegreeLayer(field.degree, field.pixel, images, tone)
 
 
@@ -240,14 +264,14 @@ def _colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look
     return to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
 
 
-def _resolve_pixels(
+def _resolve_pixels_task(
     pixel: np.ndarray,
     color: np.ndarray,
     alpha: np.ndarray,
     width: int,
     height: int,
     supersampling: int,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Assemble the image from the colors of subpixels.
 
     Parameters
@@ -267,21 +291,25 @@ def _resolve_pixels(
     (height / supersampling, width / supersampling, 4) float32 ndarray
         Linear RGBA, not premultiplied.
     """
-    rgba = np.zeros((height * width, 4), dtype=np.float32)
-    # The four floats of a pixel are copied as one complex128.
-    scalars = rgba.view(np.complex128)[:, 0]
-    for start in range(0, len(pixel), BLOCK_PIXELS):
-        block = slice(start, start + BLOCK_PIXELS)
-        block_alpha = alpha[block, None]
-        # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
-        premultiplied = color[block] if supersampling == 1 else color[block] * block_alpha
-        block_rgba = np.empty((len(block_alpha), 4), dtype=np.float32)
-        block_rgba[:, :3], block_rgba[:, 3:] = premultiplied, block_alpha
-        scalars[pixel[block]] = block_rgba.view(np.complex128)[:, 0]
     s = supersampling
-    if s == 1:
-        return rgba.reshape(height, width, 4)
-    rgba = rgba.reshape(height // s, s, width // s, s, 4).mean(axis=(1, 3))
-    alpha = rgba[..., 3:]
-    np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    rgba = np.zeros((height // s, width // s, 4), dtype=np.float32)
+    band_rows = max(BLOCK_PIXELS // (width * s), 1)
+    for start in range(0, height // s, band_rows):
+        yield Progress(start * s / height, "drawing the ink")
+        band = rgba[start : start + band_rows]
+        first_pixel = start * s * width
+        border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)
+        block = slice(*np.searchsorted(pixel, border.astype(pixel.dtype)).tolist())
+        # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
+        band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
+        block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
+        block_rgba[:, 3] = alpha[block]
+        block_rgba[:, :3] = color[block] if s == 1 else color[block] * alpha[block, None]
+        scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+        if s == 1:
+            band[...] = band_rgba.reshape(band.shape)
+            continue
+        band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+        band_alpha = band[..., 3:]
+        np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
     return rgba

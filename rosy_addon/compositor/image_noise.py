@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
+from ..progress import Progress, Task, run_to_completion, subtask
+from ..projection.pixel_blocks import pixel_blocks
+from .picture_tiles import TileRectangle, cached_tiles_task, tile_rectangle
 
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
@@ -23,11 +25,8 @@ BLUR_FACTOR = 0.5
 #: would take longer than the picture, and their mean hardly differs from `NOISE_MEAN`.
 MAX_MARGIN = 512
 
-#: Noise is computed for whole tiles of the picture. Side of a tile in pixels.
-TILE_PIXELS = 256
-
-#: Maximum number of pixels of a noise image that is cached for the next picture.
-MAX_CACHED_PIXELS = 1 << 22
+#: Label of all steps.
+STEP_LABEL = "making noise"
 
 #: Rows or columns that are blurred together. Their sums fit the caches of the processor.
 BLUR_LINES = 32
@@ -137,37 +136,24 @@ def image_noise_task(
         The mean is `NOISE_MEAN`. The standard deviation of cells, before they are filtered, is
         `NOISE_STD`. With the density 0.5 and without a high pass, values are from 0 to 1.
     """
-    row, column = np.divmod(pixel, np.int32(width))
-    # Whole tiles do not change while the visible region changes a little, so they stay cached.
-    left, right = tile_bounds(int(column.min()), int(column.max()) + 1)
-    bottom, top = tile_bounds(int(row[0]), int(row[-1]) + 1)
-    is_cached = (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
-    tile_index = (row - bottom) * np.int32(right - left) + (column - left)
-    noise = np.empty((channels, len(pixel)), dtype=np.float32)
+    rectangle = tile_rectangle(pixel, width)
+    noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
-        yield Progress(channel / channels, "making noise")
-        args = left, right, bottom, top, grain, seed, channel, density, high_pass
-        tiles = _noise_tiles(*args) if is_cached else (yield from _noise_tiles_task(*args))
-        tiles.take(tile_index, out=noise[channel], mode="clip")
-    return np.ascontiguousarray(noise.T)
-
-
-def tile_bounds(start: int, stop: int) -> tuple[int, int]:
-    """Round a range of rows or columns outward to whole tiles."""
-    return start // TILE_PIXELS * TILE_PIXELS, -(-stop // TILE_PIXELS) * TILE_PIXELS
-
-
-@lru_cache(maxsize=6)
-def _noise_tiles(*args: Any) -> np.ndarray:
-    """Return the result of `_noise_tiles_task`."""
-    return run_to_completion(_noise_tiles_task(*args))
+        settings = grain, seed, channel, density, high_pass
+        tiles = yield from subtask(
+            cached_tiles_task(_noise_tiles_task, rectangle, *settings),
+            channel / channels,
+            (channel + 1) / channels,
+        )
+        for block in pixel_blocks(len(pixel)):
+            yield Progress((channel + 1) / channels, STEP_LABEL)
+            index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
+            noise[block, channel] = tiles.take(index)
+    return noise
 
 
 def _noise_tiles_task(
-    left: int,
-    right: int,
-    bottom: int,
-    top: int,
+    rectangle: TileRectangle,
     grain: float,
     seed: int,
     channel: int,
@@ -177,17 +163,19 @@ def _noise_tiles_task(
     """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
     full_margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
     margin = min(full_margin, MAX_MARGIN)
+    left, right, bottom, top = rectangle
     padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
-    cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
+    cells = yield from _lattice_noise_task(*padded_bounds, grain, seed, channel, density)
     if high_pass:
         outside = "edge" if margin == full_margin else "mean"
         blur_task = gaussian_blur_task(cells, BLUR_FACTOR * high_pass, outside)
         cells += NOISE_MEAN - (yield from blur_task)
+        yield Progress(1.0, STEP_LABEL)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
 
-def _lattice_noise(
+def _lattice_noise_task(
     left: int,
     right: int,
     bottom: int,
@@ -196,7 +184,7 @@ def _lattice_noise(
     seed: int,
     channel: int,
     density: float,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(top - bottom, right - left) float32 noise without high pass, averaged over each pixel."""
     cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
     column = np.arange(left, right, dtype=np.float64)
@@ -204,6 +192,7 @@ def _lattice_noise(
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((top - bottom, right - left), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
+        yield Progress(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         for y in taps:
             for x in taps:
@@ -252,7 +241,7 @@ def gaussian_blur_task(
     for index, axis in enumerate((0, 1, 0, 1, 0, 1)):
         blurred = np.empty(image.shape, dtype=np.float32)
         for start in range(0, image.shape[1 - axis], BLUR_LINES):
-            yield Progress((index + start / image.shape[1 - axis]) / 6, "making noise")
+            yield Progress((index + start / image.shape[1 - axis]) / 6, STEP_LABEL)
             lines = [slice(None), slice(None)]
             lines[1 - axis] = slice(start, start + BLUR_LINES)
             blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)

@@ -9,19 +9,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_neighbors import affine_depth, neighbor_masks
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.pixel_neighbors import affine_depth, neighbor_masks_task
 from .look import Look
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.affine_depth`).
 DEPTH_JUMP = 2.0
 
+#: Label of all steps.
+STEP_LABEL = "drawing outlines"
+
 #: (dx, dy, bit) of the four nearest neighbors. The bit is that of `neighbor_masks`.
 NEIGHBORS_4 = ((1, 0, 5), (-1, 0, 3), (0, 1, 7), (0, -1, 1))
 
 
 def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
+    """Return the coverage by outlines, without progress reports; see `outline_task`."""
+    return run_to_completion(outline_task(gbuffer, look))
+
+
+def outline_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     """Compute the coverage of each pixel by outlines.
 
     Parameters
@@ -44,13 +54,17 @@ def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
     cell = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
     entry_of_cell[cell] = np.arange(len(cell), dtype=np.int32)
     # Larger depths are nearer to the eye.
-    depth, tolerance = affine_depth(gbuffer)
-    edge_pixels, line_width = _outline_edges(
-        gbuffer, look, entry_of_cell, cell, stride, depth, tolerance
+    depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
+    for block in pixel_blocks(len(cell)):
+        yield Progress(0.2 * block.start / len(cell), STEP_LABEL)
+        depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
+    edge_pixels, line_width = yield from subtask(
+        _outline_edges_task(gbuffer, look, entry_of_cell, cell, stride, depth, tolerance), 0.2, 0.9
     )
     depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
     coverage = np.zeros(len(cell), dtype=np.float32)
     for distance, dx, dy in _disc_offsets(radius):
+        yield Progress(0.9, STEP_LABEL)
         neighbor = entry_of_cell.take(cell[edge_pixels] + (dy * stride + dx))
         paintable = (neighbor >= 0) & (
             gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge_pixels]
@@ -64,7 +78,7 @@ def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
     return coverage
 
 
-def _outline_edges(
+def _outline_edges_task(
     gbuffer: GBuffer,
     look: Look,
     entry_of_cell: np.ndarray,
@@ -72,7 +86,7 @@ def _outline_edges(
     stride: int,
     depth: np.ndarray,
     tolerance: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Find the pixels at an edge of their surface, unless the neighbor occludes them.
 
     Both sides of a crease are edges, so each gets half the width. There is no edge at the border of
@@ -85,22 +99,27 @@ def _outline_edges(
     line_width : (n,) float32 ndarray
         Width of the line at these pixels, in pixels.
     """
-    mask = neighbor_masks(gbuffer, look.crease_angle, look.cross_creases)
-    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    masks_task = neighbor_masks_task(gbuffer, look.crease_angle, look.cross_creases)
+    mask = yield from subtask(masks_task, 0.0, 0.6, STEP_LABEL)
     defined = gbuffer.representation != 0
     line_width = np.zeros(len(cell), dtype=np.float32)
-    for dx, dy, bit in NEIGHBORS_4:
-        inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
-        inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
-        border = np.flatnonzero(inside & defined & (mask >> np.uint16(bit) & 1 == 0))
-        neighbor = entry_of_cell.take(cell[border] + (dy * stride + dx))
-        jump = (depth.take(neighbor) - depth[border]) / (np.float32(DEPTH_JUMP) * tolerance[border])
-        same_depth = (np.abs(jump) <= 1) & (neighbor >= 0)
-        side_width = np.where(same_depth, np.float32(look.outline / 2), np.float32(look.outline))
-        side_width[(jump > 1) & (neighbor >= 0)] = 0
-        same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[border]
-        side_width[same_instance & ~defined.take(neighbor) & (neighbor >= 0)] = 0
-        line_width[border] = np.maximum(line_width[border], side_width)
+    for block in pixel_blocks(len(cell)):
+        yield Progress(0.6 + 0.4 * block.start / len(cell), STEP_LABEL)
+        row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
+        for dx, dy, bit in NEIGHBORS_4:
+            inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
+            inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
+            is_border = inside & defined[block] & (mask[block] >> np.uint16(bit) & 1 == 0)
+            border = np.flatnonzero(is_border) + block.start
+            neighbor = entry_of_cell.take(cell[border] + (dy * stride + dx))
+            jump_limit = np.float32(DEPTH_JUMP) * tolerance[border]
+            jump = (depth.take(neighbor) - depth[border]) / jump_limit
+            same_depth = (np.abs(jump) <= 1) & (neighbor >= 0)
+            width = np.where(same_depth, np.float32(look.outline / 2), np.float32(look.outline))
+            width[(jump > 1) & (neighbor >= 0)] = 0
+            same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[border]
+            width[same_instance & ~defined.take(neighbor) & (neighbor >= 0)] = 0
+            line_width[border] = np.maximum(line_width[border], width)
     edge_pixels = np.flatnonzero(line_width)
     return edge_pixels, line_width[edge_pixels]
 

@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from .image_noise import box_radius, gaussian_blur, hash_bits_2d, tile_bounds
+from ..progress import Progress, Task, run_to_completion, subtask
+from ..projection.pixel_blocks import pixel_blocks
+from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur_task, hash_bits_2d
 from .look import Look
+from .picture_tiles import TileRectangle, cached_tiles_task, tile_rectangle
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
 #: grains, and its minimum in pixels.
@@ -37,13 +40,22 @@ SURFACE_CELL_GRAINS, MIN_SURFACE_CELL_PIXELS, HIGH_PASS_CELLS = 0.4, 1.5, 6.0
 #: Number of independent noise channels on surfaces. Lines use them in turn.
 PAPER_GRAIN_CHANNELS = 3
 
-#: Maximum number of pixels of a grain image that is cached for the next picture.
-MAX_CACHED_PIXELS = 1 << 22
+#: Label of all steps.
+STEP_LABEL = "drawing the paper grain"
 
 
 def picture_paper_grain(
     pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
 ) -> np.ndarray:
+    """Return paper grain, without progress reports; see `picture_paper_grain_task`."""
+    return run_to_completion(
+        picture_paper_grain_task(pixel, width, grain, seed, subpixels, line_count)
+    )
+
+
+def picture_paper_grain_task(
+    pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
+) -> Task[np.ndarray]:
     """Make paper grain that is anchored to the picture.
 
     The grain of different lines must be independent. Otherwise the coverages of crossing lines
@@ -69,19 +81,17 @@ def picture_paper_grain(
     (line_count, P) float32 ndarray
         Heights with mean 0 and standard deviation 1. Ink adheres better where they are larger.
     """
-    row, column = np.divmod(pixel, np.int32(width))
-    row, column = row // subpixels, column // subpixels
     offset = line_offset(grain)
-    left, right = tile_bounds(int(column.min()), int(column.max()) + 1 + (line_count - 1) * offset)
-    bottom, top = tile_bounds(int(row[0]), int(row[-1]) + 1)
-    make = (
-        _grain_tiles
-        if (right - left) * (top - bottom) <= MAX_CACHED_PIXELS
-        else _grain_tiles.__wrapped__
-    )
-    tiles = make(left, right, bottom, top, grain, seed)
-    tile_index = (row - bottom) * np.int32(right - left) + (column - left)
-    return np.stack([tiles.take(tile_index + line * offset) for line in range(line_count)])
+    rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
+    tiles = yield from cached_tiles_task(_grain_tiles_task, rectangle, grain, seed)
+    heights = np.empty((line_count, len(pixel)), dtype=np.float32)
+    for block in pixel_blocks(len(pixel)):
+        yield Progress(block.start / len(pixel), STEP_LABEL)
+        row, column = np.divmod(pixel[block], np.int32(width))
+        index = rectangle.index(row // subpixels, column // subpixels)
+        for line in range(line_count):
+            heights[line, block] = tiles.take(index + line * offset)
+    return heights
 
 
 def surface_paper_grain_args(look: Look) -> dict[str, Any]:
@@ -116,37 +126,43 @@ def _band_sigmas(grain: float) -> list[float]:
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
-@lru_cache(maxsize=2)
-def _grain_tiles(
-    left: int, right: int, bottom: int, top: int, grain: float, seed: int
-) -> np.ndarray:
+def _grain_tiles_task(rectangle: TileRectangle, grain: float, seed: int) -> Task[np.ndarray]:
     """Flat float32 heights in a rectangle of the picture, row by row."""
     sigmas = _band_sigmas(grain)
     margin = 4 * box_radius(sigmas[-1])
+    left, right, bottom, top = rectangle
     column = np.arange(left - margin, right + margin, dtype=np.int32)
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
-    white = hash_bits_2d(column, row, seed ^ SEED_SALT, 0, 0.5).astype(np.float32) - np.float32(0.5)
-    heights = _band_noise(white, sigmas)[margin:-margin, margin:-margin]
+    white = np.empty((len(row), len(column)), dtype=np.float32)
+    for start in range(0, len(row), BLOCK_ROWS):
+        yield Progress(0.0, STEP_LABEL)
+        block = slice(start, start + BLOCK_ROWS)
+        bits = hash_bits_2d(column, row[block], seed ^ SEED_SALT, 0, 0.5)
+        white[block] = bits.astype(np.float32) - np.float32(0.5)
+    heights = (yield from _band_noise_task(white, sigmas))[margin:-margin, margin:-margin]
     return np.ascontiguousarray(heights / np.float32(_band_noise_std(*sigmas))).reshape(-1)
 
 
-def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
+def _band_noise_task(white: np.ndarray, sigmas: Sequence[float]) -> Task[np.ndarray]:
     """Weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
     total = np.zeros_like(white)
-    finer = _blur(white, sigmas[0])
+    finer = yield from _blur_task(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
-        broader = _blur(white, broader_sigma)
+        broader = yield from _blur_task(white, broader_sigma)
+        yield Progress(0.0, STEP_LABEL)
         # The standard deviation of blurred white noise is proportional to 1 / sigma.
         total += np.float32(weight * finer_sigma / sigmas[0]) * (finer - broader)
         finer = broader
+    yield Progress(0.0, STEP_LABEL)
     return total
 
 
-def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
+def _blur_task(image: np.ndarray, sigma: float) -> Task[np.ndarray]:
     """Approximate a Gaussian blur, including small ones that `gaussian_blur` does not support."""
     if sigma > 1.5:
-        return gaussian_blur(image, sigma)
+        return (yield from subtask(gaussian_blur_task(image, sigma), 0.0, 0.0, STEP_LABEL))
     for axis in (0, 1) * max(round(2 * sigma**2), 1):
+        yield Progress(0.0, STEP_LABEL)
         # The kernel (1, 2, 1) / 4 has the variance 1 / 2.
         forward, backward = (np.roll(image, shift, axis=axis) for shift in (1, -1))
         image = np.float32(0.5) * image + np.float32(0.25) * (forward + backward)
@@ -159,4 +175,4 @@ def _band_noise_std(*sigmas: float) -> float:
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1
-    return float(np.linalg.norm(_band_noise(impulse, sigmas)) / 2)
+    return float(np.linalg.norm(run_to_completion(_band_noise_task(impulse, sigmas))) / 2)

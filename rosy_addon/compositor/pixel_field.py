@@ -339,8 +339,13 @@ def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
 
 
 def rotated(values: np.ndarray, angle: float) -> np.ndarray:
-    """Rotate complex numbers by an angle. Rounded once, so all versions of numpy agree."""
-    return (values.astype(np.complex128) * np.complex128(np.exp(1j * angle))).astype(np.complex64)
+    """Rotate complex numbers by an angle in radians."""
+    return product(values, np.complex128(np.exp(1j * angle)))
+
+
+def product(a: np.ndarray, b: np.ndarray | np.complex128) -> np.ndarray:
+    """Multiply complex numbers, as complex64. Rounded once, so all versions of numpy agree."""
+    return (a.astype(np.complex128) * b).astype(np.complex64)
 
 
 def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:

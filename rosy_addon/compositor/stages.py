@@ -13,11 +13,11 @@ from .lic import lic_task, noise_args
 from .lic_images import LicImages
 from .look import Look, lic_key
 from .look_units import cell_size_args
-from .outline import outline_coverage
+from .outline import outline_task
 from .paper_grain import surface_paper_grain_args
-from .pixel_field import PixelField, surface_pixel_field
+from .pixel_field import PixelField, surface_pixel_field_task
 from .surface_noise import surface_noise_task
-from .wobble import has_wobble, rotate_pixel_field, wobble_angle_task
+from .wobble import has_wobble, rotate_pixel_field_task, wobble_angle_task
 
 #: Share of the progress of LIC that the noise takes.
 NOISE_SHARE = 0.3
@@ -43,14 +43,14 @@ class ComposeStages:
     def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
         """Pixel field of one degree, rotated by the wobble of the look."""
         settings = look.crease_angle, look.cross_creases
-        field = self._cache.get_or_create(
+        field = yield from self._cache.get_or_create_task(
             ("pixel field", self._gbuffer, degree, *settings),
-            lambda: surface_pixel_field(self._gbuffer, degree, *settings),
+            lambda: surface_pixel_field_task(self._gbuffer, degree, *settings),
         )
         if not has_wobble(look):
             return field
-        angle = yield from self._wobble_angle_task(look)
-        return rotate_pixel_field(field, np.float32(look.wobble) * angle[field.gbuffer_index])
+        angle = (yield from self._wobble_angle_task(look))[field.gbuffer_index]
+        return (yield from rotate_pixel_field_task(field, np.float32(look.wobble) * angle))
 
     def lic_task(self, field: PixelField, look: Look) -> Task[LicImages]:
         """Compute the LIC images of the members of a field, or find them in the cache."""
@@ -62,11 +62,11 @@ class ComposeStages:
         key = "LIC images", self._gbuffer, field.degree, lic_key(look)
         return (yield from self._cache.get_or_create_task(key, compute_task))
 
-    def outline(self, field: PixelField, look: Look) -> np.ndarray:
-        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
-        coverage = self._cache.get_or_create(
+    def outline_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
+        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""
+        coverage = yield from self._cache.get_or_create_task(
             ("outline", self._gbuffer, look.outline, look.crease_angle, look.cross_creases),
-            lambda: outline_coverage(self._gbuffer, look),
+            lambda: outline_task(self._gbuffer, look),
         )
         return coverage[field.gbuffer_index]
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_coordinates_task
 from .image_noise import (
     BLUR_FACTOR,
@@ -28,7 +29,6 @@ from .image_noise import (
     gaussian_blur_task,
     hash_bits_nd,
 )
-from .per_pixel_lic import pixel_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
 SUBPIXEL_OFFSETS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))

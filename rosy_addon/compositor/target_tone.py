@@ -14,9 +14,9 @@ from ..progress import Progress, Task, run_to_completion
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
+from ..projection.pixel_blocks import pixel_blocks
 from ..projection.tone_sampling import surface_tones
 from .look import Look
-from .per_pixel_lic import pixel_blocks
 from .shading import Light, diffuse, light_visibility_task
 
 #: Minimum difference between the tones that become white and black.

@@ -15,10 +15,11 @@ import numpy as np
 from ..deterministic_trig import cos_sin, unit_phasor
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import rest_coordinates_task
 from .look import Look, is_hatched
 from .look_units import cell_size_args
-from .pixel_field import PixelField
+from .pixel_field import PixelField, product
 from .surface_noise import cell_scale, instance_units
 
 #: Number of plane waves in the sum.
@@ -34,9 +35,6 @@ WOBBLE_STD = 0.09
 #: -1 to 1: a sine approximated by two parabolas, with the variance 16 / 30. Unlike `sin`, it has
 #: the same bits on all platforms.
 UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 15
 
 
 def has_wobble(look: Look) -> bool:
@@ -88,9 +86,8 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
         units = instance_units(gbuffer, cell_size["pixel"])
         rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.5)
     angle = np.empty(count, dtype=np.float32)
-    for start in range(0, count, BLOCK_PIXELS):
-        yield Progress(0.5 + 0.5 * start / count, "bending lines")
-        block = slice(start, start + BLOCK_PIXELS)
+    for block in pixel_blocks(count):
+        yield Progress(0.5 + 0.5 * block.start / count, "bending lines")
         if rest is None:
             row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
             position = np.stack([column, row, 0 * row]).astype(np.float32)
@@ -105,22 +102,34 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     return np.float32(WOBBLE_STD) * angle
 
 
-def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
-    """Return the pixel field with its directions rotated in the view plane.
+def rotate_pixel_field_task(field: PixelField, angle: np.ndarray) -> Task[PixelField]:
+    """Rotate the directions of a pixel field in the view plane.
 
     Parameters
     ----------
     field : PixelField
     angle : (P,) ndarray
         Radians, counter-clockwise.
+
+    Returns
+    -------
+    PixelField
     """
-    angle = angle.astype(np.float64)
+    representation = np.empty_like(field.representation)
     channels = {
-        # A harmonic is a function of the member. The factor keeps its value for rotated members.
-        (kind, number): values * unit_phasor(-number * angle) if kind == "deviation" else values
-        for (kind, number), values in field.channels.items()
+        channel: np.empty_like(values) if channel[0] == "deviation" else values
+        for channel, values in field.channels.items()
     }
-    representation = field.representation * unit_phasor(field.degree * angle)
+    for block in pixel_blocks(len(angle)):
+        yield Progress(block.start / len(angle), "bending lines")
+        block_angle = angle[block].astype(np.float64)
+        phase = unit_phasor(field.degree * block_angle)
+        representation[block] = product(field.representation[block], phase)
+        for channel, values in field.channels.items():
+            if channel[0] == "deviation":
+                # A harmonic is a function of the member. This keeps its value for rotated members.
+                phase = unit_phasor(-channel[1] * block_angle)
+                channels[channel][block] = product(values[block], phase)
     return replace(field, representation=representation, channels=channels)
 
 

@@ -13,9 +13,7 @@ import numpy as np
 from ..field.frames import dot_components, transport_components, view_frame
 from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 14
+from .pixel_blocks import BLOCK_PIXELS
 
 #: Upper bound of the slope of a tangent plane against the picture, in pixels of depth per pixel.
 #: Corresponds to 88 degrees.
@@ -46,19 +44,17 @@ def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
     to_pixels /= 2 * camera.pixels_per_unit
     to_pixels = to_pixels.astype(np.float32)
     jacobians = np.empty((2, len(gbuffer.pixel)), dtype=np.complex64)
-    for start in range(0, len(gbuffer.pixel), BLOCK_PIXELS):
-        block = slice(start, start + BLOCK_PIXELS)
-        view_direction, normal = gbuffer.view_direction[block].T, gbuffer.normal[block].T
-        ray = view_direction[:2] / view_direction[2] if camera.is_perspective else None
-        frame = (axis.T for axis in view_frame(view_direction.T))
-        for axis, out in zip(frame, jacobians[:, block], strict=True):
-            x, y, depth = transport_components(axis, view_direction, normal)
-            if ray is not None:
-                # Subtract the motion along the ray, which does not move the projected point.
-                x -= depth * ray[0]
-                y -= depth * ray[1]
-            out.real = x * to_pixels[0, 0] + y * to_pixels[0, 1]
-            out.imag = x * to_pixels[1, 0] + y * to_pixels[1, 1]
+    view_direction, normal = gbuffer.view_direction.T, gbuffer.normal.T
+    ray = view_direction[:2] / view_direction[2] if camera.is_perspective else None
+    frame = (axis.T for axis in view_frame(gbuffer.view_direction))
+    for axis, out in zip(frame, jacobians, strict=True):
+        x, y, depth = transport_components(axis, view_direction, normal)
+        if ray is not None:
+            # Subtract the motion along the ray, which does not move the projected point.
+            x -= depth * ray[0]
+            y -= depth * ray[1]
+        out.real = x * to_pixels[0, 0] + y * to_pixels[0, 1]
+        out.imag = x * to_pixels[1, 0] + y * to_pixels[1, 1]
     return jacobians.T
 
 
@@ -146,10 +142,7 @@ def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
         Depth: z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
         Tolerance: permitted deviation from the prediction of the tangent plane, one pixel away.
     """
-    depth, tolerance = np.empty((2, len(gbuffer.pixel)), dtype=np.float32)
-    for start in range(0, len(gbuffer.pixel), BLOCK_PIXELS):
-        block = slice(start, start + BLOCK_PIXELS)
-        depth[block], _, _, tolerance[block] = _depth_slopes(gbuffer, block)
+    depth, _, _, tolerance = _depth_slopes(gbuffer, slice(None))
     return depth, tolerance
 
 

@@ -23,10 +23,8 @@ from .camera import Camera, pixel_rays
 from .corner_field import CornerField, cached_corner_field_task
 from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
+from .pixel_blocks import pixel_blocks
 from .rasterizer import Fragments, rasterize_task
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 14
 
 #: Largest holonomy over a triangle, in radians, that is neglected in the interpolation of values.
 HOLONOMY_EPS = 3e-4
@@ -121,12 +119,11 @@ def project_task(
         )
         corner_field = corner_field.rotated(camera.view[:3, :3])
         _allocate_channels(gbuffer, corner_field)
-        for block_start in range(0, len(triangle), BLOCK_PIXELS):
+        for block in pixel_blocks(len(triangle)):
             yield Progress(
-                midpoint + (stop - midpoint) * block_start / len(triangle),
+                midpoint + (stop - midpoint) * block.start / len(triangle),
                 "rotating the field into the view plane",
             )
-            block = slice(block_start, block_start + BLOCK_PIXELS)
             target_pixels = block if visible.is_single_instance else pixels[block]
             _fill_pixels(
                 gbuffer,
@@ -232,9 +229,8 @@ def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> T
         )
     instance_has_field = np.array([instance.field is not None for instance in instances])
     instance_id, triangle = np.empty((2, len(fragments.pixel)), dtype=np.int32)
-    for start in range(0, len(instance_id), BLOCK_PIXELS):
+    for block in pixel_blocks(len(instance_id)):
         yield Progress(1.0, "finding visible pixels")
-        block = slice(start, start + BLOCK_PIXELS)
         all_triangles = fragments.triangle[block]
         instance_id[block] = np.searchsorted(first_triangle, all_triangles, side="right") - 1
         triangle[block] = all_triangles - first_triangle[instance_id[block]]
@@ -324,9 +320,8 @@ def _new_gbuffer_task(
         )
         face[pixels] = instances[instance_id].surface.triangle_face.take(visible.triangle[pixels])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
-    for start in range(0, count, BLOCK_PIXELS):
-        yield Progress(start / count, "finding visible pixels")
-        block = slice(start, start + BLOCK_PIXELS)
+    for block in pixel_blocks(count):
+        yield Progress(block.start / count, "finding visible pixels")
         x, y = pixel_rays(camera, fragments.pixel[block])
         position[block, 2] = _z_at_depth(camera, x, y, fragments.depth[block])
         if camera.is_perspective:

@@ -13,9 +13,7 @@ from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
 from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer, MeshInstance
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 14
+from .pixel_blocks import pixel_blocks
 
 #: Distance of a mesh from its object's origin, in multiples of its size, beyond which positions are
 #: taken relative to the mesh: float32 would be too coarse for them.
@@ -104,10 +102,9 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
         pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
-        for start in range(0, len(pixels), BLOCK_PIXELS):
-            block = pixels[start : start + BLOCK_PIXELS]
-            yield Progress((done + start) / count, "finding points on the surface")
-            _fill_pixels(coordinates, gbuffer, instance, rest, block)
+        for block in pixel_blocks(len(pixels)):
+            yield Progress((done + block.start) / count, "finding points on the surface")
+            _fill_pixels(coordinates, gbuffer, instance, rest, pixels[block])
         done += len(pixels)
     return coordinates
 

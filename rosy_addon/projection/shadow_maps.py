@@ -17,6 +17,7 @@ from ..field.frames import normalize
 from ..progress import Progress, Task, run_to_completion, subtask
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
 from .gbuffer import GBuffer, MeshInstance
+from .pixel_blocks import pixel_blocks
 from .project import rasterize_instances_task
 
 #: Default width and height of a shadow map, in pixels.
@@ -35,9 +36,6 @@ SINGLE_VIEW_MIN_RADII = 1.3
 
 #: Label of all steps.
 STEP_LABEL = "casting shadows"
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 15
 
 
 def light_cameras(
@@ -193,10 +191,9 @@ def shadow_visibility_task(gbuffer: GBuffer, cameras: Sequence[Camera]) -> Task[
         depth_map = yield from subtask(
             depth_map_task(gbuffer.instances, camera), index / len(cameras), rendered, STEP_LABEL
         )
-        for start in range(0, len(result), BLOCK_PIXELS):
-            fraction = rendered + (done - rendered) * start / len(result)
+        for block in pixel_blocks(len(result)):
+            fraction = rendered + (done - rendered) * block.start / len(result)
             yield Progress(fraction, STEP_LABEL)
-            block = slice(start, start + BLOCK_PIXELS)
             points = (gbuffer.position[block] - translation) @ rotation
             result[block] *= visibility_from(
                 camera, depth_map, points, gbuffer.normal[block] @ rotation

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from ..field.frames import dot
 from .gbuffer import GBuffer, MeshInstance
-
-#: Pixels per block. Bounds memory, and fits the caches of the processor.
-BLOCK_PIXELS = 1 << 14
 
 #: Lower bound of the cosine between normal and view direction. Bounds the area of the surface that
 #: a pixel covers.
@@ -31,7 +26,9 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
         Linear tones. NaN where the mesh instance has no tone.
     """
     tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance, pixels in _instance_blocks(gbuffer):
+    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
+        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
+        instance = gbuffer.instances[instance_id]
         tone = instance.tone
         if tone is None:
             continue
@@ -43,14 +40,6 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
             level = 0.5 * np.log2(_texel_footprint(gbuffer, instance, pixels, corners) + 1e-12)
             tones[pixels] = tone.mip_map.sample(*sampled, level, repeat=True)
     return tones
-
-
-def _instance_blocks(gbuffer: GBuffer) -> Iterator[tuple[MeshInstance, np.ndarray]]:
-    """Yield the visible mesh instances, each with blocks of indices of its pixels."""
-    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
-        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
-        for start in range(0, len(pixels), BLOCK_PIXELS):
-            yield gbuffer.instances[instance_id], pixels[start : start + BLOCK_PIXELS]
 
 
 def _texel_footprint(

@@ -14,7 +14,7 @@ from conftest import ROOT
 from bench import cases
 from rosy_addon import memory
 from rosy_addon.cache import Cache
-from rosy_addon.compositor import image_noise, streak_statistics
+from rosy_addon.compositor import image_noise, picture_tiles, streak_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.field.field_io import load_field
@@ -122,11 +122,8 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 def traced_peak(work) -> int:
     """Return the largest number of bytes that are allocated at once, as in a new process."""
-    for function in (
-        image_noise._noise_tiles,
-        image_noise.streak_moments,
-        streak_statistics.streak_statistics,
-    ):
+    picture_tiles.TILE_CACHE.clear()
+    for function in (image_noise.streak_moments, streak_statistics.streak_statistics):
         function.cache_clear()
     tracemalloc.start()
     try:

@@ -35,7 +35,7 @@ from rosy_addon.compositor.streak_statistics import (
     streak_statistics,
 )
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
-from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_angle
+from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field_task, wobble_angle
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.presets.store import load_preset, preset_keys
@@ -337,7 +337,7 @@ def test_wobble_rotates_all_directions(degree):
     angle = np.linspace(-0.3, 0.3, 90).astype(np.float32)
     harmonics = {("deviation", j): np.full(90, c) for j, c in ((-1, 0.1j), (0, 1), (1, 0.2 + 0j))}
     field = replace(field, channels=harmonics)
-    turned = rotate_pixel_field(field, angle)
+    turned = run_to_completion(rotate_pixel_field_task(field, angle))
     member = np.exp(1j * np.angle(field.representation) / degree)
     before = field.member_direction(member)
     after = turned.member_direction(member * np.exp(1j * angle))

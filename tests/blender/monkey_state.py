@@ -93,17 +93,21 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
     for scene in bpy.data.scenes:
         _add_scene(state, scene)
     view_layer = bpy.context.view_layer
-    active = view_layer.objects.active
     state["context"] = (
         bpy.context.scene.name,
         view_layer.name,
         bpy.context.mode,
-        None if active is None or is_owned(active) else active.name,
+        _users_object_name(view_layer.objects.active),
         sorted(
             obj.name for obj in view_layer.objects if obj and obj.select_get() and not is_owned(obj)
         ),
     )
     return state
+
+
+def _users_object_name(obj: bpy.types.Object | None) -> str | None:
+    """Name of an object, or None if there is none or RoSy made it."""
+    return None if obj is None or is_owned(obj) else obj.name
 
 
 def _is_deleted_camera(datablock: bpy.types.ID) -> bool:
@@ -235,7 +239,7 @@ def _attribute_digest(attribute: bpy.types.Attribute) -> str | None:
 
 def _add_scene(state: Fingerprint, scene: bpy.types.Scene) -> None:
     path = f"scenes/{_full_name(scene)}"
-    state[f"{path}/camera"] = scene.camera and scene.camera.name
+    state[f"{path}/camera"] = _users_object_name(scene.camera)
     state[f"{path}/frame"] = (scene.frame_current, scene.frame_subframe)
     state[f"{path}/world"] = scene.world and scene.world.name
     state[f"{path}/layers"] = [layer.name for layer in scene.view_layers]

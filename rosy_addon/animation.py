@@ -31,7 +31,7 @@ from .render.renderer import Renderer
 from .render.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
-from .scene.blender_images import frame_path, write_frame
+from .scene.blender_images import frame_path, image_data_task, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.look_properties import read_look
@@ -266,8 +266,10 @@ def _frame_task(
             if sidecar.exists():
                 check_writable(sidecar)
             picture = yield from subtask(renderer.render_task(view), start, stop)
+            image_task = image_data_task(picture, as_float=settings.as_float, to_file=True)
+            image_data = yield from subtask(image_task, stop, stop)
             sidecar.unlink(missing_ok=True)
-            write_frame(path, picture, settings.as_float)
+            write_frame(path, image_data)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
         results.append(
             _FrameResult(name, frame, view.camera, up_to_date, states[index], renderer.device_name)

@@ -12,6 +12,7 @@ from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
+from .scene.blender_images import image_data_task
 from .scene.cameras import CameraSource, render_camera
 from .scene.look_properties import read_look
 from .scene.picture_state import read_picture_states
@@ -90,8 +91,12 @@ def bake_task(
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
         start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
         picture = yield from subtask(renderer.render_task(view), start, stop)
+        image_task = image_data_task(
+            picture, as_float=settings.as_float, to_file=settings.folder is not None
+        )
+        image_data = yield from subtask(image_task, stop, stop)
         drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
-        rendered_views.append(RenderedView(picture, view.camera, drawn_from))
+        rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.97, "applying the pictures")
     results = [

@@ -12,6 +12,7 @@ from ..color import to_display, to_linear
 from ..errors import RosyError
 from ..file_io import read_bytes, write_bytes
 from ..memory import check_memory
+from ..progress import Progress, Task, run_to_completion
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
@@ -38,32 +39,33 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     RosyError
         If the file cannot be written.
     """
-    write_bytes(path, png_bytes(to_srgb_uint8(rgba)))
+    write_bytes(path, run_to_completion(png_task(rgba)))
 
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
     """Convert an (H, W, 4) linear picture to uint8 display values (sRGB). Alpha stays linear."""
-    result = np.empty(rgba.shape, dtype=np.uint8)
-    for start in range(0, len(rgba), BLOCK_ROWS):
-        block = rgba[start : start + BLOCK_ROWS]
-        display = np.concatenate(
-            [to_display(block[..., :3]), np.clip(block[..., 3:], 0, 1)], axis=-1
-        )
-        np.rint(display * 255, out=result[start : start + BLOCK_ROWS], casting="unsafe")
-    return result
+    display = np.concatenate([to_display(rgba[..., :3]), np.clip(rgba[..., 3:], 0, 1)], axis=-1)
+    return np.rint(display * 255).astype(np.uint8)
 
 
-def png_bytes(rgba: np.ndarray) -> bytes:
-    """Encode an (H, W, 4) uint8 picture (sRGB, rows from the bottom) as a PNG file."""
+def png_task(rgba: np.ndarray) -> Task[bytes]:
+    """Encode a picture as a PNG file; see `write_png`."""
     height, width = rgba.shape[:2]
-    rows = rgba[::-1].reshape(height, width * 4)
-    # Each row starts with its filter type. It is 0, none, as filters do not help with noise.
-    rows = np.concatenate([np.zeros((height, 1), dtype=np.uint8), rows], axis=1)
+    compressor = zlib.compressobj(ZLIB_LEVEL)
+    compressed = []
+    for start in range(0, height, BLOCK_ROWS):
+        yield Progress(start / height, "writing the picture")
+        block = to_srgb_uint8(rgba[::-1][start : start + BLOCK_ROWS])
+        # Each row starts with its filter type. It is 0, none, as filters do not help with noise.
+        rows = np.zeros((len(block), 1 + width * 4), dtype=np.uint8)
+        rows[:, 1:] = block.reshape(len(block), -1)
+        compressed.append(compressor.compress(rows.tobytes()))
+    compressed.append(compressor.flush())
     header = struct.pack(">IIBBBBB", width, height, _BIT_DEPTH, _RGBA_COLOR_TYPE, 0, 0, 0)
     chunks = [
         (b"IHDR", header),
         (b"sRGB", bytes([_PERCEPTUAL_INTENT])),
-        (b"IDAT", zlib.compress(rows.tobytes(), ZLIB_LEVEL)),
+        (b"IDAT", b"".join(compressed)),
         (b"IEND", b""),
     ]
     return _SIGNATURE + b"".join(_pack_chunk(kind, data) for kind, data in chunks)

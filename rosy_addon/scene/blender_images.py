@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -10,29 +11,83 @@ import numpy as np
 from ..color import to_display, to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
-from ..file_io import check_writable, make_folder, replacing
-from ..image_io.png import write_png
+from ..file_io import check_writable, make_folder, replacing, write_bytes
+from ..image_io.png import png_task
+from ..progress import Progress, Task, subtask
 
 #: Pixels by which colors are extended past the border of the covered area. A render whose
 #: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
 BLEED_PIXELS = 4
 
+#: Rows that are converted at once.
+BLOCK_ROWS = 64
+
+#: Label of all steps.
+STEP_LABEL = "converting the picture"
+
 #: Shown where there is no picture: the linear value of mid gray on screen.
 NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
 
 
+class ImageData(NamedTuple):
+    """A picture as a Blender image stores it.
+
+    Attributes
+    ----------
+    pixels : (H, W, 4) float32 ndarray
+        With bleed, see `with_bleed`. Linear if the image is stored in single precision or in a
+        file, otherwise display values.
+    png : bytes or None
+        The file, if the image is stored as .png.
+    """
+
+    pixels: np.ndarray
+    png: bytes | None = None
+
+
+def image_data_task(picture: Picture, *, as_float: bool, to_file: bool) -> Task[ImageData]:
+    """Convert a picture for a Blender image.
+
+    Parameters
+    ----------
+    picture : Picture
+    as_float : bool
+        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
+    to_file : bool
+        Whether the image is saved to a file, and not packed into the .blend file.
+
+    Returns
+    -------
+    ImageData
+    """
+    height = len(picture.rgba)
+    pixels = np.empty(picture.rgba.shape, dtype=np.float32)
+    for start in range(0, height, BLOCK_ROWS):
+        yield Progress(0.5 * start / height, STEP_LABEL)
+        first = max(start - BLEED_PIXELS, 0)
+        block = with_bleed(picture.rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
+        block = block[start - first :][:BLOCK_ROWS]
+        if not as_float and not to_file:
+            block[..., :3] = to_display(block[..., :3])
+        pixels[start : start + BLOCK_ROWS] = block
+    if as_float or not to_file:
+        return ImageData(pixels)
+    return ImageData(pixels, (yield from subtask(png_task(pixels), 0.5, 1.0, STEP_LABEL)))
+
+
 def new_image(
-    name: str, picture: Picture, *, as_float: bool = False, stem: Path | None = None
+    name: str, image_data: ImageData, *, as_float: bool = False, stem: Path | None = None
 ) -> bpy.types.Image:
-    """Create a Blender image from a picture.
+    """Create a Blender image.
 
     Parameters
     ----------
     name : str
         Name of the datablock.
-    picture : Picture
+    image_data : ImageData
+        From `image_data_task`, with the same parameters.
     as_float : bool
-        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
+        Whether linear values are stored in single precision.
     stem : Path, optional
         Path to save the image at, without the suffix. By default it is packed into the .blend file.
 
@@ -41,20 +96,18 @@ def new_image(
     RosyError
         If the file cannot be written. The image is deleted in this case.
     """
-    rgba = with_bleed(picture.rgba)
-    height, width = rgba.shape[:2]
+    height, width = image_data.pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
     try:
         image.alpha_mode = "CHANNEL_PACKED"
         image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
-        if not as_float:
-            rgba[..., :3] = to_display(rgba[..., :3])
-        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
-        image.update()
+        if image_data.png is None:
+            image.pixels.foreach_set(image_data.pixels.ravel())
+            image.update()
         if stem is None:
             image.pack()
         else:
-            _save_image(image, picture, stem)
+            _save_image(image, image_data.png, stem)
     except BaseException:
         bpy.data.images.remove(image)
         raise
@@ -109,10 +162,16 @@ def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
     return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
 
 
-def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
+def write_frame(path: Path, image_data: ImageData) -> None:
     """Write one frame of an image sequence: 8-bit .png, or .exr with half floats.
 
     If writing fails, no partial file is left.
+
+    Parameters
+    ----------
+    path : Path
+    image_data : ImageData
+        From `image_data_task`, for a file.
 
     Raises
     ------
@@ -121,17 +180,16 @@ def write_frame(path: Path, picture: Picture, as_float: bool) -> None:
     """
     make_folder(path.parent)
     check_writable(path)
-    rgba = with_bleed(picture.rgba)
-    if not as_float:
-        write_png(path, rgba)
+    if image_data.png is not None:
+        write_bytes(path, image_data.png)
         return
-    height, width = rgba.shape[:2]
+    height, width = image_data.pixels.shape[:2]
     image = bpy.data.images.new(path.stem, width, height, alpha=True, float_buffer=True)
     # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
     scene = bpy.data.scenes.new(path.stem)
     try:
         image.colorspace_settings.name = "Non-Color"
-        image.pixels.foreach_set(np.ascontiguousarray(rgba, dtype=np.float32).ravel())
+        image.pixels.foreach_set(image_data.pixels.ravel())
         image_settings = scene.render.image_settings
         image_settings.file_format, image_settings.color_mode, image_settings.color_depth = (
             "OPEN_EXR",
@@ -157,12 +215,15 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
     return image
 
 
-def _save_image(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
-    """Save an image to a file, and make the image use this file. An older file is replaced."""
+def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
+    """Save an image to a file, and make the image use this file. An older file is replaced.
+
+    The contents of a .png are given. An .exr is written by Blender.
+    """
     path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
     make_folder(path.parent)
     check_writable(path)
-    if image.is_float:
+    if png is None:
         image.file_format = "OPEN_EXR"
         image.filepath_raw = str(path)
         try:
@@ -170,7 +231,7 @@ def _save_image(image: bpy.types.Image, picture: Picture, stem: Path) -> None:
         except RuntimeError as reason:
             raise RosyError(f"{path}: cannot be written: {reason}") from reason
     else:
-        write_png(path, with_bleed(picture.rgba))
+        write_bytes(path, png)
         image.file_format = "PNG"
     image.source = "FILE"
     image.filepath = _blend_relative(path)

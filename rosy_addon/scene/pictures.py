@@ -31,7 +31,7 @@ from .bake_records import (
     recorded_materials,
     store_record,
 )
-from .blender_images import load_sequence, new_image
+from .blender_images import ImageData, load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
 from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
@@ -81,11 +81,14 @@ class RenderedView:
     Attributes
     ----------
     picture : Picture
+    image_data : ImageData
+        The picture, converted for the output settings.
     camera : Camera
     drawn_from : DrawnFrom
     """
 
     picture: Picture
+    image_data: ImageData
     camera: Camera
     drawn_from: DrawnFrom
 
@@ -242,7 +245,7 @@ def apply_picture(
     with rollback_on_error() as created:
         image = new_image(
             f"RoSy {name}",
-            rendered_view.picture,
+            rendered_view.image_data,
             as_float=settings.as_float,
             stem=None if settings.folder is None else settings.folder / picture_stem(name),
         )

@@ -86,7 +86,8 @@ def compose_task(
     tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
     tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
     layers = []
-    degrees = np.unique(np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]).tolist()
+    visible_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
+    degrees = sorted({gbuffer.instance_degrees[instance_id] for instance_id in visible_ids})
     for layer_index, degree in enumerate(degrees):
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
         yield Progress(start, "finding directions")

@@ -186,6 +186,7 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
     degree, (count, channels) = field.degree, noise.shape
     line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
     cell_of_pixel, width, cell_count = _pixel_window(field)
+    yield Progress(0.0, "finding directions")
     # Streamlines that have ended stay in `SINK_CELL`.
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)

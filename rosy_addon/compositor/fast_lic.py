@@ -88,7 +88,6 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     LicImages
     """
     count, channels = noise.shape
-    noise = noise - np.float32(NOISE_MEAN)
     line = member_lines(field)
     members = np.empty((len(line), count, channels), dtype=np.float32)
     effective_samples = np.empty(count, dtype=np.float32)
@@ -96,9 +95,11 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     overlap_sums = None
     for extent, core, overlap_stop in _strips(field, look):
         start, stop = core.start / count, core.stop / count
+        yield Progress(start, STEP_LABEL)
         strip_field = _crop_rows(field, extent)
+        strip_noise = noise[extent] - np.float32(NOISE_MEAN)
         covering = yield from subtask(
-            build_covering_task(strip_field, look, noise[extent]), start, start
+            build_covering_task(strip_field, look, strip_noise), start, start
         )
         cells = covering.cell_of_pixel[core.start - extent.start :]
         core_cells, overlap_cells = np.split(
@@ -106,7 +107,8 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
         )
         averages = _LineAverages(covering, cells[: overlap_stop - core.start])
         undefined = strip_field.representation == 0
-        averages.init_undefined(covering.cell_of_pixel[undefined], noise[extent][undefined])
+        averages.init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
+        yield Progress(start, STEP_LABEL)
         coverage_task = _cover_all_lines_task(
             covering, averages, look, _pixels_to_cells(step_limit, extent, covering)
         )

@@ -201,10 +201,12 @@ def surface_pixel_field_task(
     count = len(gbuffer.pixel)
     mask = yield from subtask(neighbor_masks_task(gbuffer, crease_angle, cross_creases), 0.0, 0.5)
     jacobians = np.empty((2, count), dtype=np.complex64).T
+    instance_selected = np.asarray(gbuffer.instance_degrees) == degree
+    selected = np.empty(count, dtype=bool)
     for block in pixel_blocks(count):
         yield Progress(0.5 + 0.4 * block.start / count, "finding directions")
         jacobians[block] = screen_jacobians(gbuffer.part(block))
-    selected = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id] == degree
+        selected[block] = instance_selected[gbuffer.instance_id[block]]
     selected = slice(None) if selected.all() else np.flatnonzero(selected)
     z = gbuffer.representation[selected]
     pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]

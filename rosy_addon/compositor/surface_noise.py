@@ -25,6 +25,7 @@ from .image_noise import (
     BLUR_FACTOR,
     NOISE_MEAN,
     NOISE_STD,
+    STEP_LABEL,
     box_radius,
     gaussian_blur_task,
     hash_bits_nd,
@@ -106,7 +107,7 @@ def surface_noise_task(
     normalization = np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in pixel_blocks(len(gbuffer.pixel)):
-        yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), "making noise")
+        yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
@@ -118,7 +119,11 @@ def surface_noise_task(
         total[:, block] *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     if high_pass:
         yield from subtask(_high_pass_task(gbuffer, total, BLUR_FACTOR * high_pass), 0.6, 1.0)
-    return np.ascontiguousarray(total.T) + np.float32(NOISE_MEAN)
+    noise = np.empty(total.shape[::-1], dtype=np.float32)
+    for block in pixel_blocks(len(noise)):
+        yield Progress(1.0, STEP_LABEL)
+        noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
+    return noise
 
 
 def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:
@@ -249,21 +254,34 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 
 def _high_pass_task(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> Task[None]:
     """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
-    row, column = np.divmod(gbuffer.pixel, np.int32(gbuffer.camera.width))
+    count, width = len(gbuffer.pixel), np.int32(gbuffer.camera.width)
+    column = gbuffer.pixel % width
     # The empty margin is as wide as the support of the blur.
     margin = 3 * box_radius(sigma)
-    bottom, left = int(row[0]) - margin, int(column.min()) - margin
-    shape = int(row[-1]) - bottom + 1 + margin, int(column.max()) - left + 1 + margin
-    index = (row - bottom) * np.int32(shape[1]) + (column - left)
+    bottom, left = int(gbuffer.pixel[0] // width) - margin, int(column.min()) - margin
+    height = int(gbuffer.pixel[-1] // width) - bottom + 1 + margin
+    image_width = int(column.max()) - left + 1 + margin
+    # Index of each pixel in the image that is blurred.
+    index = np.empty(count, dtype=np.int32)
+    for block in pixel_blocks(count):
+        yield Progress(0.0, STEP_LABEL)
+        row = gbuffer.pixel[block] // width - np.int32(bottom)
+        index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
-    def blurred_task(values: np.ndarray | int, part: int) -> Task[np.ndarray]:
-        """(P,) blurred values of the pixels, 0 outside."""
-        image = np.zeros(shape, dtype=np.float32)
-        image.reshape(-1)[index] = values
+    def blurred_task(values: np.ndarray | None, part: int) -> Task[np.ndarray]:
+        """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
+        image = np.zeros((height, image_width), dtype=np.float32)
+        for block in pixel_blocks(count):
+            yield Progress(part / (len(channels) + 1), STEP_LABEL)
+            image.reshape(-1)[index[block]] = 1 if values is None else values[block]
         start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
         image = yield from subtask(gaussian_blur_task(image, sigma), start, stop)
-        return image.reshape(-1).take(index)
+        return image.reshape(-1)
 
-    weight = np.maximum((yield from blurred_task(1, 0)), 1e-3)
+    weight = yield from blurred_task(None, 0)
+    weight = np.maximum(weight.take(index), 1e-3)
     for part, channel in enumerate(channels, start=1):
-        channel -= (yield from blurred_task(channel, part)) / weight
+        blurred = yield from blurred_task(channel, part)
+        for block in pixel_blocks(count):
+            yield Progress((part + 1) / (len(channels) + 1), STEP_LABEL)
+            channel[block] -= blurred.take(index[block]) / weight[block]

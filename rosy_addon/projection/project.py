@@ -312,16 +312,11 @@ def _new_gbuffer_task(
     count = len(visible.instance_id)
     fragments = visible.fragments
     face = np.empty(count, dtype=np.int32)
-    for instance_id in visible.visible_ids:
-        pixels = (
-            slice(None)
-            if visible.is_single_instance
-            else np.flatnonzero(visible.instance_id == instance_id)
-        )
-        face[pixels] = instances[instance_id].surface.triangle_face.take(visible.triangle[pixels])
+    face_of_triangle = np.concatenate([instance.surface.triangle_face for instance in instances])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
     for block in pixel_blocks(count):
         yield Progress(block.start / count, "finding visible pixels")
+        face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
         position[block, 2] = _z_at_depth(camera, x, y, fragments.depth[block])
         if camera.is_perspective:

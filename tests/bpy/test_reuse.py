@@ -35,7 +35,7 @@ def run_stages(monkeypatch):
         monkeypatch.setattr(module, name, watched)
 
     watch(projection, "project_task")
-    watch(stages, "surface_pixel_field")
+    watch(stages, "surface_pixel_field_task")
     watch(stages, "lic_task")
     return names
 
@@ -106,7 +106,7 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
     change(scene, monkey)
     run_stages.clear()
     after = draw(scene)
-    assert run_stages == ["project_task", "surface_pixel_field", "lic_task"]
+    assert run_stages == ["project_task", "surface_pixel_field_task", "lic_task"]
     assert not np.array_equal(before, after)
     np.testing.assert_array_equal(after, draw_uncached(scene))
 
@@ -123,8 +123,8 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
         ("noise", "colour", ["lic_task"]),
         ("magnitude", "both", ["lic_task"]),
         ("method", "members", ["lic_task"]),
-        ("crease_angle", 0.05, ["surface_pixel_field", "lic_task"]),
-        ("supersampling", 2, ["project_task", "surface_pixel_field", "lic_task"]),
+        ("crease_angle", 0.05, ["surface_pixel_field_task", "lic_task"]),
+        ("supersampling", 2, ["project_task", "surface_pixel_field_task", "lic_task"]),
     ],
 )
 def test_a_setting_runs_the_stages_that_depend_on_it(

@@ -117,6 +117,7 @@ def surface_noise_task(
         block_hash = instance_hash[instance_id]
         _accumulate_octaves(total[:, block], lattice, level, block_hash, seed, density)
         total[:, block] *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
+    del rest  # as large as all other arrays together
     if high_pass:
         yield from subtask(_high_pass_task(gbuffer, total, BLUR_FACTOR * high_pass), 0.6, 1.0)
     noise = np.empty(total.shape[::-1], dtype=np.float32)

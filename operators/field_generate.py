@@ -151,7 +151,8 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     def make_task(self, context: bpy.types.Context) -> Task[str]:
         """Generate all fields, then store them. Return what was made, for a message.
 
-        Meshes without features to follow are reported and left out, unless there is no other mesh.
+        Meshes without features to follow, or without a direction on any face, are reported and left
+        out, unless there is no other mesh.
         """
         inputs, fields, errors = [], {}, []
         for mesh in self.required_data(context):
@@ -165,12 +166,14 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         for index, (mesh, surface, settings) in enumerate(inputs):
             task = generate_task(surface, settings, self.degree)
             try:
-                fields[mesh] = yield from subtask(
-                    task, index / len(inputs), (index + 1) / len(inputs)
-                )
+                field = yield from subtask(task, index / len(inputs), (index + 1) / len(inputs))
             except NoFeaturesError as error:
                 errors.append(error)
                 continue
+            if surface.face_count and not field.vectors.any():
+                errors.append(self._no_direction_error(surface))
+                continue
+            fields[mesh] = field
             if note := orientation_warning(surface):
                 report_warning(self, note)
         if not fields:
@@ -184,6 +187,14 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
+
+    def _no_direction_error(self, surface: Surface) -> RosyError:
+        """Return the error of a mesh on which this kind of field is undefined everywhere."""
+        kind = KIND_LABELS.get(self.kind, self.kind.capitalize())
+        return RosyError(
+            f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
+            "Smoothest"
+        )
 
     def _notes(self, fields: list[tuple[Surface, RosyField]]) -> str:
         """Return what the message says about the fields. Counting must not take long."""

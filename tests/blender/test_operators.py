@@ -59,6 +59,22 @@ def test_errors_of_generate(suzanne):
     assert contents() == before
 
 
+def test_a_kind_without_directions_is_an_error(scene, capfd):
+    """Curvature has no direction on a cube: it gets no field, and others still do."""
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    before = contents()
+    assert "Object 'Cube': Curvature gives no direction on any face" in error_of(
+        bpy.ops.rosy.field_generate, kind="curvature"
+    )
+    assert contents() == before
+    bpy.ops.mesh.primitive_torus_add()
+    cube.select_set(True)
+    assert bpy.ops.rosy.field_generate(kind="curvature") == {"FINISHED"}
+    assert "rosy" in bpy.context.object.data.attributes and "rosy" not in cube.data.attributes
+    assert "Warning: Object 'Cube': Curvature gives no direction" in capfd.readouterr().out
+
+
 def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
     suzanne.select_set(False)
     bpy.ops.mesh.primitive_uv_sphere_add()

@@ -60,7 +60,7 @@ def test_errors_of_generate(suzanne):
 
 
 def test_a_kind_without_directions_is_an_error(scene, capfd):
-    """Curvature has no direction on a cube: it gets no field, and others still do."""
+    """Curvature has no direction on a cube. The default kind has one on all of its faces."""
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object
     before = contents()
@@ -73,6 +73,8 @@ def test_a_kind_without_directions_is_an_error(scene, capfd):
     assert bpy.ops.rosy.field_generate(kind="curvature") == {"FINISHED"}
     assert "rosy" in bpy.context.object.data.attributes and "rosy" not in cube.data.attributes
     assert "Warning: Object 'Cube': Curvature gives no direction" in capfd.readouterr().out
+    assert bpy.ops.rosy.field_generate() == {"FINISHED"}
+    assert np.linalg.norm(member_vectors(cube.data), axis=1).min() > 0.5
 
 
 def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):

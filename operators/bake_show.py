@@ -1,4 +1,4 @@
-"""Operator: show another of the baked pictures on the objects."""
+"""Operators: show another of the baked pictures on the objects, or the pictures in a 3D view."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import bpy
 
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.scene.pictures import show_bake
-from .poll import poll_idle
+from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS
+from ..rosy_addon.viewport import session
+from .poll import poll_idle, poll_view_3d
 from .reports import report_error
 
 
@@ -31,4 +33,23 @@ class ROSY_OT_show(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROSY_OT_show,)
+class ROSY_OT_show_here(bpy.types.Operator):
+    """Show the baked pictures in this 3D view: with materials, and without the live fields over them"""
+
+    bl_idname = "rosy.show_here"
+    bl_label = "Show the Picture Here"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_view_3d(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        space = context.space_data
+        session.stop(space)
+        if space.shading.type in SHADING_WITHOUT_MATERIALS:
+            space.shading.type = "MATERIAL"
+        return {"FINISHED"}
+
+
+CLASSES = (ROSY_OT_show, ROSY_OT_show_here)

@@ -49,6 +49,14 @@ def poll_idle(operator: type[bpy.types.Operator]) -> bool:
     return True
 
 
+def poll_view_3d(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Return whether the context has a 3D view. Set the poll message if not."""
+    if context.space_data is None or context.space_data.type != "VIEW_3D":
+        operator.poll_message_set("Available only in a 3D view")
+        return False
+    return True
+
+
 def poll_active_field(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Return whether the active mesh has a field. Set the poll message if not."""
     objects = selected_mesh_objects(context)

@@ -7,6 +7,7 @@ import bpy
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.ui import live_views
 from ..rosy_addon.viewport import session
+from .poll import poll_view_3d
 from .reports import report_error
 
 
@@ -42,10 +43,7 @@ class ROSY_OT_viewport(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.space_data is None or context.space_data.type != "VIEW_3D":
-            cls.poll_message_set("Available only in a 3D view")
-            return False
-        return True
+        return poll_view_3d(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         space = context.space_data

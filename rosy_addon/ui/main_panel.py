@@ -20,6 +20,9 @@ from .sidebar import SidebarPanel, draw_progress, draw_wrapped, use_property_col
 #: Placeholder texts of empty settings of the generator.
 PLACEHOLDERS = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
 
+#: Types of shading in which a 3D view does not show the pictures.
+SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
+
 
 class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     """Make a field, bake its picture and look at it."""
@@ -108,15 +111,22 @@ def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
 def _draw_picture_section(
     layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
 ) -> None:
-    """Draw the list of baked pictures and the buttons that bake."""
+    """Draw the switch of the live view, the baked pictures and the buttons that bake."""
     layout.label(text="2.  Picture", icon="RENDER_STILL")
     _draw_live_toggle(layout, context)
     if session.is_live(context.space_data):
         layout.prop(context.scene.rosy, "remember_live")
-    draw_wrapped(layout, context, session.messages(context.area))
     if job_status.current is not None:
         draw_progress(layout)
-        return
+    else:
+        _draw_bakes(layout, context, objects)
+    # Below the buttons, so that messages that come and go do not move them.
+    draw_wrapped(layout, context, session.messages(context.area))
+
+
+def _draw_bakes(
+    layout: bpy.types.UILayout, context: bpy.types.Context, objects: list[bpy.types.Object]
+) -> None:
     bake_infos = list_bakes(context.scene, for_panel=True, automatic_device=automatic_device)
     _redraw_later(SCENE_STATES.seconds_to_wait())
     for bake in bake_infos:
@@ -205,10 +215,11 @@ def _draw_view_hints(
     """Draw buttons that make the picture visible in a view that does not show it."""
     view, camera = context.space_data, context.scene.camera
     column = layout.column(align=True)
-    if view.shading.type in {"WIREFRAME", "SOLID"}:
-        column.label(text="This view does not show materials", icon="INFO")
-        button = column.operator("wm.context_set_enum", text="Show the Picture Here")
-        button.data_path, button.value = "space_data.shading.type", "MATERIAL"
+    is_live = session.is_live(view)
+    if is_live or view.shading.type in SHADING_WITHOUT_MATERIALS:
+        reason = "Live fields cover the picture" if is_live else "This view does not show materials"
+        column.label(text=reason, icon="INFO")
+        column.operator("rosy.show_here")
     in_camera_view = view.region_3d is not None and view.region_3d.view_perspective == "CAMERA"
     if (
         not in_camera_view

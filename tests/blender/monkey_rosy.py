@@ -302,6 +302,11 @@ def show(monkey):
     monkey.rosy("show", camera=monkey.pick([*names, *names, monkey.name()]) or "")
 
 
+@action(0.5, uses_rosy=True)
+def show_here(monkey):
+    monkey.rosy("show_here")
+
+
 @action(1, uses_rosy=True)
 def turntable(monkey):
     select_mesh(monkey)

@@ -311,6 +311,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "bake_animation": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
     "remove": (*_PICTURE, "scenes/SCENE/rosy/bakes/*", *_APPLIED),
     "show": ("owned/node_groups/*", "picture/*"),
+    "show_here": (),
     "turntable": (),
     "viewport": (),
     "strokes": _STROKES,

@@ -35,6 +35,7 @@ WINDOWS = {
     "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
     "presets": ("window_presets.py", 1000, 900, SIMULATED_EVENTS),
     "live": ("window_live.py", 1000, 720, ()),
+    "first-bake": ("window_first_bake.py", 1000, 800, ()),
 }
 
 
@@ -69,8 +70,8 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
     parser.add_argument(
         "--windows",
-        default="panel,presets,live",
-        help="which tests to run in a window, by default panel,presets,live; none for headless",
+        default="panel,presets,live,first-bake",
+        help="which tests to run in a window, by default all; none for headless",
     )
     parser.add_argument("--only-window", action="store_true")
     parser.add_argument("--steps", default="", help="names of the only steps to run in a window")

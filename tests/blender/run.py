@@ -33,7 +33,7 @@ SIMULATED_EVENTS = ("--enable-event-simulate",)
 #: are drawn in software, but with room for the menu of all presets), and further options.
 WINDOWS = {
     "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
-    "presets": ("window_presets.py", 1000, 900, SIMULATED_EVENTS),
+    "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
     "live": ("window_live.py", 1000, 720, ()),
     "first-bake": ("window_first_bake.py", 1000, 800, ()),
 }

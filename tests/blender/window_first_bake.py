@@ -1,7 +1,8 @@
 """The five steps of the README in a window, done with the mouse: on the default cube and on Suzanne.
 
 Run by run.py, as window_panel.py is, but with real events: xdotool moves the mouse. A picture of the 3D
-view is saved after each step. Those of the cube, and the last one of Suzanne, are in docs/images.
+view is saved after each step. Those of the cube, and the last one of Suzanne, are in docs/images, and
+so is that of a live view.
 """
 
 from __future__ import annotations
@@ -11,12 +12,19 @@ import sys
 from pathlib import Path
 
 import bpy
+from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import SHOTS, capture, preferences, rosy, run_steps, view, wait_until
-
-#: Colors of a saved picture: interfaces have few, and the file is a third of the size.
-PICTURE_COLORS = 128
+from window_steps import (
+    capture,
+    in_view,
+    preferences,
+    rosy,
+    run_steps,
+    save_part,
+    view,
+    wait_until,
+)
 
 #: Distances from the top of the 3D view to buttons of the panel, in pixels. They differ between
 #: versions of Blender by less than half the height of a button.
@@ -81,11 +89,7 @@ def save_picture(name):
     yield 1.0
     _, area, region, _ = view()
     capture(f"window-{name}", region)
-    left, top = view_corner()
-    crop = f"{area.width}x{area.height}+{left}+{top}"
-    command = ["convert", SHOTS / f"window-{name}.png", "-crop", crop, "+repage", "-strip"]
-    colors = ["+dither", "-colors", str(PICTURE_COLORS)]
-    subprocess.run([*command, *colors, SHOTS / f"{name}.png"], check=True, timeout=20)
+    save_part(f"window-{name}", name, area.x, area.y, area.width, area.height)
 
 
 def is_live():
@@ -119,6 +123,8 @@ def open_tab(name):
 
 
 def follow_steps(name):
+    """Do the steps, with the first field of the scene live."""
+    preferences().live_first_field = True
     yield from open_tab(name)
 
     yield from click_in_panel(MAKE_FIELD)
@@ -149,7 +155,6 @@ def follow_steps(name):
 
 
 def default_cube():
-    preferences().live_first_field = True
     yield from follow_steps("first-bake")
 
 
@@ -169,4 +174,32 @@ def suzanne():
     yield from follow_steps("first-bake-suzanne")
 
 
-run_steps(default_cube, suzanne)
+def live_suzanne():
+    """A subdivided Suzanne with a live field, for the documentation of live views."""
+    preferences().live_first_field = True
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    space = view()[1].spaces.active
+    space.show_region_ui = True
+    yield 0.5
+    for _ in range(3):
+        view()[3].active_panel_category = "RoSy"
+        view()[1].tag_redraw()
+        yield 0.3
+    with in_view():
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 2
+        bpy.ops.object.shade_smooth()
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+        bpy.ops.object.select_all(action="DESELECT")
+    rotation = Euler((1.3, 0.0, 0.4)).to_quaternion()
+    space.region_3d.view_rotation = rotation
+    # The sidebar covers the right third of the view.
+    space.region_3d.view_location = rotation @ Vector((0.75, 0.0, 0.0))
+    space.region_3d.view_distance = 4.3
+    yield from wait_for_live_view()
+    yield from save_picture("live")
+
+
+run_steps(default_cube, suzanne, live_suzanne)

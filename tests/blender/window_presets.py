@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import capture, in_view, rosy, run_steps, view
+from window_steps import capture, in_view, rosy, run_steps, save_part, view
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -100,6 +100,8 @@ def preset_chosen_by_its_preview():
     move_to(x + 3, y)
     yield 2.0
     yield from save_screenshot("presets-2-choice")
+    bottom = point_on_preview()[1] - 370
+    save_part("window-presets-2-choice", "presets", 0, bottom, view()[0].width, 490)
     yield from click(x, y)
     assert bpy.context.scene.rosy.preset_name == "cross-hatch", bpy.context.scene.rosy.preset_name
     assert bpy.context.scene.rosy.look.ink == "hatch"

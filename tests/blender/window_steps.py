@@ -21,6 +21,9 @@ SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
 TIMEOUT_SECONDS = 40.0
 
+#: Colors of a picture for the documentation: interfaces have few, and the file is a third of the size.
+PICTURE_COLORS = 128
+
 #: Names of the only steps to run; all if there is none.
 ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 
@@ -115,3 +118,15 @@ def capture(name, region):
     screen = raw[len(raw) - 3 * width * height :].reshape(height, width, 3)[::-1]
     part = screen[region.y : region.y + region.height, region.x : region.x + region.width]
     return part.astype(np.float32) / 255
+
+
+def save_part(screenshot, name, x, y, width, height):
+    """Save a part of the screenshot of `capture` as NAME.png, for the documentation.
+
+    `x` and `y` are pixels from the lower left of the window, which is that of the screen.
+    """
+    crop = f"{width}x{height}+{x}+{y}"
+    cropping = ["-gravity", "SouthWest", "-crop", crop, "+repage", "-strip"]
+    colors = ["+dither", "-colors", str(PICTURE_COLORS)]
+    command = ["convert", SHOTS / f"{screenshot}.png", *cropping, *colors, SHOTS / f"{name}.png"]
+    subprocess.run(command, check=True, timeout=20)

@@ -18,7 +18,7 @@ from .generator_settings import generator_setting_names
 from .sidebar import SidebarPanel, draw_progress, draw_wrapped, use_property_columns
 
 #: Placeholder texts of empty settings of the generator.
-PLACEHOLDERS = {"guide": "the selected", "uv_map": "the active", "vectors": "name"}
+PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 #: Types of shading in which a 3D view does not show the pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")

@@ -32,6 +32,7 @@ MAKE_FIELD = 205
 BAKE = 380
 SHOW_HERE = 562
 STANDARD = 546
+REMOVE = 489
 
 #: Steps of the wheel that enlarge what the camera sees.
 ZOOM_STEPS = 2
@@ -152,6 +153,10 @@ def follow_steps(name):
     assert bpy.context.scene.view_settings.view_transform == "Standard"
     yield 8.0
     yield from save_picture(f"{name}-5-shown")
+
+    yield from click_in_panel(REMOVE)
+    yield from wait_until(lambda: not bpy.context.scene.rosy.bakes)
+    assert not bpy.context.object.modifiers
 
 
 def default_cube():

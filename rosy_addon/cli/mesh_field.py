@@ -123,8 +123,14 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField
     degree = 4 if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
     default_kind = "guided" if has_guides else "curvature" if degree in (2, 4) else "axis"
-    settings = _generator_settings(options, surface, options.generate or default_kind, degree)
-    return surface, generate(surface, settings, degree)
+    kind = options.generate or default_kind
+    field = generate(surface, _generator_settings(options, surface, kind, degree), degree)
+    if surface.face_count and not field.vectors.any():
+        print_note(
+            f"{surface.name}: {kind} gives no direction on any face: choose another kind with "
+            "--generate, such as smoothest"
+        )
+    return surface, field
 
 
 def _generator_settings(

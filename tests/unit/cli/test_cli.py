@@ -170,6 +170,17 @@ def test_the_generator_follows_the_degree(degree, kind, ring, tmp_path):
     assert default.read_bytes() == chosen.read_bytes()
 
 
+def test_a_kind_without_directions_is_noted(tmp_path, capsys):
+    """A flat mesh has no direction of curvature. The smoothest field has one everywhere."""
+    mesh = tmp_path / "flat.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    command = ["field", str(mesh), "-o", str(tmp_path / "a.rosy")]
+    assert main(command) == 0
+    assert "curvature gives no direction on any face" in capsys.readouterr().err
+    assert main([*command, "--generate", "smoothest"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 REFUSED = {
     "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
     "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),

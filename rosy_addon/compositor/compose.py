@@ -229,6 +229,7 @@ def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> T
             )
         )
     noise = yield from stages.surface_paper_grain_task(field, look)
+    yield Progress(1.0, "drawing the paper grain")
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)

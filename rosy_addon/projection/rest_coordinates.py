@@ -15,6 +15,9 @@ from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
 
+#: Label of all steps.
+STEP_LABEL = "finding points on the surface"
+
 #: Distance of a mesh from its object's origin, in multiples of its size, beyond which positions are
 #: taken relative to the mesh: float32 would be too coarse for them.
 FAR_RATIO = 1000
@@ -91,6 +94,7 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
     -------
     RestCoordinates
     """
+    yield Progress(0.0, STEP_LABEL)
     count = len(gbuffer.pixel)
     coordinates = RestCoordinates(
         *(np.empty((3, count), dtype=np.float32) for _ in range(3)),
@@ -103,7 +107,7 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
         for block in pixel_blocks(len(pixels)):
-            yield Progress((done + block.start) / count, "finding points on the surface")
+            yield Progress((done + block.start) / count, STEP_LABEL)
             _fill_pixels(coordinates, gbuffer, instance, rest, pixels[block])
         done += len(pixels)
     return coordinates

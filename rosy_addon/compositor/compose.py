@@ -302,6 +302,8 @@ def _resolve_pixels_task(
         first_pixel = start * s * width
         border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)
         block = slice(*np.searchsorted(pixel, border.astype(pixel.dtype)).tolist())
+        if block.start == block.stop:  # rows that are not written to take no memory
+            continue
         # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
         band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
         block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)

@@ -58,7 +58,7 @@ SURFACE_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 34
 
 #: Bytes of a visible sample with the methods "members" and "brute", and of each of its lines or
 #: directions there.
-MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 135, 48, 165, 32
+MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 59, 39, 79, 34
 
 #: Bytes of a step of the streamlines of a batch.
 STEP_BYTES = 24
@@ -73,7 +73,7 @@ GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 50
 SHADOW_MAP_BYTES = 110_000_000
 
 #: Bytes of a pixel of a finished picture, and while it is written to a file.
-PICTURE_BYTES, WRITING_BYTES = 16, 16
+PICTURE_BYTES, WRITING_BYTES = 16, 6
 
 #: Fraction of the memory of arrays below `MMAP_THRESHOLD_BYTES` that the C library keeps for later
 #: arrays after they are freed.

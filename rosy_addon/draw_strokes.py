@@ -11,16 +11,16 @@ import bpy
 from .cache import BAKE_CACHE
 from .compositor.shading import lights_of
 from .errors import RosyError
-from .file_io import check_writable
+from .file_io import check_writable, write_bytes
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
 from .scene.scene_reader import SceneData, read_scene
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
-from .strokes.pipeline import StrokeDrawing, draw_instances_task
+from .strokes.pipeline import StrokeDrawing, draw_instances_task, geometry_task
 from .strokes.style import StrokeStyle
-from .strokes.svg import Pen, write_svg
+from .strokes.svg import Pen, svg_task
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +124,14 @@ def draw_strokes_task(
     )
     drawing = yield from subtask(work, 0.05, 0.95)
     BAKE_CACHE.evict_over_limit()
-    yield Progress(0.97, "storing the strokes")
+    label = "storing the strokes"
     if kind == "SVG":
-        write_svg(path, drawing.strokes, view, pen)
+        text = yield from subtask(svg_task(drawing.strokes, view, pen), 0.95, 1.0, label)
+        write_bytes(path, text.encode())
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    obj = store_strokes(scene, kind, drawing, view, pen, _parent_object(scene_data), collection)
+    geometry = yield from subtask(geometry_task(drawing, view, pen), 0.95, 0.97, label)
+    yield Progress(0.97, label)
+    obj = store_strokes(scene, kind, geometry, view.name, _parent_object(scene_data), collection)
     return StrokeResult(
         view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
     )

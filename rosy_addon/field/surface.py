@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import RosyError, counted
+from ..progress import Progress, Task, run_to_completion
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -436,6 +437,11 @@ def _smooth_corner_pairs(
 
 
 def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Run `connected_components_task` to its end."""
+    return run_to_completion(connected_components_task(count, pairs))
+
+
+def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]:
     """Label the connected components of a graph.
 
     Each node points to a root: the smallest node known to be in its component. Each round links the
@@ -448,6 +454,10 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     pairs : (n, 2) int ndarray
         Edges of the graph.
 
+    Yields
+    ------
+    Progress
+
     Returns
     -------
     (count,) int32 ndarray
@@ -456,6 +466,7 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     root = np.arange(count, dtype=np.int32)
     a, b = pairs[:, 0], pairs[:, 1]
     while len(a):
+        yield Progress(1 - len(a) / len(pairs), "finding connected parts")
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         np.minimum.at(root, high, low)
         while True:

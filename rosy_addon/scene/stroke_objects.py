@@ -15,8 +15,7 @@ from mathutils import Matrix
 from ..color import to_hex
 from ..compositor.family_hues import PALETTE
 from ..errors import RosyError
-from ..projection.camera import Camera
-from ..strokes.pipeline import StrokeDrawing, stroke_geometry
+from ..strokes.pipeline import StrokeGeometry
 from ..strokes.style import StrokeStyle
 from ..strokes.svg import Pen
 from .compat import is_editable
@@ -75,9 +74,8 @@ def target_objects(
 def store_strokes(
     scene: bpy.types.Scene,
     kind: str,
-    drawing: StrokeDrawing,
-    camera: Camera,
-    pen: Pen,
+    geometry: StrokeGeometry,
+    camera: str,
     owner: bpy.types.Object | None = None,
     collection: bpy.types.Collection | None = None,
 ) -> bpy.types.Object:
@@ -90,10 +88,9 @@ def store_strokes(
     scene : bpy.types.Scene
     kind : {"PENCIL", "CURVES"}
         Grease Pencil or Curves.
-    drawing : StrokeDrawing
-    camera : Camera
-        The width of the pen is in pixels of this camera.
-    pen : Pen
+    geometry : StrokeGeometry
+    camera : str
+        Name of the camera.
     owner : bpy.types.Object, optional
         Parent of the object. The strokes move with it.
     collection : bpy.types.Collection, optional
@@ -103,8 +100,7 @@ def store_strokes(
     -------
     bpy.types.Object
     """
-    name = f"RoSy Strokes {camera.name}"
-    geometry = stroke_geometry(drawing, camera, pen)
+    name = f"RoSy Strokes {camera}"
     final_names: dict[bpy.types.ID, str] = {}
     with rollback_on_error() as created:
 
@@ -115,7 +111,7 @@ def store_strokes(
         data = DATA_BUILDERS[kind](
             name, geometry, min(scene.frame_start, scene.frame_current), register
         )
-        record = _find_record(scene, kind, camera.name)
+        record = _find_record(scene, kind, camera)
         obj = None if record is None else record.thing
         if obj is None:
             obj = bpy.data.objects.new(name, data)
@@ -132,7 +128,7 @@ def store_strokes(
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
-    _store_record(scene, kind, camera.name, obj)
+    _store_record(scene, kind, camera, obj)
     return obj
 
 

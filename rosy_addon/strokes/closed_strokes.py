@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import dot, normalize
+from ..progress import Progress, Task, subtask
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
@@ -31,8 +32,8 @@ MIN_LOOP_LENGTH = 6.0
 #: loop may miss its first point after them.
 MAX_ITERATIONS, CLOSING_TOLERANCE = 4, 1e-3
 
-#: Step of a particle in spacings.
-TRACE_STEP = 0.5
+#: Step of a particle in spacings, and the number of steps after which a task yields.
+TRACE_STEP, STEPS_PER_YIELD = 0.5, 8
 
 
 class _ClosingTrace(NamedTuple):
@@ -57,7 +58,7 @@ class _ClosingTrace(NamedTuple):
     passed: np.ndarray
 
 
-def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Strokes:
+def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Task[Strokes]:
     """Close the strokes whose ends almost meet.
 
     The angle to the field that closes a loop is found with the secant method. Strokes for which it
@@ -71,11 +72,15 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Str
     spacing : (T, 3) ndarray
         Spacing at the corners of the triangles, in world space.
 
+    Yields
+    ------
+    Progress
+
     Returns
     -------
     Strokes
         The open strokes, then the loops. If there are loops, all families are 0: call this before
-        `label_families`.
+        `label_families_task`.
     """
     candidates = _candidates(strokes)
     if not len(candidates):
@@ -89,8 +94,9 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Str
         _left_offset(strokes, first, strokes.points[last]),
     )
     angle = np.clip(-offset / strokes.length[candidates], -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)
-    for _ in range(MAX_ITERATIONS):
-        trace = _trace_loops(mesh, strokes, candidates, angle)
+    for iteration in range(MAX_ITERATIONS):
+        start, stop = iteration / MAX_ITERATIONS, (iteration + 1) / MAX_ITERATIONS
+        trace = yield from subtask(_trace_loops_task(mesh, strokes, candidates, angle), start, stop)
         offset_change, angle_change = trace.left_offset - offset, angle - previous_angle
         if (np.abs(trace.left_offset) <= tolerance).all():
             break
@@ -150,9 +156,9 @@ def _candidates(strokes: Strokes) -> np.ndarray:
     )
 
 
-def _trace_loops(
+def _trace_loops_task(
     mesh: TangentMesh, strokes: Strokes, candidates: np.ndarray, angle: np.ndarray
-) -> _ClosingTrace:
+) -> Task[_ClosingTrace]:
     """Trace candidates from their first points until they pass these points again or miss them.
 
     `angle` is the (n,) angle in radians to the left of the field.
@@ -166,6 +172,8 @@ def _trace_loops(
     active = np.arange(len(candidates))
     segments: list[tuple[np.ndarray, ...]] = []
     while len(active):
+        if len(segments) % STEPS_PER_YIELD == 0:
+            yield Progress(1 - len(active) / len(candidates), "closing loops")
         current = particles.take(active)
         to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)
         forward = dot(to_origin, tangent[active])

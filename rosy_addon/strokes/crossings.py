@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import normalize
+from ..progress import Progress, Task, run_to_completion, subtask
 from .stroke_set import POINT_COLUMNS, Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
@@ -37,6 +38,11 @@ class Crossings(NamedTuple):
 
 
 def find_crossings(strokes: Strokes) -> Crossings:
+    """Run `crossings_task` to its end."""
+    return run_to_completion(crossings_task(strokes))
+
+
+def crossings_task(strokes: Strokes) -> Task[Crossings]:
     """Find where strokes cross.
 
     Only segments in the same triangle are compared.
@@ -51,6 +57,7 @@ def find_crossings(strokes: Strokes) -> Crossings:
     segment_end = segment_end[np.argsort(strokes.triangle[segment_end], kind="stable")]
     batches = []
     for first, second in _close_pairs(strokes, segment_end):
+        yield Progress(min(0.1 * len(batches), 0.9), "finding crossings")
         first, second = segment_end[first], segment_end[second]
         batches.append(_intersect_segments(strokes.points, stroke, first, second))
     if not batches:
@@ -176,6 +183,11 @@ def _intersect_segments(
 
 
 def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Strokes:
+    """Run `crossing_gaps_task` to its end."""
+    return run_to_completion(crossing_gaps_task(strokes, gap, weave))
+
+
+def crossing_gaps_task(strokes: Strokes, gap: float, weave: bool = False) -> Task[Strokes]:
     """Cut a gap into one of the two strokes at each crossing.
 
     Parameters
@@ -188,7 +200,8 @@ def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Str
         If true, strokes pass over and under in turn. Otherwise the stroke of the family with the
         lower number passes over.
     """
-    crossings = find_crossings(strokes)
+    crossings = yield from subtask(crossings_task(strokes), 0.0, 0.6)
+    yield Progress(0.6, "cutting gaps")
     if not len(crossings.stroke):
         return strokes
     if weave:
@@ -202,6 +215,7 @@ def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Str
     stroke, arc = crossings.stroke[row, under], crossings.arc[row, under]
     # The gaps of a stroke are measured in the spacing at its start.
     spacing = strokes.spacing[strokes.start[:-1]][stroke]
+    yield Progress(0.7, "cutting gaps")
     return cut_intervals(strokes, stroke, arc - gap / 2 * spacing, arc + gap / 2 * spacing)
 
 

@@ -14,11 +14,11 @@ from ..field.frames import dot
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .crossings import with_crossing_gaps
-from .families import label_families
+from .crossings import crossing_gaps_task
+from .families import label_families_task
 from .head_on_ends import head_on_ends
 from .outline import OUTLINE_KINDS, outline
-from .overshoot import extend_free_ends, mark_free_boundary_ends
+from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
     LightSource,
     lit_tone,
@@ -32,10 +32,10 @@ from .spacing import (
 from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
 from .style import StrokeStyle
-from .svg import Pen, simplify_mask
-from .tangent_mesh import build_tangent_mesh
-from .trace import trace_strokes_task
-from .visibility import clip_to_visible, in_frame, pixel_size, project_to_pixels
+from .svg import Pen, simplify_mask_task
+from .tangent_mesh import tangent_mesh_task
+from .trace import trace_on_mesh_task
+from .visibility import clip_task, in_frame, pixel_size, project_to_pixels
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
 TIP_WIDTH = 0.15
@@ -144,10 +144,11 @@ def draw_instances_task(
     if not len(strokes):
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clip_to_frame or not style.hidden:
-        yield Progress(0.85, "finding visible strokes")
-        strokes = clip_to_visible(strokes, instances, camera, remove_hidden=not style.hidden)
+        task = clip_task(strokes, instances, camera, remove_hidden=not style.hidden)
+        strokes = yield from subtask(task, 0.85, 0.95)
     if style.overshoot:
-        strokes = _overshoot_ends(strokes, instances, camera, style, clip_to_frame)
+        task = _overshoot_task(strokes, instances, camera, style, clip_to_frame)
+        strokes = yield from subtask(task, 0.95, 1.0)
     if not len(strokes):
         raise _no_visible_stroke(camera)
     # Families of different instances are still separate. Each belongs to one instance.
@@ -167,47 +168,59 @@ def _trace_instance(
     cache: Cache,
 ) -> Task[Strokes]:
     """Return all strokes of a mesh instance, with its outline, including hidden parts."""
+    yield Progress(0.0, "computing the spacing")
     spacing = _vertex_spacing(instance, camera, style)
     tone = lit_tone(instance, camera, lights) if style.tone else None
     if tone is not None:
         spacing = spacing_by_tone(spacing, tone)
     if style.curvature:
         spacing = spacing_by_curvature(instance.surface, spacing, style.curvature)
+    yield Progress(0.02, "computing the spacing")
     check_stroke_memory(instance, spacing, camera, clipped)
-    strokes = yield from trace_strokes_task(
-        instance, spacing, cross_creases=style.cross_creases, cache=cache
+    mesh = yield from subtask(
+        tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.03, 0.1
     )
-    strokes = label_families(strokes, build_tangent_mesh(instance, cache=cache), camera.view[0, :3])
+    task = trace_on_mesh_task(mesh, spacing, surface_name=instance.surface.name)
+    strokes = yield from subtask(task, 0.1, 0.9)
     if style.overshoot:
-        strokes = mark_free_boundary_ends(
-            strokes, build_tangent_mesh(instance, cross_creases=style.cross_creases, cache=cache)
-        )
+        strokes = mark_free_boundary_ends(strokes, mesh)
+    if style.cross_creases:
+        # Strokes may cross creases, families do not.
+        mesh = yield from subtask(tangent_mesh_task(instance, cache=cache), 0.9, 0.92)
+    task = label_families_task(strokes, mesh, camera.view[0, :3])
+    strokes = yield from subtask(task, 0.92, 0.95)
     if tone is not None:
         point_tone = values_at_points(strokes, instance.surface, tone)
         strokes = weight_by_tone(strokes, point_tone, style.layering)
     if style.gaps:
-        strokes = with_crossing_gaps(strokes, style.gaps, weave=True)
+        task = crossing_gaps_task(strokes, style.gaps, weave=True)
+        strokes = yield from subtask(task, 0.95, 0.98)
     if style.taper:
+        yield Progress(0.98, "shaping ends")
         ends = ~head_on_ends(strokes)
+        yield Progress(0.98, "shaping ends")
         if style.overshoot:
             # Ends that will be extended are tapered after the extension.
             ends &= ~strokes.free_end_mask
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
     if style.outline:
+        yield Progress(0.99, "finding outlines")
         strokes = Strokes.concatenate(strokes, outline(instance, camera))
     return strokes
 
 
-def _overshoot_ends(
+def _overshoot_task(
     strokes: Strokes,
     instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle,
     clip_to_frame: bool,
-) -> Strokes:
+) -> Task[Strokes]:
     """Extend free ends, clip the extensions to the frame, and taper these ends."""
     occluders = None if style.hidden else instances
-    strokes = extend_free_ends(strokes, camera, style.overshoot, occluders)
+    task = extension_task(strokes, camera, style.overshoot, occluders)
+    strokes = yield from subtask(task, 0.0, 0.8)
+    yield Progress(0.8, "extending strokes")
     if clip_to_frame or not style.hidden:
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
@@ -297,8 +310,15 @@ class StrokeGeometry:
 
 
 def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeGeometry:
+    """Run `geometry_task` to its end."""
+    return run_to_completion(geometry_task(drawing, camera, pen))
+
+
+def geometry_task(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> Task[StrokeGeometry]:
     """Return the curves of a drawing for a pen whose width is in pixels of the camera."""
-    strokes = simplify_strokes(drawing.strokes, camera)
+    label = "simplifying strokes"
+    strokes = yield from subtask(simplify_task(drawing.strokes, camera), 0.0, 0.8, label)
+    yield Progress(0.8, label)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
     # surface.
     points = (offset_along_normal if drawing.hidden else offset_toward_camera)(
@@ -311,6 +331,11 @@ def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeG
 
 
 def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
+    """Run `simplify_task` to its end."""
+    return run_to_completion(simplify_task(strokes, camera))
+
+
+def simplify_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
     """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
 
     Parameters
@@ -325,7 +350,7 @@ def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
     features = np.column_stack(
         [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
     )
-    kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    kept = yield from simplify_mask_task(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
     return replace(
         strokes,
         start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),

@@ -270,6 +270,11 @@ class StrokeSamples(ColumnTable):
         self._open_sides = np.concatenate([self._open_sides, added])
 
     @property
+    def coverage(self) -> float:
+        """Fraction of the expected samples that there are, at most 0.99."""
+        return min(self.count / max(self.expected_count, 1), 0.99)
+
+    @property
     def has_open_sides(self) -> bool:
         """Whether any sides were open at the last call of `open_sides`, or were added since."""
         return len(self._open_sides) > 0

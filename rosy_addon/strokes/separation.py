@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.frames import dot, normalize
+from ..progress import Progress, Task, run_to_completion, subtask
 from .point_grid import PointGrid
 from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .stroke_set import Strokes
@@ -39,11 +40,19 @@ MAX_TURN = np.radians(18)
 #: The same for the normals of the surface: along strokes, and at their ends.
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
+#: Points that are examined at once, to bound memory and the length of a step.
+BLOCK_POINTS = 1 << 15
+
 #: Radius around such points in which strokes are sampled finely, in spacings.
 CHECK_RADIUS = 1.0
 
 
 def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Strokes:
+    """Run `separation_task` to its end."""
+    return run_to_completion(separation_task(mesh, strokes, min_length))
+
+
+def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Task[Strokes]:
     """Remove the parts of strokes that are nearer than `MIN_SEPARATION` to another of their family.
 
     Two strokes are of the same family at a point if the angle between their directions is less than
@@ -54,16 +63,22 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`: their families are not used.
+        Strokes before `label_families_task`: their families are not used.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
     Strokes
         Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
     """
-    suspect = _suspect_points(mesh, strokes)
+    label = "separating strokes"
+    yield Progress(0.0, label)
+    suspect = yield from subtask(_suspect_points_task(mesh, strokes), 0.0, 0.3, label)
     if not suspect.any():
         return strokes
     near_suspect = _points_near(strokes, suspect)
@@ -72,14 +87,18 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
         [np.arange(strokes.start[stroke], strokes.start[stroke + 1]) for stroke in candidates]
     )
     subset = strokes.select(candidates)
+    yield Progress(0.3, label)
     refined, source = _refine(subset, np.isin(point, near_suspect))
-    too_close = _too_close(mesh, refined, suspect[point][source], subset.length)
+    yield Progress(0.4, label)
+    task = _too_close_task(mesh, refined, suspect[point][source], subset.length)
+    too_close = yield from subtask(task, 0.4, 0.8, label)
     if not too_close.any():
         return strokes
     # Loops that are cut are also cut at their first point, where they were closed.
     opened = np.flatnonzero(refined.closed & (np.bincount(refined.stroke, too_close) > 0))
     too_close[refined.start[:-1][opened]] = too_close[refined.start[1:][opened] - 1] = True
     too_close = _dilate(refined, too_close)
+    yield Progress(0.8, label)
     cut = np.unique(refined.stroke[too_close])
     remaining = refined.runs_where(~too_close, free_at_removed=False)
     is_cut = np.zeros(len(candidates), dtype=bool)
@@ -89,20 +108,25 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     remaining = remaining.select(
         remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
     )
+    yield Progress(0.9, label)
     untouched = np.ones(len(strokes), dtype=bool)
     untouched[candidates[cut]] = False
-    result = Strokes.concatenate(strokes.select(untouched), remaining)
+    kept = strokes.select(untouched)
+    yield Progress(0.95, label)
+    result = Strokes.concatenate(kept, remaining)
     return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
 
 
-def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
+def _suspect_points_task(mesh: TangentMesh, strokes: Strokes) -> Task[np.ndarray]:
     """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
-    surface_turn = _surface_turn_per_spacing(mesh, strokes)
-    suspect = (
-        (_stroke_turn_per_spacing(strokes) > MAX_TURN)
-        | (_field_turn_per_spacing(mesh, strokes) > MAX_TURN)
-        | (surface_turn > FOLD_ANGLE)
-    )
+    surface_turn = np.empty(len(strokes.points))
+    suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
+    for start in range(0, len(suspect), BLOCK_POINTS):
+        yield Progress(start / len(suspect), "separating strokes")
+        block = slice(start, start + BLOCK_POINTS)
+        surface_turn[block] = _surface_turn_per_spacing(mesh, strokes, block)
+        suspect[block] |= _field_turn_per_spacing(mesh, strokes, block) > MAX_TURN
+    suspect |= surface_turn > FOLD_ANGLE
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     gap = strokes.points[ends[:, 1]] - strokes.points[ends[:, 0]]
     self_distance = MIN_SELF_ARC * strokes.spacing[ends[:, 1]]
@@ -113,15 +137,16 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     return suspect
 
 
-def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
-    """Return (n,) radians by which the shading normal turns within a spacing.
+def _surface_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
+    """Return radians by which the shading normal turns within a spacing, at a block of points.
 
     It is the norm of the derivatives in two perpendicular directions.
     """
-    gradient, normal = mesh.gradient[strokes.triangle], mesh.corner_normal[strokes.triangle]
+    triangle = strokes.triangle[block]
+    gradient, normal = mesh.gradient[triangle], mesh.corner_normal[triangle]
     derivative_x = np.einsum("nk,nki->ni", gradient.real, normal)
     derivative_y = np.einsum("nk,nki->ni", gradient.imag, normal)
-    return strokes.spacing * np.sqrt(
+    return strokes.spacing[block] * np.sqrt(
         dot(derivative_x, derivative_x) + dot(derivative_y, derivative_y)
     )
 
@@ -139,14 +164,18 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
     return np.arccos(np.clip(dot(member_before, member_after), -1, 1))
 
 
-def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
-    """Return (n,) radians by which the field turns within a spacing, in the direction of most turn."""
-    z, gradient = mesh.z[strokes.triangle], mesh.gradient[strokes.triangle]
-    value = np.einsum("nk,nk->n", strokes.weights, z)
+def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
+    """Return radians by which the field turns within a spacing, at a block of points.
+
+    They are those in the direction of most turn.
+    """
+    triangle = strokes.triangle[block]
+    z, gradient = mesh.z[triangle], mesh.gradient[triangle]
+    value = np.einsum("nk,nk->n", strokes.weights[block], z)
     derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()
     derivative_y = np.einsum("nk,nk->n", gradient.imag, z) * value.conj()
     scale = np.maximum(mesh.degree * np.abs(value) ** 2, 1e-300)
-    return strokes.spacing * np.hypot(derivative_x.imag, derivative_y.imag) / scale
+    return strokes.spacing[block] * np.hypot(derivative_x.imag, derivative_y.imag) / scale
 
 
 def _points_near(strokes: Strokes, suspect: np.ndarray) -> np.ndarray:
@@ -186,9 +215,9 @@ def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.nda
     return strokes.subdivided(counts), np.repeat(np.arange(len(counts)), counts)
 
 
-def _too_close(
+def _too_close_task(
     mesh: TangentMesh, refined: Strokes, suspect: np.ndarray, length: np.ndarray
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Return (m,) bool: the points of refined strokes to remove.
 
     Parameters
@@ -204,12 +233,33 @@ def _too_close(
     arc, stroke, spacing = refined.arc, refined.stroke, refined.spacing
     grid = PointGrid(1.01 * MIN_SEPARATION * float(np.median(spacing)), len(stroke))
     grid.add(refined.points)
-    query = np.flatnonzero(suspect)
-    point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
-    point = query[point]
-    arc_gap = refined.arc_distance(point, other)
-    distinct = (stroke[point] != stroke[other]) | (arc_gap > MIN_SELF_ARC * spacing[point])
-    point, other = point[distinct], other[distinct]
+    end_distance = np.minimum(arc, length[stroke] - arc)
+    queries = np.flatnonzero(suspect)
+    rejected = np.zeros(len(stroke), dtype=bool)
+    for start in range(0, len(queries), BLOCK_POINTS):
+        yield Progress(start / len(queries), "separating strokes")
+        query = queries[start : start + BLOCK_POINTS]
+        point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
+        point = query[point]
+        arc_gap = np.abs(arc[point] - arc[other])
+        around = np.where(refined.closed, length, np.inf)[stroke[point]] - arc_gap
+        arc_gap = np.minimum(arc_gap, np.abs(around))
+        distinct = (stroke[point] != stroke[other]) | (arc_gap > MIN_SELF_ARC * spacing[point])
+        point, other = _pairs_of_one_family(mesh, refined, point[distinct], other[distinct])
+        # Cut the shorter stroke, or within one stroke the point that is nearer to an end.
+        same_stroke = stroke[point] == stroke[other]
+        priority, other_priority = (
+            np.where(same_stroke, end_distance[end], length[stroke[end]]) for end in (point, other)
+        )
+        yields = (priority < other_priority) | ((priority == other_priority) & (point > other))
+        rejected[np.where(yields, point, other)] = True
+    return rejected
+
+
+def _pairs_of_one_family(
+    mesh: TangentMesh, refined: Strokes, point: np.ndarray, other: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of points that are of the same family and on the same side of a fold."""
     normal_a, normal_b = refined.normal[point], refined.normal[other]
     normal_sum, delta = normal_a + normal_b, refined.points[point] - refined.points[other]
     same_family = dot(normal_a, normal_b) > MIN_NORMAL_COSINE
@@ -228,17 +278,7 @@ def _too_close(
     same_family &= mesh.is_same_family(
         member_a, normal_a, member_b, normal_b, FAMILY_TOLERANCE
     ) | mesh.is_same_family(projected[0], mean_normal, projected[1], mean_normal, FAMILY_TOLERANCE)
-    point, other = point[same_family], other[same_family]
-    # Cut the shorter stroke, or within one stroke the point that is nearer to an end.
-    end_distance = np.minimum(arc, length[stroke] - arc)
-    priority = np.where(stroke[point] == stroke[other], end_distance[point], length[stroke[point]])
-    other_priority = np.where(
-        stroke[point] == stroke[other], end_distance[other], length[stroke[other]]
-    )
-    yields = (priority < other_priority) | ((priority == other_priority) & (point > other))
-    rejected = np.zeros(len(stroke), dtype=bool)
-    rejected[np.where(yields, point, other)] = True
-    return rejected
+    return point[same_family], other[same_family]
 
 
 def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:

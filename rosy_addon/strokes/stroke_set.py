@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,19 +102,6 @@ class Strokes:
         """(S, 2) bool: `free_ends`, or all false if it is None."""
         return np.zeros((len(self), 2), dtype=bool) if self.free_ends is None else self.free_ends
 
-    def arc_distance(self, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
-        """Return (m,) float64: the distances along strokes between pairs of points, in world space.
-
-        On a closed stroke it is the shorter of the two directions. It is infinite if the points are on
-        different strokes.
-        """
-        arc, stroke = self.arc, self.stroke
-        direct = np.abs(arc[point_a] - arc[point_b])
-        around = np.where(self.closed, self.length, np.inf)[stroke[point_a]] - direct
-        return np.where(
-            stroke[point_a] == stroke[point_b], np.minimum(direct, np.abs(around)), np.inf
-        )
-
     def select(self, selection: np.ndarray) -> Strokes:
         """Return some strokes, selected by number, in that order, or by an (S,) bool mask."""
         selection = np.asarray(selection)
@@ -210,16 +198,29 @@ class Strokes:
         smooth = fraction * fraction * (3 - 2 * fraction)
         return replace(self, width=self.width * (min_width + (1 - min_width) * smooth))
 
-    def subdivided(self, counts: np.ndarray) -> Strokes:
-        """Divide the segment that ends at each point into `counts` equal parts.
+    def subdivided(self, counts: np.ndarray, first: int = 0, stop: int | None = None) -> Strokes:
+        """Divide the segment that ends at each point into equal parts.
 
-        `counts` is (n,); values at first points are ignored. Added points have NaN as weights.
+        Parameters
+        ----------
+        counts : (n,) ndarray
+            Number of parts for each point; values at first points are ignored.
+        first, stop : int
+            Return only these strokes, by default all.
+
+        Returns
+        -------
+        Strokes
+            Added points have NaN as weights.
         """
-        counts = counts.astype(np.int64)
-        counts[self.start[:-1]] = 1
+        stop = len(self) if stop is None else stop
+        start = self.start[first : stop + 1]
+        counts = counts[start[0] : start[-1]].astype(np.int64)
+        counts[start[:-1] - start[0]] = 1
         last = np.cumsum(counts) - 1
-        point = np.repeat(np.arange(len(counts)), counts)
-        fraction = (np.arange(len(point)) - (last - counts)[point]) / counts[point]
+        row = np.repeat(np.arange(len(counts)), counts)
+        fraction = (np.arange(len(row)) - (last - counts)[row]) / counts[row]
+        point = row + start[0]
         before = np.maximum(point - 1, 0)
 
         def interpolate(values: np.ndarray) -> np.ndarray:
@@ -232,12 +233,31 @@ class Strokes:
         return replace(
             repeated,
             points=interpolate(self.points),
-            start=np.concatenate([[0], last[self.start[1:] - 1] + 1]),
+            start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),
+            family=self.family[first:stop],
+            closed=self.closed[first:stop],
+            free_ends=self.free_end_mask[first:stop],
             normal=normalize(interpolate(self.normal)),
             spacing=interpolate(self.spacing),
             width=interpolate(self.width),
             opacity=interpolate(self.opacity),
             weights=np.where((fraction < 1)[:, None], np.nan, repeated.weights),
+        )
+
+    @staticmethod
+    def join(blocks: Sequence[Strokes]) -> Strokes:
+        """Return all strokes of blocks with the same families."""
+        offsets = np.cumsum([0, *(len(block.points) for block in blocks)])
+        columns = {
+            name: np.concatenate([getattr(block, name) for block in blocks])
+            for name in (*POINT_COLUMNS, "family", "closed")
+        }
+        start = [block.start[:-1] + offset for block, offset in zip(blocks, offsets, strict=False)]
+        return replace(
+            blocks[0],
+            **columns,
+            start=np.concatenate([*start, offsets[-1:]]),
+            free_ends=np.concatenate([block.free_end_mask for block in blocks]),
         )
 
     @staticmethod

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..file_io import write_bytes
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes
@@ -24,6 +25,9 @@ WIDTH_TOLERANCE = 0.02
 
 #: Largest distance of the outline of a stroke from its center line at a bend, in half widths.
 MAX_MITER = 1.25
+
+#: Strokes that are written, or ordered for a plotter, at once.
+PATHS_PER_STEP = 1000
 
 #: Largest distance in pixels between a removed point and the simplified polyline.
 SIMPLIFY_TOLERANCE_PX = 0.06
@@ -91,6 +95,11 @@ def write_svg(
 
 
 def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
+    """Run `svg_task` to its end."""
+    return run_to_completion(svg_task(strokes, camera, pen))
+
+
+def svg_task(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> Task[str]:
     """Return strokes as an SVG document, projected by a camera.
 
     Hidden parts are not removed here; see `clip_to_visible`.
@@ -102,6 +111,10 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
     camera : Camera
     pen : Pen, optional
 
+    Yields
+    ------
+    Progress
+
     Returns
     -------
     str
@@ -109,6 +122,7 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
         is one path, or several if its opacity changes.
     """
     pen = pen or Pen()
+    yield Progress(0.0, "writing strokes")
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
@@ -133,6 +147,7 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
     for family, (name, color) in enumerate(
         zip(strokes.names, pen.family_colors(strokes.names), strict=True)
     ):
+        yield Progress(family / len(strokes.names), "writing strokes")
         family_strokes = strokes.select(strokes.family == family)
         if not len(family_strokes):
             continue
@@ -142,22 +157,29 @@ def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
             f'fill="none" stroke={quoteattr(color)} stroke-width="{pen.width:.3g}" '
             'stroke-linecap="round" stroke-linejoin="round">'
         )
-        lines += (
-            _plotter_paths(family_pixels, family_strokes)
+        task = (
+            _plotter_paths_task(family_pixels, family_strokes)
             if pen.plotter
-            else _stroke_paths(family_pixels, family_strokes, pen.width, color)
+            else _stroke_paths_task(family_pixels, family_strokes, pen.width, color)
         )
+        start, stop = (done / len(strokes.names) for done in (family, family + 1))
+        lines += yield from subtask(task, start, stop)
         lines.append("</g>")
     lines.append("</svg>")
     return "\n".join(lines) + "\n"
 
 
-def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
-    """Return one path per stroke, in the order of `plotter_order`."""
-    order, is_reversed = plotter_order(pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1])
-    kept = simplify_mask(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX)
+def _plotter_paths_task(pixels: np.ndarray, strokes: Strokes) -> Task[list[str]]:
+    """Return one path per stroke, in the order of `plotter_order_task`."""
+    first, last = pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1]
+    order, is_reversed = yield from subtask(plotter_order_task(first, last), 0.0, 0.5)
+    kept = yield from subtask(
+        simplify_mask_task(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX), 0.5, 0.6
+    )
     paths = []
     for stroke, backward in zip(order.tolist(), is_reversed.tolist(), strict=True):
+        if len(paths) % PATHS_PER_STEP == 0:
+            yield Progress(0.6 + 0.4 * len(paths) / len(order), "writing strokes")
         span = slice(strokes.start[stroke], strokes.start[stroke + 1])
         points = pixels[span][kept[span]]
         points = points[::-1] if backward else points
@@ -165,7 +187,9 @@ def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
     return paths
 
 
-def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
+def _stroke_paths_task(
+    pixels: np.ndarray, strokes: Strokes, width: float, color: str
+) -> Task[list[str]]:
     """Return the paths of strokes: a line if the width is constant, otherwise a filled outline.
 
     A stroke is split where its opacity changes. The parts have square ends, so that they do not
@@ -174,18 +198,20 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
     opacity_level = np.rint(np.clip(strokes.opacity, 0, 1) * OPACITY_LEVELS).astype(np.int64)
     point, start, first = _split_by_opacity(opacity_level, strokes)
     radius = np.clip(strokes.width[point], 0, 1) * width / 2
-    kept = simplify_mask(np.column_stack([pixels[point], radius]), start, SIMPLIFY_TOLERANCE_PX)
+    features = np.column_stack([pixels[point], radius])
+    kept = yield from subtask(simplify_mask_task(features, start, SIMPLIFY_TOLERANCE_PX), 0.1, 0.5)
     start = np.concatenate([[0], np.cumsum(kept)])[start]
     points, radius = pixels[point][kept], radius[kept]
     min_radius, max_radius = (
         extremum.reduceat(radius, start[:-1]) for extremum in (np.minimum, np.maximum)
     )
     left, right = _offset_sides(points, radius, start)
-    is_whole = (
-        np.bincount(strokes.stroke[first], minlength=len(strokes))[strokes.stroke[first]] == 1
-    )
+    stroke = strokes.stroke[first]
+    is_whole = np.bincount(stroke, minlength=len(strokes))[stroke] == 1
     paths = []
     for piece, level in enumerate(opacity_level[first].tolist()):
+        if piece % PATHS_PER_STEP == 0:
+            yield Progress(0.5 + 0.5 * piece / len(first), "writing strokes")
         span = slice(start[piece], start[piece + 1])
         if not level or not max_radius[piece]:
             continue
@@ -197,7 +223,7 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
                 if width_px > (1 - WIDTH_TOLERANCE) * width
                 else f' stroke-width="{width_px:.3g}"'
             )
-            closed = strokes.closed[strokes.stroke[first[piece]]]
+            closed = strokes.closed[stroke[piece]]
             paths.append(f'<path{attributes} d="{_line_path(points[span], closed)}"/>')
         else:
             attributes += f' fill={quoteattr(color)} stroke="none"'
@@ -288,6 +314,11 @@ def _format_points(points: np.ndarray) -> str:
 
 
 def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
+    """Run `simplify_mask_task` to its end."""
+    return run_to_completion(simplify_mask_task(points, start, tolerance))
+
+
+def simplify_mask_task(points: np.ndarray, start: np.ndarray, tolerance: float) -> Task[np.ndarray]:
     """Choose the points of simplified polylines.
 
     The method is that of Ramer, Douglas and Peucker, for all polylines at once.
@@ -310,6 +341,7 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
     kept[first], kept[last] = True, True
     first, last = first[last - first > 1], last[last - first > 1]
     while len(first):
+        yield Progress(1 - float((last - first).sum()) / len(points), "simplifying strokes")
         count = last - first - 1
         begin = np.concatenate([[0], np.cumsum(count)[:-1]])
         segment = np.repeat(np.arange(len(first)), count)
@@ -337,6 +369,11 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
 
 
 def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Run `plotter_order_task` to its end."""
+    return run_to_completion(plotter_order_task(first, last))
+
+
+def plotter_order_task(first: np.ndarray, last: np.ndarray) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Order and reverse strokes so that the pen travels little between them.
 
     The next stroke is always the one with the nearest end (greedy). A grid speeds up the search.
@@ -367,6 +404,8 @@ def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.n
     current, order, is_reversed = low.tolist(), [], []
     current_cell = (0, 0)
     for _ in range(count):
+        if len(order) % PATHS_PER_STEP == 0:
+            yield Progress(len(order) / count, "ordering strokes")
         nearest = _nearest_end(
             grid, positions, current, current_cell, cell_count, extent.max() / cell_count
         )

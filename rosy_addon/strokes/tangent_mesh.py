@@ -18,7 +18,7 @@ from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
 from ..field.surface import Surface, build_edges
-from ..progress import run_to_completion
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.corner_field import cached_corner_field_task
 from ..projection.field_channel import rotation_order
 from ..projection.gbuffer import MeshInstance
@@ -202,14 +202,19 @@ def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndar
     return np.where(z != 0, reference * np.exp(1j * angle), 0)
 
 
-def build_tangent_mesh(
+def build_tangent_mesh(instance: MeshInstance, **options) -> TangentMesh:
+    """Run `tangent_mesh_task` to its end."""
+    return run_to_completion(tangent_mesh_task(instance, **options))
+
+
+def tangent_mesh_task(
     instance: MeshInstance,
     *,
     display: str = "smooth",
     cross_creases: bool = False,
     crease_angle: float = CREASE_ANGLE,
     cache: Cache | None = None,
-) -> TangentMesh:
+) -> Task[TangentMesh]:
     """Build the tangent mesh of a mesh instance.
 
     Parameters
@@ -224,6 +229,10 @@ def build_tangent_mesh(
         Smallest angle between the normals of the triangles at a crease, in radians.
     cache : Cache, optional
         Cache for corner fields.
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
@@ -243,17 +252,21 @@ def build_tangent_mesh(
             f"{surface.name}: the field has {counted(len(field.vectors), 'vector')}, but the mesh has "
             f"{counted(surface.face_count, 'face')}"
         )
-    corner_field = run_to_completion(
-        cached_corner_field_task(surface, instance.matrix, field, display, cache)
+    corner_field = yield from subtask(
+        cached_corner_field_task(surface, instance.matrix, field, display, cache), 0.0, 0.3
     )
+    label = "preparing the surface"
+    yield Progress(0.3, label)
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     points = vertices[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
+    yield Progress(0.4, label)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
     rotations = _rotations_to_planes(
         corner_field.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
     )
+    yield Progress(0.5, label)
     z = corner_field.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
@@ -265,8 +278,19 @@ def build_tangent_mesh(
             harmonics.append((channel[1], values))
         else:
             family_z = values.sum(axis=1)
-    neighbor, neighbor_edge, edge_transport = _adjacency(
-        surface, points, x, y, normal, (z != 0).any(axis=1), None if cross_creases else crease_angle
+    yield Progress(0.6, label)
+    neighbor, neighbor_edge, edge_transport = yield from subtask(
+        _adjacency_task(
+            surface,
+            points,
+            x,
+            y,
+            normal,
+            (z != 0).any(axis=1),
+            None if cross_creases else crease_angle,
+        ),
+        0.6,
+        1.0,
     )
     return TangentMesh(
         degree=field.degree,
@@ -380,7 +404,7 @@ def _rotations_to_planes(
     return rotations
 
 
-def _adjacency(
+def _adjacency_task(
     surface: Surface,
     points: np.ndarray,
     x: np.ndarray,
@@ -388,16 +412,17 @@ def _adjacency(
     normal: np.ndarray,
     defined: np.ndarray,
     crease_angle: float | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Return `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
 
     Strokes stop at triangles that are not `defined` (T,) and, unless `crease_angle` is None, at
     creases.
     """
-    count = len(points)
+    count, label = len(points), "connecting triangles"
     edges = build_edges(
         surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
     )
+    yield Progress(0.5, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     triangle_a, triangle_b = a // 3, b // 3
     passable = defined[triangle_a] & defined[triangle_b]
@@ -407,6 +432,7 @@ def _adjacency(
             & (dot(normal[triangle_a], normal[triangle_b]) < np.cos(crease_angle))
         )
     a, b, triangle_a, triangle_b = (values[passable] for values in (a, b, triangle_a, triangle_b))
+    yield Progress(0.7, label)
     neighbor = np.full((count, 3), -1, dtype=np.int32)
     neighbor_edge = np.zeros((count, 3), dtype=np.int8)
     edge_transport = np.ones((count, 3), dtype=np.complex128)

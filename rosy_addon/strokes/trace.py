@@ -8,18 +8,18 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
-from .closed_strokes import close_loops
-from .families import label_families
+from .closed_strokes import close_loops_task
+from .families import label_families_task
 from .growing_strokes import StrokeSegments
 from .placement import StreamlinePlacer
-from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
-from .separation import enforce_separation
+from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds_task
+from .separation import separation_task
 from .separation_rules import SeparationRules
 from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
-from .tangent_mesh import build_tangent_mesh, corner_values
+from .tangent_mesh import TangentMesh, corner_values, tangent_mesh_task
 
 #: Steps between two attempts to seed beside strokes, and the number of tips below which seeds are added at every
 #: step.
@@ -87,16 +87,33 @@ def trace_strokes_task(
         If there is no field, the spacing is not above 0, or it is so small that there would be too
         many strokes.
     """
-    mesh = build_tangent_mesh(instance, display=display, cross_creases=cross_creases, cache=cache)
-    corner_spacing = corner_values(mesh, spacing, instance.surface.name)
+    mesh = yield from subtask(
+        tangent_mesh_task(instance, display=display, cross_creases=cross_creases, cache=cache),
+        0.0,
+        0.1,
+    )
+    strokes = yield from subtask(
+        trace_on_mesh_task(mesh, spacing, rules, instance.surface.name), 0.1, 0.95
+    )
+    return (yield from subtask(label_families_task(strokes, mesh), 0.95, 1.0))
+
+
+def trace_on_mesh_task(
+    mesh: TangentMesh,
+    spacing: np.ndarray | float,
+    rules: SeparationRules | None = None,
+    surface_name: str = "mesh",
+) -> Task[Strokes]:
+    """Do the same as `trace_strokes_task` on a tangent mesh, but do not assign families."""
+    corner_spacing = corner_values(mesh, spacing, surface_name)
     if not (np.isfinite(corner_spacing).all() and (corner_spacing > 0).all()):
-        raise RosyError(f"{instance.surface.name}: the spacing of strokes must be above 0")
+        raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
     placer = StreamlinePlacer(mesh, corner_spacing, rules or SeparationRules())
     rules = placer.rules
-    yield from place_streamlines_task(placer)
-    strokes = close_loops(mesh, collect_strokes(placer), corner_spacing)
-    strokes = enforce_separation(mesh, strokes, rules.min_length)
-    return label_families(strokes, mesh)
+    yield from subtask(place_streamlines_task(placer), 0.0, 0.9)
+    strokes = yield from subtask(collect_task(placer), 0.9, 0.92)
+    strokes = yield from subtask(close_loops_task(mesh, strokes, corner_spacing), 0.92, 0.95)
+    return (yield from subtask(separation_task(mesh, strokes, rules.min_length), 0.95, 1.0))
 
 
 def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
@@ -115,28 +132,32 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.corner_spacing))
     for _ in range(WARMUP_STEPS):
+        yield Progress(0.0, label)
         if len(placer.tips):
             placer.step()
     placer.suspend()
     seeds = candidate_seeds(placer.mesh, placer.corner_spacing)
-    seeds = uncovered_seeds(placer.samples, seeds)
+    seeds = yield from uncovered_seeds_task(placer.samples, seeds)
     seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.corner_spacing))
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     while len(seeds):
+        yield Progress(placer.samples.coverage, label)
         placer.add_seeds(thinned_seeds(placer.mesh, seeds, seed_spacing * median_spacing))
         yield from _grow_until(placer, label, STRAGGLER_RATIO)
         if seed_spacing <= MIN_SEED_SPACING:
             break
         seed_spacing /= 4
-        seeds = uncovered_seeds(placer.samples, seeds)
-    placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
+        seeds = yield from uncovered_seeds_task(placer.samples, seeds)
+    yield from placer.rescan_task(
+        replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length)
+    )
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
     )
     placer.resume_yielded(replace(fill_rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
-    placer.rescan(fill_rules)
+    yield from placer.rescan_task(fill_rules)
     yield from _grow_until(placer, label)
     if not placer.strokes.alive[: placer.strokes.count].any():
         # Where only short strokes fit, none has survived the minimum lengths of the first rounds.
@@ -152,6 +173,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     """
     steps, max_tips = 0, 0
     while True:
+        yield Progress(placer.samples.coverage, label)
         if steps % STEPS_PER_SEEDING == 0 or len(placer.tips) < MIN_TIPS:
             seeded = placer.seed_neighbors()
             if not seeded and not len(placer.tips):
@@ -160,8 +182,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
                 # Each call closes the sides that it tried. Try others twice more.
                 if not placer.seed_neighbors() and not placer.seed_neighbors():
                     return
-            fraction = placer.samples.count / max(placer.samples.expected_count, 1)
-            yield Progress(min(fraction, 0.99), label)
+            yield Progress(placer.samples.coverage, label)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
@@ -171,16 +192,20 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
         steps += 1
 
 
-def collect_strokes(placer: StreamlinePlacer) -> Strokes:
-    """Return the strokes of a placer. They are all in one family; see `label_families`."""
+def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
+    """Return the strokes of a placer. They are all in one family; see `label_families_task`."""
+    label = "collecting strokes"
     mesh, samples = placer.mesh, placer.samples
-    segments = StrokeSegments(
-        *(np.concatenate(column) for column in zip(*placer.segments, strict=True))
-    )
+    columns = []
+    for column in zip(*placer.segments, strict=True):
+        yield Progress(0.05 * len(columns), label)
+        columns.append(np.concatenate(column))
+    segments = StrokeSegments(*columns)
     keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
     stroke, sign, triangle, begin_weights, weights, direction = (
         column[keep] for column in segments
     )
+    yield Progress(0.4, label)
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
     backward = np.flatnonzero(sign < 0)
@@ -202,14 +227,17 @@ def collect_strokes(placer: StreamlinePlacer) -> Strokes:
             np.concatenate([stroke, stroke_ids]),
         )
     )
+    yield Progress(0.6, label)
     stroke = np.concatenate([stroke, stroke_ids])[order]
     triangle = np.concatenate([triangle, first_triangle])[order]
     weights = np.concatenate([weights, first_weights])[order]
     direction = np.concatenate([direction * sign, first_direction])[order]
+    yield Progress(0.8, label)
     row = np.searchsorted(stroke_ids, stroke)
     points = mesh.points_at(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
     spacing = np.einsum("nk,nk->n", weights, placer.corner_spacing[triangle])
+    yield Progress(0.9, label)
     return Strokes(
         points=points,
         start=start,

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ..field.frames import dot, normalize
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.rasterizer import rasterize
+from ..projection.rasterizer import rasterize_task
 from .stroke_set import Strokes, arc_lengths
 
 #: Largest distance between the points of strokes at which visibility is tested, in pixels.
 SAMPLE_STEP_PX = 1.0
+
+#: Points of strokes that are clipped at once, to bound memory and the length of a step.
+BLOCK_POINTS = 1 << 16
 
 #: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of the
 #: rasterization.
@@ -74,6 +79,17 @@ def clip_to_visible(
     *,
     remove_hidden: bool = True,
 ) -> Strokes:
+    """Run `clip_task` to its end."""
+    return run_to_completion(clip_task(strokes, instances, camera, remove_hidden=remove_hidden))
+
+
+def clip_task(
+    strokes: Strokes,
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    *,
+    remove_hidden: bool = True,
+) -> Task[Strokes]:
     """Return the parts of strokes that are in the frame and not hidden.
 
     Parameters
@@ -84,6 +100,10 @@ def clip_to_visible(
     camera : Camera
     remove_hidden : bool
         If false, strokes are only clipped to the frame.
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
@@ -99,16 +119,28 @@ def clip_to_visible(
     differs from that at the point, by the slope times up to half a pixel. A point is also hidden if
     it is behind only one of them, but one of the two faces the camera and the other faces away.
     """
-    strokes = subdivide_to_pixels(strokes, camera)
-    pixels, _ = project_to_pixels(strokes.points, camera)
-    inside = in_frame(pixels, camera)
-    visible = inside.copy()
+    label = "finding visible strokes"
+    depth_buffer = None
     if remove_hidden:
-        visible[visible] = ~_is_hidden(
-            strokes, pixels, visible, rasterize_depth(instances, camera), camera
-        )
-        visible = _remove_specks(visible, pixels, strokes.start)
-    return strokes.runs_where(visible, free_at_removed=inside)
+        depth_buffer = yield from subtask(depth_task(instances, camera), 0.0, 0.3, label)
+    yield Progress(0.3, label)
+    clipped = []
+    counts = pixel_counts(strokes, camera)
+    # Each block ends with the stroke that reaches the next multiple of its size.
+    block_index = np.cumsum(counts)[strokes.start[1:] - 1] // BLOCK_POINTS
+    cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
+    for first, stop in pairwise(cuts):
+        yield Progress(0.3 + 0.6 * first / max(len(strokes), 1), label)
+        block = strokes.subdivided(counts, first, stop)
+        pixels, _ = project_to_pixels(block.points, camera)
+        inside = in_frame(pixels, camera)
+        visible = inside.copy()
+        if depth_buffer is not None:
+            visible[visible] = ~_is_hidden(block, pixels, visible, depth_buffer, camera)
+            visible = _remove_specks(visible, pixels, block.start)
+        clipped.append(block.runs_where(visible, free_at_removed=inside))
+    yield Progress(0.9, label)
+    return Strokes.join(clipped)
 
 
 def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
@@ -117,14 +149,17 @@ def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
         return ((pixels >= 0) & (pixels <= (camera.width, camera.height))).all(axis=1)
 
 
-def subdivide_to_pixels(strokes: Strokes, camera: Camera) -> Strokes:
-    """Subdivide segments that are longer than `SAMPLE_STEP_PX` pixels."""
+def pixel_counts(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """Return (n,) int64: the parts of at most `SAMPLE_STEP_PX` pixels of the segment before a point.
+
+    As for `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
+    """
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixel_distance = np.zeros(len(pixels))
     pixel_distance[1:] = np.hypot(*np.diff(pixels, axis=0).T)
     pixel_distance[strokes.start[:-1]] = 0
     counts = np.where(np.isfinite(pixel_distance), np.ceil(pixel_distance / SAMPLE_STEP_PX), 1)
-    return strokes.subdivided(np.clip(counts, 1, 4096))
+    return np.clip(counts, 1, 4096).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,16 +185,26 @@ class DepthBuffer:
 
 
 def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthBuffer:
+    """Run `depth_task` to its end."""
+    return run_to_completion(depth_task(instances, camera))
+
+
+def depth_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[DepthBuffer]:
     """Rasterize mesh instances to a depth buffer."""
+    label = "finding the nearest surface"
+    yield Progress(0.0, label)
     corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
     indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
-    fragments = rasterize(clip, indices, camera.width, camera.height)
+    yield Progress(0.2, label)
+    task = rasterize_task(clip, indices, camera.width, camera.height)
+    fragments = yield from subtask(task, 0.2, 0.8, label)
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
     triangle.flat[fragments.pixel] = fragments.triangle
     depth = np.full(triangle.shape, np.inf)
     depth.flat[fragments.pixel] = -dot(fragments.barycentric, corners[fragments.triangle, :, 2])
+    yield Progress(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     return DepthBuffer(triangle, depth, normal, dot(normal, corners[:, 0]))
 

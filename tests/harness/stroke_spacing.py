@@ -83,6 +83,18 @@ def lateral_gaps(mesh: TangentMesh, strokes: Strokes, max_points: int = 20_000) 
     )
 
 
+def _arc_distance(strokes: Strokes, point_a: np.ndarray, point_b: np.ndarray) -> np.ndarray:
+    """Return (m,) float64: the distances along strokes between pairs of points, in world space.
+
+    On a closed stroke it is the shorter of the two directions. It is infinite if the points are on
+    different strokes.
+    """
+    arc, stroke = strokes.arc, strokes.stroke
+    direct = np.abs(arc[point_a] - arc[point_b])
+    around = np.where(strokes.closed, strokes.length, np.inf)[stroke[point_a]] - direct
+    return np.where(stroke[point_a] == stroke[point_b], np.minimum(direct, np.abs(around)), np.inf)
+
+
 def _measure(
     mesh: TangentMesh, samples: Strokes, tangent: np.ndarray, grid: PointGrid, batch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +103,7 @@ def _measure(
     query, other = grid.pairs_within(samples.points[batch], SEARCH_RADIUS * samples.spacing[batch])
     sample = batch[query]
     distinct = stroke[sample] != stroke[other]
-    distinct |= samples.arc_distance(sample, other) > MIN_SELF_ARC * samples.spacing[sample]
+    distinct |= _arc_distance(samples, sample, other) > MIN_SELF_ARC * samples.spacing[sample]
     distinct &= dot(samples.normal[sample], samples.normal[other]) > 0.3
     query, other, sample = query[distinct], other[distinct], sample[distinct]
     normal = normalize(samples.normal[sample] + samples.normal[other])

@@ -66,7 +66,7 @@ class Job:
         global _current_job
         self.task = task
         self.required_data = list(required_data)
-        self.scene = context.scene
+        self.scene, self.view_layer = context.scene, context.view_layer
         self.stop_reason: str | None = None
         self.result: Any = None
         self.workspaces: list[bpy.types.WorkSpace] = []
@@ -129,6 +129,8 @@ class Job:
         try:
             if context.scene != self.scene:
                 return "another scene was chosen"
+            if context.view_layer != self.view_layer:  # tasks hold its depsgraph
+                return "another view layer was chosen"
             for data_block in self.required_data:
                 if isinstance(data_block, bpy.types.Object) and not data_block.users_scene:
                     return f"'{data_block.name}' was deleted"

@@ -13,10 +13,10 @@ from bpy_extras.io_utils import ExportHelper
 from ..rosy_addon.cache import Cache
 from ..rosy_addon.file_io import check_writable
 from ..rosy_addon.gpu.select import select_renderer
-from ..rosy_addon.progress import Task
+from ..rosy_addon.progress import Task, subtask
 from ..rosy_addon.projection.camera import check_size
 from ..rosy_addon.scene.look_properties import read_look
-from ..rosy_addon.scene.read_view import read_turntable
+from ..rosy_addon.scene.read_view import read_turntable_task
 from ..rosy_addon.scene.video import encode_video_task
 from ..rosy_addon.turntable import (
     check_video_path,
@@ -114,17 +114,23 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         path = Path(bpy.path.abspath(self.filepath))
         check_writable(path)
         check_video_path(path)
+        return self._turntable_task(context, path)
+
+    def _turntable_task(self, context: bpy.types.Context, path: Path) -> Task[Path]:
+        """Read the mesh, and draw and write the video."""
         scene = context.scene
         look = read_look(scene.rosy)
         look = replace(look, supersampling=max(look.supersampling, 2))
         renderer = select_renderer(scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False)
         obj = selected_mesh_objects(context)[0]
         depsgraph = context.evaluated_depsgraph_get()
-        instance, lights = read_turntable(scene, depsgraph, obj, look)
+        reading = read_turntable_task(scene, depsgraph, obj, look)
+        instance, lights = yield from subtask(reading, 0.0, 0.0)
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
         views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
         encode = None if has_ffmpeg() else encode_video_task
-        return turntable_task(renderer, views, self.pictures, path, self.rate, encode)
+        task = turntable_task(renderer, views, self.pictures, path, self.rate, encode)
+        return (yield from task)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return selected_mesh_objects(context)[:1]

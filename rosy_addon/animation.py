@@ -43,7 +43,7 @@ from .scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import nonfinite_policy, read_views, scene_depsgraph
+from .scene.read_view import nonfinite_policy, read_views_task, scene_depsgraph
 from .scene.scene_reader import SceneData, field_objects, temp_attributes
 
 #: Suffix of a sidecar file, after the name of the picture.
@@ -239,7 +239,7 @@ def _frame_task(
     )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
-    scene_views = read_views(
+    reading = read_views_task(
         scene,
         depsgraph,
         sources,
@@ -249,6 +249,7 @@ def _frame_task(
         reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
         cache=cache,
     )
+    scene_views = yield from subtask(reading, 0.0, 0.0)
     states = read_picture_states(scene, depsgraph, sources)
     results = []
     for index, view in enumerate(scene_views.views):

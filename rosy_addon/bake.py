@@ -24,7 +24,7 @@ from .scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import read_views, scene_depsgraph
+from .scene.read_view import read_views_task, scene_depsgraph
 
 __all__ = ["BakeResult", "bake", "bake_task"]
 
@@ -73,7 +73,7 @@ def bake_task(
     Raises
     ------
     RosyError
-        If there is nothing to draw or it cannot be drawn; see `read_views`, `select_renderer`,
+        If there is nothing to draw or it cannot be drawn; see `read_views_task`, `select_renderer`,
         `Renderer.render_task` and `check_targets`.
     """
     look = read_look(scene.rosy) if look is None else look
@@ -81,9 +81,10 @@ def bake_task(
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
-    scene_views = read_views(
+    reading = read_views_task(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
+    scene_views = yield from subtask(reading, 0.0, 0.05)
     check_targets(scene_views.scene_data.objects, settings)
     states = read_picture_states(scene, depsgraph, sources)
     renderer = select_renderer(settings.device, look, BAKE_CACHE)

@@ -16,7 +16,7 @@ from .progress import Progress, Task, run_to_completion, subtask
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
-from .scene.scene_reader import SceneData, read_scene
+from .scene.scene_reader import SceneData, read_scene_task
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from .strokes.pipeline import StrokeDrawing, draw_instances_task, geometry_task
 from .strokes.style import StrokeStyle
@@ -98,7 +98,7 @@ def draw_strokes_task(
     Raises
     ------
     RosyError
-        If there is nothing to draw, or it cannot be drawn; see `read_scene`, `resolve_camera` and
+        If there is nothing to draw, or it cannot be drawn; see `read_scene_task`, `resolve_camera` and
         `draw_instances_task`. Also if the file cannot be written.
     """
     settings = scene.rosy.strokes
@@ -111,7 +111,8 @@ def draw_strokes_task(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
-    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    reading = read_scene_task(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    scene_data = yield from subtask(reading, 0.0, 0.05)
     lights = lights_of(style, read_lights(depsgraph, view.view))
     clip_to_frame = kind == "SVG"
     work = draw_instances_task(

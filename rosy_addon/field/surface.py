@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import RosyError, counted
-from ..progress import Progress, Task, run_to_completion
+from ..progress import Progress, Task, run_to_completion, subtask
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -134,6 +134,13 @@ class Surface:
 
 
 def build_surface(
+    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, **options
+) -> Surface:
+    """Run `surface_task` to its end."""
+    return run_to_completion(surface_task(vertices, corner_vertex, face_start, **options))
+
+
+def surface_task(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
@@ -147,7 +154,7 @@ def build_surface(
     triangles: np.ndarray | None = None,
     triangle_face: np.ndarray | None = None,
     rest_vertices: np.ndarray | None = None,
-) -> Surface:
+) -> Task[Surface]:
     """Make a `Surface` from arrays, and compute the parts that are not given.
 
     Parameters
@@ -165,10 +172,18 @@ def build_surface(
     corner_normal : (C, 3) array_like, optional
         Shading normals. If not given, the face normals averaged over each fan, weighted by angle.
     corner_fan : (C,) array_like of int, optional
-        The result of `smooth_fans`, if it is known.
+        The result of `smooth_fans_task`, if it is known.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
         The result of `triangulate`, if it is known.
     rest_vertices : (V, 3) array_like, optional
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Surface
 
     Raises
     ------
@@ -180,12 +195,16 @@ def build_surface(
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
     face_start = np.ascontiguousarray(face_start, dtype=np.int32).ravel()
     _check_polygons(name, vertices, corner_vertex, face_start)
+    yield Progress(0.1, "reading the mesh")
     if triangles is None:
         triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
+        yield Progress(0.3, "triangulating the mesh")
     if corner_fan is None:
-        corner_fan = smooth_fans(
+        task = smooth_fans_task(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
         )
+        corner_fan = yield from subtask(task, 0.3, 0.8)
+    yield Progress(0.8, "computing normals")
     if corner_normal is None:
         corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(
@@ -203,22 +222,27 @@ def build_surface(
     )
 
 
-def smooth_fans(
+def smooth_fans_task(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
     sharp_edges: np.ndarray | None = None,
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(C,) int32: `Surface.corner_fan`; the parameters are those of `build_surface`.
 
     Without a sharp angle, the result does not depend on the vertex positions.
     """
+    label = "finding smooth edges"
+    yield Progress(0.0, label)
     pairs = _smooth_corner_pairs(
         vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
     )
-    return connected_components(len(corner_vertex), pairs)
+    yield Progress(0.5, label)
+    return (
+        yield from subtask(connected_components_task(len(corner_vertex), pairs), 0.5, 1.0, label)
+    )
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ..cache import Cache, content_hash
 from ..errors import NoFeaturesError, RosyError
-from ..field.surface import Surface, build_surface, smooth_fans
+from ..field.surface import Surface, smooth_fans_task, surface_task
+from ..progress import Task, run_to_completion, subtask
 
 #: Marks of edges: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
@@ -42,7 +44,23 @@ def mesh_surface(
     occluder_only: bool = False,
     cache: Cache | None = None,
 ) -> Surface:
-    """Read the surface of a mesh.
+    """Run `mesh_surface_task` to its end."""
+    return run_to_completion(
+        mesh_surface_task(mesh, name, read_rest=read_rest, occluder_only=occluder_only, cache=cache)
+    )
+
+
+def mesh_surface_task(
+    mesh: bpy.types.Mesh,
+    name: str | None = None,
+    *,
+    read_rest: bool = False,
+    occluder_only: bool = False,
+    cache: Cache | None = None,
+) -> Task[Surface]:
+    """Read the arrays of a mesh at once, and return a task that builds its surface from them.
+
+    The task does not use the mesh, which may change or be deleted meanwhile.
 
     Parameters
     ----------
@@ -57,6 +75,10 @@ def mesh_surface(
     cache : Cache, optional
         Keeps the surfaces of meshes that have not changed since an earlier call.
 
+    Returns
+    -------
+    Task
+
     Raises
     ------
     RosyError
@@ -65,42 +87,63 @@ def mesh_surface(
     """
     name = mesh_label(mesh) if name is None else name
     flush_edit_mode(mesh)
-    face_count = len(mesh.polygons)
-    if not face_count:
+    if not len(mesh.polygons):
         content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
         raise RosyError(f"{name}: the mesh has no faces, {content}")
-    arguments = {
+    arguments = _topology(mesh, occluder_only) | {
         "vertices": vertex_positions(mesh),
+        "name": name,
+        "corner_normal": read_collection(mesh.corner_normals, "vector", np.float32, 3),
+        "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
+    }
+    if cache is None:
+        return surface_task(**arguments, **_triangles(mesh))
+    # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
+    key = "surface", content_hash(*arguments.values())
+    if cache.get(key) is None:
+        arguments |= _triangles(mesh)
+    return cache.get_or_create_task(key, lambda: _with_fans_task(arguments, cache))
+
+
+def mesh_fans_task(mesh: bpy.types.Mesh, cache: Cache) -> Task[np.ndarray]:
+    """Read the topology of a mesh at once, and return a task that caches its `corner_fan`.
+
+    The fans depend on the topology alone, so a deformation does not change them.
+    """
+    return _fans_task(_topology(mesh), vertex_positions(mesh), cache)
+
+
+def _fans_task(
+    topology: dict[str, np.ndarray | None], vertices: np.ndarray, cache: Cache
+) -> Task[np.ndarray]:
+    """Return the smooth fans of a topology, from the cache if they are known."""
+    return cache.get_or_create_task(
+        ("fans", content_hash(*topology.values())), lambda: smooth_fans_task(vertices, **topology)
+    )
+
+
+def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np.ndarray | None]:
+    """Return the arguments of `surface_task` that smooth fans depend on."""
+    return {
         "corner_vertex": _attribute_or_collection(
             mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
         ),
         "face_start": _face_starts(mesh),
-        "name": name,
         "sharp_edges": None if occluder_only else _sharp_edges(mesh),
         "flat_faces": (
-            np.ones(face_count, dtype=bool)
+            np.ones(len(mesh.polygons), dtype=bool)
             if occluder_only
             else read_attribute(mesh, "sharp_face", bool, 1)
         ),
-        "corner_normal": read_collection(mesh.corner_normals, "vector", np.float32, 3),
-        "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
     }
 
-    def build() -> Surface:
-        return build_surface(**arguments, **_triangles(mesh))
 
-    if cache is None:
-        return build()
-    if not occluder_only:
-        # Smooth fans depend on the topology alone, so a deformation does not change them.
-        names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
-        topology = {name: arguments[name] for name in names}
-        arguments["corner_fan"] = cache.get_or_create(
-            ("fans", content_hash(*topology.values())),
-            lambda: smooth_fans(arguments["vertices"], **topology),
-        )
-    # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
-    return cache.get_or_create(("surface", content_hash(*arguments.values())), build)
+def _with_fans_task(arguments: dict[str, Any], cache: Cache) -> Task[Surface]:
+    """Build a surface from the arguments of `surface_task`, with fans from the cache."""
+    names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
+    topology = {name: arguments[name] for name in names}
+    fans = yield from subtask(_fans_task(topology, arguments["vertices"], cache), 0.0, 0.7)
+    return (yield from subtask(surface_task(**arguments, corner_fan=fans), 0.7, 1.0))
 
 
 def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:

@@ -13,8 +13,8 @@ from ..progress import Task, subtask
 from ..projection.ambient_occlusion import DIRECTION_COUNT, occlusion_task
 from ..projection.gbuffer import MeshInstance
 from .compat import is_editable
-from .meshes import mesh_surface
-from .scene_reader import SceneData, read_scene
+from .meshes import mesh_surface_task
+from .scene_reader import SceneData, read_scene_task
 
 #: Default name of the attribute.
 OCCLUSION_ATTRIBUTE = "Occlusion"
@@ -51,16 +51,17 @@ def store_occlusion_task(
     Raises
     ------
     RosyError
-        If the scene cannot be read (see `read_scene`), or a mesh is linked, in edit mode, or has an
+        If the scene cannot be read (see `read_scene_task`), or a mesh is linked, in edit mode, or has an
         attribute of that name with another type or domain. Nothing is changed in this case.
     """
     for obj in objects:
         _check_writable(obj, name)
-    scene_data = read_scene(depsgraph, objects, "zero")
+    scene_data = yield from subtask(read_scene_task(depsgraph, objects, "zero"), 0.0, 0.1)
     values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
-        start, stop = index / len(objects), (index + 1) / len(objects)
-        instances, instance_index = _with_original_faces(scene_data, obj)
+        start, stop = (0.1 + 0.9 * done / len(objects) for done in (index, index + 1))
+        task = _with_original_faces_task(scene_data, obj)
+        instances, instance_index = yield from subtask(task, start, start)
         values_by_mesh[obj.data] = yield from subtask(
             occlusion_task(instances, instance_index, direction_count), start, stop
         )
@@ -70,19 +71,17 @@ def store_occlusion_task(
         mesh.update()
 
 
-def _with_original_faces(
+def _with_original_faces_task(
     scene_data: SceneData, obj: bpy.types.Object
-) -> tuple[list[MeshInstance], int]:
+) -> Task[tuple[list[MeshInstance], int]]:
     """Return the mesh instances of a scene, and the index of an object's instance.
 
     The instance gets the object's original surface if its modifiers change the faces.
     """
     instance_index = scene_data.objects.index(obj)
     instances = list(scene_data.instances)
-    original, evaluated = (
-        mesh_surface(obj.data, f"object '{obj.name}'"),
-        instances[instance_index].surface,
-    )
+    evaluated = instances[instance_index].surface
+    original = yield from mesh_surface_task(obj.data, f"object '{obj.name}'")
     same_faces = np.array_equal(original.face_start, evaluated.face_start)
     if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
         instances[instance_index] = replace(instances[instance_index], surface=original)

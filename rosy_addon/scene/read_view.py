@@ -12,11 +12,12 @@ from ..cache import Cache
 from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..errors import RosyError
+from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from ..render.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
 from .lights import read_lights
-from .scene_reader import SceneData, read_scene
+from .scene_reader import SceneData, read_scene_task
 from .tone_inputs import load_reference, make_tone_request
 
 
@@ -36,7 +37,7 @@ class SceneViews:
     scene_data: SceneData
 
 
-def read_views(
+def read_views_task(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     cameras: Sequence[CameraSource],
@@ -46,7 +47,7 @@ def read_views(
     size: tuple[int, int] | None = None,
     reference_camera: bpy.types.Object | None = None,
     cache: Cache | None = None,
-) -> SceneViews:
+) -> Task[SceneViews]:
     """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
 
     Parameters
@@ -67,10 +68,18 @@ def read_views(
     cache : Cache, optional
         Keeps meshes, fields and tones that have not changed since an earlier reading.
 
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    SceneViews
+
     Raises
     ------
     RosyError
-        If two cameras have the same name; see also `resolve_camera`, `read_scene` and
+        If two cameras have the same name; see also `resolve_camera`, `read_scene_task` and
         `load_reference`.
     """
     resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
@@ -82,7 +91,9 @@ def read_views(
             "rename them in their libraries, or draw from one"
         )
     tone_request = make_tone_request(scene, look)
-    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), cache, tone_request)
+    scene_data = yield from read_scene_task(
+        depsgraph, objects, nonfinite_policy(scene), cache, tone_request
+    )
     reference = None
     if look.tone == "picture":
         reference_camera = reference_camera or render_camera(scene)
@@ -95,10 +106,14 @@ def read_views(
     return SceneViews(tuple(views), scene_data)
 
 
-def read_turntable(
+def read_turntable_task(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object, look: Look
-) -> tuple[MeshInstance, list[Light]]:
+) -> Task[tuple[MeshInstance, list[Light]]]:
     """Read one object and the lights of the scene, for views of the object from all sides.
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
@@ -109,10 +124,12 @@ def read_turntable(
     Raises
     ------
     RosyError
-        See `read_scene`.
+        See `read_scene_task`.
     """
     tone_request = make_tone_request(scene, look)
-    scene_data = read_scene(depsgraph, [obj], nonfinite_policy(scene), tone_request=tone_request)
+    scene_data = yield from read_scene_task(
+        depsgraph, [obj], nonfinite_policy(scene), tone_request=tone_request
+    )
     lights = read_lights(depsgraph, np.eye(4)) if look.light == "scene" else []
     return scene_data.instances[0], lights
 

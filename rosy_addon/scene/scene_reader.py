@@ -13,6 +13,7 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .compat import has_rosy_properties, is_editable
@@ -25,7 +26,7 @@ from .evaluated_field import (
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .libraries import check_object_type, remedy_for_absence
-from .meshes import evaluated_mesh, mesh_surface
+from .meshes import evaluated_mesh, mesh_fans_task, mesh_surface, mesh_surface_task
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
@@ -98,6 +99,17 @@ def read_scene(
     cache: Cache | None = None,
     tone_request: ToneRequest | None = None,
 ) -> SceneData:
+    """Run `read_scene_task` to its end."""
+    return run_to_completion(read_scene_task(depsgraph, objects, nonfinite, cache, tone_request))
+
+
+def read_scene_task(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object] | None = None,
+    nonfinite: str = "error",
+    cache: Cache | None = None,
+    tone_request: ToneRequest | None = None,
+) -> Task[SceneData]:
     """Read every mesh that is visible in renders, as arrays.
 
     Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are
@@ -119,6 +131,14 @@ def read_scene(
     tone_request : ToneRequest, optional
         The source of the surface tones.
 
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    SceneData
+
     Raises
     ------
     RosyError
@@ -132,7 +152,16 @@ def read_scene(
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")
     cache = Cache() if cache is None else cache
+    label = "reading the scene"
+    for index, obj in enumerate(objects):
+        start, stop = (0.5 * done / len(objects) for done in (index, index + 1))
+        yield from subtask(_prepare_surfaces_task(obj, depsgraph, cache), start, stop, label)
+    yield Progress(0.5, label)
     with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
+        yield Progress(0.7, label)
+        # The scene may have changed since the last step. All instances are read in one step, the
+        # last, so that the caller can read what belongs to them before it yields.
+        depsgraph.update()
         reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors)
         for instance in rendered_instances(depsgraph):
             reader.add(instance)
@@ -147,6 +176,31 @@ def read_scene(
         [owner for _, owner in reader.field_instances],
         tuple(f"{error}. It was left out" for error in (errors or {}).values()),
     )
+
+
+def _prepare_surfaces_task(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache
+) -> Task[None]:
+    """Build what the surfaces of an object take longest to build, and keep it in the cache.
+
+    These are the original surface, its face normals, and the smooth fans of the evaluated mesh.
+    Errors are left to those who read the surfaces.
+    """
+    label = f"object '{obj.name}'"
+    try:
+        task = mesh_surface_task(obj.data, label, cache=cache)
+        surface = yield from subtask(task, 0.0, 0.5)
+        yield Progress(0.5, label)
+        _ = surface.face_normal
+        if user_modifiers(obj):
+            depsgraph.update()
+            with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+                task = None if mesh is None else mesh_fans_task(mesh, cache)
+            yield Progress(0.6, label)
+            if task is not None:
+                yield from subtask(task, 0.6, 1.0)
+    except RosyError:
+        pass
 
 
 #: Why the fields of objects cannot be drawn.

@@ -18,7 +18,12 @@ from rosy.rosy_addon.scene.field_attributes import has_field
 from rosy.rosy_addon.scene.lights import read_lights
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
-from rosy.rosy_addon.scene.scene_reader import TEMP_FIELD_ATTRIBUTE, field_objects, read_instances
+from rosy.rosy_addon.scene.scene_reader import (
+    TEMP_FIELD_ATTRIBUTE,
+    field_objects,
+    read_instances,
+    read_scene_task,
+)
 from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_field,
@@ -498,3 +503,17 @@ def test_selected_edges_of_a_mesh_made_by_a_script(scene, repeated):
             marked_edges(mesh, "SELECTED")
     else:
         assert len(marked_edges(mesh, "SELECTED")) == count
+
+
+def test_reading_can_be_stopped_at_every_step(scene, monkey):
+    """Nothing is left of the attributes that modifiers copy while a scene is read."""
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    before = contents()
+    steps = sum(1 for _ in read_scene_task(depsgraph()))
+    assert steps > 10
+    for step in range(1, steps + 1):
+        task = read_scene_task(depsgraph())
+        for _ in range(step):
+            next(task)
+        task.close()
+        assert contents() == before, step

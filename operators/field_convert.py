@@ -9,19 +9,18 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, RosyError, counted
+from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.generate import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
-from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.scene.meshes import mesh_surface_task
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
-from .reports import report_error
 
 #: Items of the new degree; the number of each item is the degree. Not inside the annotation: up to
 #: Python 3.11, a comprehension there cannot see module names.
@@ -127,7 +126,9 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         meshes = list(self.required_data(context))
         converted = {}
         for index, mesh in enumerate(meshes):
-            surface = mesh_surface(mesh)
+            start, stop = index / len(meshes), (index + 1) / len(meshes)
+            surface = yield from subtask(mesh_surface_task(mesh), start, start)
+            yield Progress(start, "reading the field")
             field = read_mesh_field(mesh, surface=surface)
             values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
             if values is not None and values.min() < 0:
@@ -137,8 +138,9 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
             magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
             conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
             task = convert_task(surface, field, conversion)
-            field = yield from subtask(task, index / len(meshes), (index + 1) / len(meshes))
+            field = yield from subtask(task, start, stop)
             converted[mesh] = replace(field, source_directions=None)
+        yield Progress(1.0, "storing the fields")
         store_fields(self, context, converted)
         return len(converted)
 
@@ -155,7 +157,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
             layout.prop(self, "values")
 
 
-class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
+class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
     bl_idname = "rosy.field_store"
@@ -172,17 +174,21 @@ class ROSY_OT_field_store(_FieldOperator, bpy.types.Operator):
         description="Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles",
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
-            assign_fields(fields, self.attribute, self.form)
-        except REPORTED_ERRORS as error:
-            return report_error(self, error)
-        self.report(
-            {"INFO"},
-            f"Stored {counted(len(fields), 'field')} as {STORAGE_FORMS[self.form][0]}",
-        )
-        return {"FINISHED"}
+    def make_task(self, context: bpy.types.Context) -> Task[int]:
+        """Read all fields, then store them. Return the number of meshes."""
+        meshes = list(self.required_data(context))
+        fields = {}
+        for index, mesh in enumerate(meshes):
+            start, stop = index / len(meshes), (index + 1) / len(meshes)
+            surface = yield from subtask(mesh_surface_task(mesh), start, stop)
+            yield Progress(stop, "reading the field")
+            fields[mesh] = read_mesh_field(mesh, surface=surface)
+        yield Progress(1.0, "storing the fields")
+        assign_fields(fields, self.attribute, self.form)
+        return len(fields)
+
+    def finish(self, context: bpy.types.Context, result: int) -> None:
+        self.report({"INFO"}, f"Stored {counted(result, 'field')} as {STORAGE_FORMS[self.form][0]}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

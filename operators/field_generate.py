@@ -13,7 +13,7 @@ from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
-from ..rosy_addon.field.singularities import describe_fields
+from ..rosy_addon.field.singularities import description_task
 from ..rosy_addon.field.surface import Surface, orientation_warning
 from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.guides import (
@@ -22,7 +22,7 @@ from ..rosy_addon.scene.guides import (
     guide_strokes_and_empties,
     guide_vectors,
 )
-from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
+from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface_task
 from ..rosy_addon.ui.generator_settings import generator_setting_names
 from .modal_task import ModalTaskMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
@@ -156,7 +156,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         """
         inputs, fields, errors = [], {}, []
         for mesh in self.required_data(context):
-            surface = mesh_surface(mesh)
+            surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
             try:
                 settings = self._generator_settings(context, mesh, surface)
             except NoFeaturesError as error:
@@ -174,6 +174,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 errors.append(self._no_direction_error(surface))
                 continue
             fields[mesh] = field
+            yield Progress((index + 1) / len(inputs), "checking orientations")
             if note := orientation_warning(surface):
                 report_warning(self, note)
         if not fields:
@@ -182,7 +183,9 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
             report_warning(self, str(error))
         yield Progress(1.0, "counting singularities")
         surfaces = {mesh: surface for mesh, surface, _ in inputs}
-        notes = self._notes([(surfaces[mesh], field) for mesh, field in fields.items()])
+        fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
+        notes = yield from subtask(self._notes_task(fields_on_surfaces), 1.0, 1.0)
+        yield Progress(1.0, "storing the fields")
         store_fields(self, context, fields, self.attribute)
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
@@ -196,11 +199,11 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
             "Smoothest"
         )
 
-    def _notes(self, fields: list[tuple[Surface, RosyField]]) -> str:
+    def _notes_task(self, fields: list[tuple[Surface, RosyField]]) -> Task[str]:
         """Return what the message says about the fields. Counting must not take long."""
         face_count = sum(surface.face_count for surface, _ in fields)
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
-        return describe_fields(fields, count_singularities=is_cheap)
+        return (yield from description_task(fields, count_singularities=is_cheap))
 
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface

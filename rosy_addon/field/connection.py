@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion
 from .frames import dot
 from .sparse_multigrid import CSRMatrix, from_coo
 from .surface import Surface, build_edges, connected_components, next_corners
@@ -84,7 +85,14 @@ class Connection:
 
 
 def build_connection(surface: Surface) -> Connection:
+    """Run `connection_task` to its end."""
+    return run_to_completion(connection_task(surface))
+
+
+def connection_task(surface: Surface) -> Task[Connection]:
     """Build the connection of the triangles of a surface, at `Surface.vertices`."""
+    label = "building the connection Laplacian"
+    yield Progress(0.0, label)
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
     edges = build_edges(vertex, start)
@@ -95,12 +103,16 @@ def build_connection(surface: Surface) -> Connection:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     twin[a], twin[b] = b, a
 
+    yield Progress(0.3, label)
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     # In counter-clockwise order around a vertex, the previous corner lies across the edge that
     # leaves from this corner.
+    yield Progress(0.5, label)
     previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
     is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
+    yield Progress(0.6, label)
     first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
+    yield Progress(0.7, label)
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
@@ -111,6 +123,7 @@ def build_connection(surface: Surface) -> Connection:
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
+    yield Progress(0.8, label)
     # Each edge once: from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Task, run_to_completion
-from .connection import build_connection, laplacian
+from ..progress import Progress, Task, run_to_completion, subtask
+from .connection import connection_task, laplacian
 from .directional_field import field_matching
 from .frames import normalize
-from .generate import MIN_SMOOTHING_LENGTH, compute_magnitude
+from .generate import MIN_SMOOTHING_LENGTH, magnitude_task
 from .guided import conjugate_gradient_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
@@ -63,8 +63,10 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
     RosyError
         If a step is not possible; see `change_degree` and `diffuse_task`.
     """
+    yield Progress(0.0, "converting the field")
     if conversion.degree is not None:
         field = change_degree(surface, field, conversion.degree)
+        yield Progress(0.0, "converting the field")
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
     if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
@@ -72,7 +74,7 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
         field = yield from diffuse_task(surface, field, max(time, np.finfo(np.float64).tiny))
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = compute_magnitude(surface, magnitude)
+        magnitude = yield from magnitude_task(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 
@@ -209,15 +211,18 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
-    connection = build_connection(surface)
+    connection = yield from subtask(connection_task(surface), 0.0, 0.1)
     frame_angle = corner_frame_angles(surface, connection, x, y)
+    yield Progress(0.1, "smoothing the field")
     corner_area = np.repeat(connection.area / 3, 3)
     corner_face = np.repeat(surface.triangle_face, 3)
     to_node = np.exp(-1j * degree * frame_angle)
     rhs = complex_bincount(
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
+    yield Progress(0.15, "smoothing the field")
     matrix = laplacian(connection, degree)
+    yield Progress(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)
     matrix = from_coo(
@@ -227,7 +232,8 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
         connection.node_count,
         connection.node_count,
     )
-    solution = yield from conjugate_gradient_task(matrix, rhs)
+    solution = yield from subtask(conjugate_gradient_task(matrix, rhs), 0.2, 0.95)
+    yield Progress(0.95, "smoothing the field")
     area = np.bincount(surface.triangle_face, connection.area, surface.face_count)
     mean = (
         node_sum_per_face(surface, connection, solution, frame_angle, degree)

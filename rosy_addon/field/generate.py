@@ -23,12 +23,12 @@ from .guides import (
     guides_from_axes,
     guides_from_edges,
     guides_from_strokes,
-    guides_from_uv,
+    uv_guides_task,
 )
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_task
-from .surface import Surface, build_surface, sum_per_face
+from .surface import Surface, sum_per_face, surface_task
 
 #: The smallest number whose inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
@@ -167,7 +167,8 @@ def generate_task(
     if settings.kind == "uv":
         if settings.uv is None:
             raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")
-        return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
+        task = uv_guides_task(surface, settings.uv, check_degree(degree))
+        return RosyField(degree, (yield from task))
     raise RosyError(f"unknown generator '{settings.kind}': choose {', '.join(GENERATORS)}")
 
 
@@ -177,6 +178,7 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
     ends = settings.edges
     if ends is None:
         ends = feature_edges(surface, settings.sharp_angle)
+        yield Progress(0.0, "finding guides")
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
@@ -213,18 +215,22 @@ def _guided_or_smoothest_task(
 def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
     """A field along the mean of all guides in the settings."""
     degree = check_degree(degree)
-    guide_sets = []
+    guide_sets, label = [], "finding guides"
     if settings.edges is not None:
         guide_sets.append(guides_from_edges(surface, settings.edges, degree))
+        yield Progress(0.0, label)
     if settings.strokes:
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
+        yield Progress(0.0, label)
     if settings.axis_guides:
         position, axis, radius = (
             np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
         )
         guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
+        yield Progress(0.0, label)
     if settings.uv is not None:
-        guide_sets.append(guides_from_uv(surface, settings.uv, degree))
+        task = uv_guides_task(surface, settings.uv, degree)
+        guide_sets.append((yield from subtask(task, 0.0, 0.0)))
     if settings.vectors is not None:
         guide_sets.append(normalize(settings.vectors))
     if not guide_sets:
@@ -232,6 +238,7 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
             f"{surface.name}: no guides are given: give strokes, edges, a UV map, vectors or axes"
         )
     faces = np.tile(np.arange(surface.face_count), len(guide_sets))
+    yield Progress(0.0, label)
     guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
     weight = (
         (settings.smoothing_length * surface.extent) ** -2 if settings.smoothing_length else None
@@ -275,6 +282,11 @@ def axis_field(
 
 
 def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
+    """Run `magnitude_task` to its end."""
+    return run_to_completion(magnitude_task(surface, kind))
+
+
+def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
     """Compute magnitudes of one of the kinds in `MAGNITUDES`.
 
     "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
@@ -292,19 +304,28 @@ def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
     if kind == "unit":
         return np.ones(surface.face_count)
     if kind == "confidence":
-        return curvature_field(surface, 4).magnitude
+        field = yield from curvature_task(surface, 4)
+        return field.magnitude
     if kind != "curvature":
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
-    smooth_surface = _with_smooth_normals(surface)
-    mean, deviator = _face_curvature(smooth_surface, *face_frames(smooth_surface))
+    smooth_surface = yield from _smooth_normals_task(surface)
+    x, y = face_frames(smooth_surface)
+    yield Progress(0.5, "computing the curvature")
+    mean, deviator = yield from subtask(_face_curvature_task(smooth_surface, x, y), 0.5, 1.0)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
-def _with_smooth_normals(surface: Surface) -> Surface:
+def _smooth_normals_task(surface: Surface) -> Task[Surface]:
     """The surface with smooth normals everywhere, without flat faces and sharp edges."""
-    return build_surface(
-        surface.vertices, surface.corner_vertex, surface.face_start, name=surface.name
+    task = surface_task(
+        surface.vertices,
+        surface.corner_vertex,
+        surface.face_start,
+        name=surface.name,
+        triangles=surface.triangles,
+        triangle_face=surface.triangle_face,
     )
+    return (yield from subtask(task, 0.0, 0.3, "averaging normals"))
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
@@ -349,10 +370,11 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
         raise RosyError(f"a curvature field needs an even degree, not {degree}")
     label = "computing principal directions"
     yield Progress(0.0, label)
-    smooth_surface = _with_smooth_normals(surface)
+    smooth_surface = yield from _smooth_normals_task(surface)
     yield Progress(0.3, label)
     x, y = face_frames(smooth_surface)
-    mean, deviator = _face_curvature(smooth_surface, x, y)
+    yield Progress(0.4, label)
+    mean, deviator = yield from subtask(_face_curvature_task(smooth_surface, x, y), 0.4, 0.6)
     yield Progress(0.6, label)
     deviator_norm = np.abs(deviator)
     center = smooth_surface.face_center.mean(axis=0)
@@ -365,19 +387,22 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     is_curved = deviator_norm > TINY
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
+    yield Progress(0.65, label)
     rotation = corner_rotations(
         smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
     )
+    yield Progress(0.68, label)
     weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         yield Progress(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
+    yield Progress(0.95, label)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
-def _face_curvature(
+def _face_curvature_task(
     surface: Surface, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Fit the second fundamental form of each face.
 
     The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
@@ -395,8 +420,10 @@ def _face_curvature(
     points = surface.vertices[surface.corner_vertex]
     edge = points[next_corner] - points
     normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
+    yield Progress(0.3, "computing principal directions")
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
+    yield Progress(0.6, "computing principal directions")
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
     uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
     trace = uu + vv

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import build_connection, laplacian
+from .connection import connection_task, laplacian
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import corner_frame_angles, node_sum_per_face
@@ -80,15 +80,19 @@ def guided_task(
     if not target.any():
         raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
-    connection = build_connection(surface)
-    yield Progress(0.04, "averaging the guides at the vertices")
+    connection = yield from subtask(connection_task(surface), 0.01, 0.04)
+    label = "averaging the guides at the vertices"
+    yield Progress(0.04, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
+    yield Progress(0.045, label)
     to_node = np.exp(-1j * degree * frame_angle)
     corner_face = np.repeat(surface.triangle_face, 3)
     corner_area = np.repeat(connection.area / 3, 3)
     node, count = connection.corner_node, connection.node_count
+    yield Progress(0.05, label)
     penalty = np.bincount(node, corner_area * weight[corner_face], count)
     rhs = complex_bincount(node, corner_area * (weight * target)[corner_face] * to_node, count)
+    yield Progress(0.055, label)
     # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
     fixed_z = complex_bincount(node, corner_area * (hard * target)[corner_face] * to_node, count)
     max_modulus = np.bincount(node, corner_area * (hard * np.abs(target))[corner_face], count)
@@ -102,10 +106,12 @@ def guided_task(
         matrix = laplacian(connection, degree)
         yield Progress(0.08, "building the connection Laplacian")
         matrix, fixed_terms = _eliminate_fixed(matrix, penalty, fixed, fixed_z)
+        yield Progress(0.09, "building the connection Laplacian")
         solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free])
         z[free] = yield from subtask(solver, 0.1, 0.95)
     yield Progress(0.95, "averaging the field on the faces")
     face_z = node_sum_per_face(surface, connection, z, frame_angle, degree)
+    yield Progress(0.98, "averaging the field on the faces")
     modulus = np.abs(face_z)
     defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
     face_z = np.divide(face_z, modulus, out=np.zeros_like(face_z), where=defined)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
@@ -166,6 +167,11 @@ def guides_from_axes(
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
+    """Run `uv_guides_task` to its end."""
+    return run_to_completion(uv_guides_task(surface, uv, degree))
+
+
+def uv_guides_task(surface: Surface, uv: np.ndarray, degree: int) -> Task[np.ndarray]:
     """Make guides along the axes of a UV map, in the direction of increasing u.
 
     Parameters
@@ -182,17 +188,21 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     (F, 3) float64 ndarray
         Unit; zero on faces without area in the map.
     """
+    label = "following the UV map"
     x, y = face_frames(surface)
+    yield Progress(0.3, label)
     face = surface.corner_face
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
     mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
     u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
+    yield Progress(0.7, label)
     # Least squares fit of the linear map from (u, v) to the face plane.
     uu, uv_sum, vv = (
         sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
     )
     up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
+    yield Progress(0.9, label)
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up

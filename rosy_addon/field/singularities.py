@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import counted
+from ..progress import Progress, Task, run_to_completion
 from .frames import dot
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
@@ -24,6 +25,11 @@ def euler_characteristic(surface: Surface) -> int:
 
 
 def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
+    """Run `singularities_task` to its end."""
+    return run_to_completion(singularities_task(surface, field))
+
+
+def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Find the singular vertices of a field, and their indices.
 
     A field on faces is singular at vertices. The rotation of the field around a vertex is the sum
@@ -47,13 +53,17 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     index : (K,) int32 ndarray
         Singularity indices in units of 1 / N; never 0.
     """
+    label = "counting singularities"
+    yield Progress(0.0, label)
     x, y = face_frames(surface)
     z = to_representation(field.vectors, x, y, field.degree)
     edges = build_edges(surface.corner_vertex, surface.face_start)
+    yield Progress(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     matching = matching_angles(surface, x, y, z, field.degree, a, b)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
+    yield Progress(0.7, label)
     # A counter-clockwise loop around the head of an edge crosses it from side a to side b, a loop
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
@@ -74,9 +84,9 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     return vertex, index[vertex]
 
 
-def describe_fields(
+def description_task(
     fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool
-) -> str:
+) -> Task[str]:
     """Describe fields for a message.
 
     Parameters
@@ -91,7 +101,10 @@ def describe_fields(
     """
     parts = []
     if count_singularities:
-        count = sum(len(find_singularities(surface, field)[0]) for surface, field in fields)
+        count = 0
+        for surface, field in fields:
+            vertices, _ = yield from singularities_task(surface, field)
+            count += len(vertices)
         parts.append(counted(count, "singularity", "singularities"))
     undefined = sum(int((~field.vectors.any(axis=1)).sum()) for _, field in fields)
     if undefined:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import BLOCK_TRIANGLES, Connection, build_connection, laplacian
+from .connection import BLOCK_TRIANGLES, Connection, connection_task, laplacian
 from .frames import dot
 from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
@@ -65,14 +65,14 @@ def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    yield Progress(0.0, "building the connection Laplacian")
-    connection = build_connection(surface)
+    connection = yield from subtask(connection_task(surface), 0.0, 0.1)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
     z, _ = yield from subtask(smallest_eigenvectors_task(connection, degree), 0.1, 0.95)
+    yield Progress(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
-    yield Progress(0.95, "averaging the field on the faces")
-    return RosyField(degree, face_vectors_from_nodes(surface, connection, z, degree))
+    vectors = yield from subtask(face_vectors_task(surface, connection, z, degree), 0.95, 1.0)
+    return RosyField(degree, vectors)
 
 
 def smallest_eigenvectors_task(
@@ -87,10 +87,14 @@ def smallest_eigenvectors_task(
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
+    label = "building the connection Laplacian"
+    yield Progress(0.0, label)
     component = connection.component
     mass = connection.positive_mass
+    yield Progress(0.05, label)
     shift = SPECTRAL_SHIFT * 4 * np.pi / mass.sum()
-    levels = yield from subtask(hierarchy_task(laplacian(connection, degree, shift)), 0.1, 0.4)
+    matrix = laplacian(connection, degree, shift)
+    levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.4)
     masses, components = [mass], [component]
     for level in levels[:-1]:
         weight = np.abs(level.prolongation.data)
@@ -273,18 +277,23 @@ def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.nd
     return z * rotation[component]
 
 
-def face_vectors_from_nodes(
+def face_vectors_task(
     surface: Surface, connection: Connection, z: np.ndarray, degree: int
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(F, 3) unit members on the faces, from (n,) representations at the nodes.
 
     Zero on faces where the mean is zero.
     """
+    label = "averaging the field on the faces"
+    yield Progress(0.0, label)
     x, y = face_frames(surface)
+    yield Progress(0.3, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
+    yield Progress(0.5, label)
     mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
     modulus = np.abs(mean)
     mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
+    yield Progress(0.9, label)
     return from_representation(mean, x, y, degree)
 
 

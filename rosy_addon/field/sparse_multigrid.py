@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import Progress, Task, subtask
 
 #: Relative increase of the diagonal of a matrix that is singular.
 SINGULAR_SHIFT = 1e-10
@@ -24,6 +24,9 @@ DIRECT_SOLVE_SIZE = 400
 
 #: Rows processed at once, so that their entries fit in the cache of a core.
 BLOCK_ROWS = 1 << 12
+
+#: Blocks of rows of a new matrix that are assembled at once.
+BLOCKS_PER_STEP = 16
 
 #: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
 #: connect unknowns to an aggregate.
@@ -107,9 +110,10 @@ def from_coo(
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
 
 
-def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
+def matrix_product_task(a: CSRMatrix, b: CSRMatrix) -> Task[CSRMatrix]:
     """The matrix product a b."""
-    return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
+    task = _assemble_by_rows_task(a, b.column_count, lambda part: _product_terms(a, b, part))
+    return (yield from task)
 
 
 def _product_terms(
@@ -128,11 +132,11 @@ def _product_terms(
     return a.row_indices[block].take(entry), b.indices.take(source), value
 
 
-def _assemble_by_rows(
+def _assemble_by_rows_task(
     matrix: CSRMatrix,
     column_count: int,
     entries: Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]],
-) -> CSRMatrix:
+) -> Task[CSRMatrix]:
     """Build a matrix block by block of the rows of another one, so that sorting stays in the cache.
 
     Parameters
@@ -148,6 +152,8 @@ def _assemble_by_rows(
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []
     for first in range(0, len(matrix), BLOCK_ROWS):
+        if first % (BLOCKS_PER_STEP * BLOCK_ROWS) == 0:
+            yield Progress(first / len(matrix), "building multigrid levels")
         last = min(first + BLOCK_ROWS, len(matrix))
         row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))
         key, value = _sum_duplicates((row - first) << bits | column, value)
@@ -207,18 +213,26 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
     """
     levels = []
     unknown_count = len(matrix)
+    label = "building multigrid levels"
     while True:
-        yield Progress(1 - len(matrix) / (unknown_count + 1), "building multigrid levels")
+        start = 1 - len(matrix) / (unknown_count + 1)
+        middle, stop = 1 - 0.7 * (1 - start), 1 - 0.4 * (1 - start)
+        yield Progress(start, label)
         jacobi_weight = _jacobi_weights(matrix)
-        aggregation = _build_aggregates(matrix) if len(matrix) > DIRECT_SOLVE_SIZE else None
+        aggregation = None
+        if len(matrix) > DIRECT_SOLVE_SIZE:
+            aggregation = yield from subtask(_aggregates_task(matrix), start, middle, label)
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
             inverse = _dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
             levels.append(Level(matrix, None, jacobi_weight, inverse))
             return levels
-        prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
+        task = _smoothed_prolongation_task(matrix, jacobi_weight, *aggregation)
+        prolongation = yield from subtask(task, middle, middle, label)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
-        yield Progress(1 - len(matrix) / (unknown_count + 1), "building multigrid levels")
-        matrix = matrix_product(prolongation.adjoint, matrix_product(matrix, prolongation))
+        product = yield from subtask(matrix_product_task(matrix, prolongation), middle, stop)
+        matrix = yield from subtask(
+            matrix_product_task(prolongation.adjoint, product), stop, stop, label
+        )
 
 
 def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
@@ -278,13 +292,13 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
         return np.linalg.inv(dense)
 
 
-def _smoothed_prolongation(
+def _smoothed_prolongation_task(
     matrix: CSRMatrix,
     jacobi_weight: np.ndarray,
     aggregate: np.ndarray,
     count: int,
     phase: np.ndarray,
-) -> CSRMatrix:
+) -> Task[CSRMatrix]:
     """The prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
     unknowns = np.arange(len(matrix))
 
@@ -299,10 +313,10 @@ def _smoothed_prolongation(
             np.concatenate([value, phase.take(block_rows)]),
         )
 
-    return _assemble_by_rows(matrix, count, entries)
+    return (yield from _assemble_by_rows_task(matrix, count, entries))
 
 
-def _build_aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
+def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarray]]:
     """Group the unknowns into aggregates of strongly connected neighbors.
 
     Returns
@@ -330,6 +344,7 @@ def _build_aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     priority = np.random.default_rng(0).permutation(count)
     free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while free.any():
+        yield Progress(1 - np.count_nonzero(free) / count, "building multigrid levels")
         free_priority = np.where(free, priority, -1)
         new_roots = free & (max_over_neighbors(max_over_neighbors(free_priority)) == priority)
         root |= new_roots
@@ -338,6 +353,7 @@ def _build_aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     aggregate[root] = np.arange(np.count_nonzero(root))
     phase = np.ones(count, dtype=np.complex128)
     for _ in range(2):
+        yield Progress(1.0, "building multigrid levels")
         # A free unknown joins the aggregate of the neighbor with the strongest connection.
         weight = np.where(aggregate[column] >= 0, strength, 0)
         strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])

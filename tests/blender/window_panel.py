@@ -72,12 +72,16 @@ def pixels(image):
     return values.reshape(image.size[1], image.size[0], 4)
 
 
-def start_bake(**settings):
-    """Start a bake as its button does, and wait until it has made progress."""
+def start_task(operator, **settings):
+    """Start a task as its button does, and wait until it has made progress."""
     with in_view():
-        assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
+        assert operator("INVOKE_DEFAULT", True, **settings) == {"RUNNING_MODAL"}
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
-    assert status().current is not None, "the bake ended before it could be interrupted"
+    assert status().current is not None, "the task ended before it could be interrupted"
+
+
+def start_bake(**settings):
+    yield from start_task(bpy.ops.rosy.bake, **settings)
 
 
 def check_idle():
@@ -90,16 +94,16 @@ def check_idle():
             assert "rosy" not in module or module.endswith(".ui.live_views"), name
 
 
-def check_interruption(interrupt, *, unchanged=True, screenshot=None):
-    """Start a long bake, call `interrupt`, and check that it ends and changes nothing."""
+def check_interruption(interrupt, start=start_bake, *, unchanged=True, screenshot=None):
+    """Start a long task, call `interrupt`, and check that it ends and changes nothing."""
     yield from fresh_scene(size=(1600, 1200))
     make_field()
     bpy.context.scene.rosy.look.method = "brute"
     before = contents()
-    yield from start_bake()
+    yield from start()
     if screenshot is not None:
         yield from save_screenshot(screenshot, 360)
-        assert status().current is not None, "the bake ended before the screenshot"
+        assert status().current is not None, "the task ended before the screenshot"
     interrupt()
     yield from wait_until(lambda: status().current is None)
     yield 0.5
@@ -291,6 +295,28 @@ def press_escape():
 
 def stop_with_escape():
     yield from check_interruption(press_escape, screenshot="baking")
+
+
+def strokes_stopped_with_escape():
+    def start():
+        yield from start_task(bpy.ops.rosy.strokes, kind="PENCIL")
+
+    yield from check_interruption(press_escape, start)
+
+
+def field_stopped_with_escape():
+    before = {}
+
+    def start():
+        with in_view():
+            bpy.context.object.modifiers["Subdivision"].levels = 4
+            bpy.ops.object.modifier_apply(modifier="Subdivision")
+            bpy.ops.ed.undo_push(message="subdivided")
+        before.update(contents())
+        yield from start_task(bpy.ops.rosy.field_generate, kind="smoothest", degree=6)
+
+    yield from check_interruption(press_escape, start, unchanged=False)
+    assert contents() == before and bpy.context.object.data.rosy.degree == 4
 
 
 def start_turntable(name, pictures, size=(160, 120)):
@@ -523,6 +549,8 @@ run_steps(
     eevee_shows_the_picture,
     undo_after_bake,
     stop_with_escape,
+    strokes_stopped_with_escape,
+    field_stopped_with_escape,
     turntable_with_progress,
     turntable_stopped_with_escape,
     turntable_encoded_by_another_blender,

@@ -15,12 +15,18 @@ from scipy.spatial.transform import Rotation
 from shapes import from_triangles, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
+from rosy_addon.field import sparse_multigrid
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
 from rosy_addon.field.smoothest import smallest_eigenvectors_task, smoothest_field, smoothest_task
-from rosy_addon.field.sparse_multigrid import from_coo, hierarchy_task, matrix_product, w_cycle
+from rosy_addon.field.sparse_multigrid import (
+    from_coo,
+    hierarchy_task,
+    matrix_product_task,
+    w_cycle,
+)
 from rosy_addon.field.surface import build_surface
 from rosy_addon.progress import run_to_completion
 
@@ -50,9 +56,18 @@ def random_matrix(rows, columns, seed):
 def test_products_of_sparse_matrices():
     a, b = random_matrix(60, 40, 0), random_matrix(40, 25, 1)
     dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
-    np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
+    np.testing.assert_allclose(
+        as_scipy(run_to_completion(matrix_product_task(a, b))).toarray(), dense, atol=1e-12
+    )
     vector = np.arange(40) * (1 + 2j)
     np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
+
+
+def test_products_of_larger_matrices_take_more_steps(monkeypatch):
+    monkeypatch.setattr(sparse_multigrid, "BLOCKS_PER_STEP", 1)
+    small, large = (laplacian(build_connection(icosphere(level)), 4, shift=1.0) for level in (3, 5))
+    assert sum(1 for _ in matrix_product_task(small, small)) == 1
+    assert sum(1 for _ in matrix_product_task(large, large)) >= len(large) / 2**13
 
 
 def test_the_adjoint():

@@ -17,6 +17,7 @@ from rosy_addon.projection.camera import (
     perspective_camera,
 )
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes import separation, visibility
 from rosy_addon.strokes.pipeline import (
     draw_instances,
     draw_instances_task,
@@ -191,6 +192,28 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
         for _ in range(300):
             next(task)
     assert 30 < done.value.value.length.sum() < 50
+
+
+@pytest.mark.parametrize("module", [separation, visibility])
+def test_blocks_divide_the_work_and_do_not_change_strokes(module, monkeypatch):
+    style = StrokeStyle(spacing=10, outline=True)
+
+    def draw():
+        """Return the number of steps, and the strokes."""
+        steps, task = 0, draw_instances_task([SPHERE], CAMERA, style)
+        while True:
+            try:
+                next(task)
+            except StopIteration as done:
+                return steps, done.value.strokes
+            steps += 1
+
+    steps, expected = draw()
+    monkeypatch.setattr(module, "BLOCK_POINTS", 100)
+    more_steps, strokes = draw()
+    assert more_steps > steps + 10
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(getattr(strokes, name), values, err_msg=name)
 
 
 def test_seeding_ends_where_all_strokes_are_short():

@@ -281,11 +281,6 @@ def axis_field(
     return RosyField(degree, vectors)
 
 
-def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
-    """Run `magnitude_task` to its end."""
-    return run_to_completion(magnitude_task(surface, kind))
-
-
 def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
     """Compute magnitudes of one of the kinds in `MAGNITUDES`.
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.frames import dot, normalize
+from ..progress import Progress, Task
 from .point_grid import PointGrid
 from .stroke_set import Strokes
 
@@ -20,13 +21,20 @@ MAX_FORWARD, MAX_LATERAL, MAX_BACKWARD = 1.2, 0.8, 0.6
 #: their normals.
 MAX_DIRECTION_COSINE, MIN_NORMAL_COSINE = -0.8, 0.5
 
+#: Ends that are compared with others at once.
+BLOCK_ENDS = 1 << 12
 
-def head_on_ends(strokes: Strokes) -> np.ndarray:
+
+def head_on_ends_task(strokes: Strokes) -> Task[np.ndarray]:
     """Return which ends of strokes meet the end of another stroke head on.
 
     Parameters
     ----------
     strokes : Strokes
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
@@ -42,13 +50,19 @@ def head_on_ends(strokes: Strokes) -> np.ndarray:
         return result.reshape(-1, 2)
     grid = PointGrid(MAX_FORWARD * float(np.median(spacing)), len(ends))
     grid.add(position)
-    query, other = grid.pairs_within(position, float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing)
-    delta = position[other] - position[query]
-    forward = dot(delta, outward[query])
-    lateral = np.sqrt(np.maximum(dot(delta, delta) - forward**2, 0))
-    meets = (query != other) & (dot(outward[query], outward[other]) < MAX_DIRECTION_COSINE)
-    meets &= dot(normal[query], normal[other]) > MIN_NORMAL_COSINE
-    meets &= (forward < MAX_FORWARD * spacing[query]) & (forward > -MAX_BACKWARD * spacing[query])
-    meets &= lateral < MAX_LATERAL * spacing[query]
-    result[query[meets]] = True
+    radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
+    for start in range(0, len(ends), BLOCK_ENDS):
+        yield Progress(start / len(ends), "shaping ends")
+        block = slice(start, start + BLOCK_ENDS)
+        query, other = grid.pairs_within(position[block], radius[block])
+        query = query + start
+        delta = position[other] - position[query]
+        forward = dot(delta, outward[query])
+        lateral = np.sqrt(np.maximum(dot(delta, delta) - forward**2, 0))
+        meets = (query != other) & (dot(outward[query], outward[other]) < MAX_DIRECTION_COSINE)
+        meets &= dot(normal[query], normal[other]) > MIN_NORMAL_COSINE
+        meets &= forward < MAX_FORWARD * spacing[query]
+        meets &= forward > -MAX_BACKWARD * spacing[query]
+        meets &= lateral < MAX_LATERAL * spacing[query]
+        result[query[meets]] = True
     return result.reshape(-1, 2)

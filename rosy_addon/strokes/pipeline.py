@@ -16,14 +16,14 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .crossings import crossing_gaps_task
 from .families import label_families_task
-from .head_on_ends import head_on_ends
+from .head_on_ends import head_on_ends_task
 from .outline import OUTLINE_KINDS, outline
 from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
     LightSource,
     lit_tone,
     pixel_spacing,
-    spacing_by_curvature,
+    spacing_by_curvature_task,
     spacing_by_foreshortening,
     spacing_by_tone,
     values_at_points,
@@ -170,11 +170,13 @@ def _trace_instance(
     """Return all strokes of a mesh instance, with its outline, including hidden parts."""
     yield Progress(0.0, "computing the spacing")
     spacing = _vertex_spacing(instance, camera, style)
+    yield Progress(0.005, "computing the spacing")
     tone = lit_tone(instance, camera, lights) if style.tone else None
     if tone is not None:
         spacing = spacing_by_tone(spacing, tone)
     if style.curvature:
-        spacing = spacing_by_curvature(instance.surface, spacing, style.curvature)
+        task = spacing_by_curvature_task(instance.surface, spacing, style.curvature)
+        spacing = yield from subtask(task, 0.01, 0.02)
     yield Progress(0.02, "computing the spacing")
     check_stroke_memory(instance, spacing, camera, clipped)
     mesh = yield from subtask(
@@ -196,9 +198,8 @@ def _trace_instance(
         task = crossing_gaps_task(strokes, style.gaps, weave=True)
         strokes = yield from subtask(task, 0.95, 0.98)
     if style.taper:
-        yield Progress(0.98, "shaping ends")
-        ends = ~head_on_ends(strokes)
-        yield Progress(0.98, "shaping ends")
+        ends = ~(yield from subtask(head_on_ends_task(strokes), 0.98, 0.99))
+        yield Progress(0.99, "shaping ends")
         if style.overshoot:
             # Ends that will be extended are tapered after the extension.
             ends &= ~strokes.free_end_mask

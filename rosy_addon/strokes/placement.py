@@ -39,7 +39,7 @@ MIN_MOVED_RATIO = 0.02
 PARENT_LEAD = 2.5
 
 #: Samples whose coverage is checked at once. Bounds memory.
-RESCAN_BATCH_SIZE = 1 << 14
+RESCAN_BATCH_SIZE = 1 << 13
 
 
 class StreamlinePlacer:

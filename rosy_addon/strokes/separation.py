@@ -41,7 +41,7 @@ MAX_TURN = np.radians(18)
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
 #: Points that are examined at once, to bound memory and the length of a step.
-BLOCK_POINTS = 1 << 15
+BLOCK_POINTS = 1 << 14
 
 #: Radius around such points in which strokes are sampled finely, in spacings.
 CHECK_RADIUS = 1.0

@@ -11,8 +11,9 @@ import numpy as np
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
 from ..field.frames import dot, normalize
-from ..field.generate import compute_magnitude
+from ..field.generate import magnitude_task
 from ..field.surface import Surface, sum_per_fan
+from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
@@ -126,9 +127,9 @@ def spacing_by_tone(
     return np.asarray(spacing) / ink
 
 
-def spacing_by_curvature(
+def spacing_by_curvature_task(
     surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Divide the spacing by a power of the curvature, relative to its median.
 
     Parameters
@@ -139,11 +140,15 @@ def spacing_by_curvature(
         The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
         The factor is limited to `MIN_SPACING_RATIO` and `MAX_SPACING_RATIO`.
 
+    Yields
+    ------
+    Progress
+
     Returns
     -------
     (V,) float64 ndarray
     """
-    curvature = compute_magnitude(surface, "curvature")
+    curvature = yield from magnitude_task(surface, "curvature")
     corner = surface.corner_vertex
     count = np.bincount(corner, minlength=len(surface.vertices))
     vertex_curvature = np.bincount(corner, curvature[surface.corner_face], len(surface.vertices))

@@ -21,6 +21,9 @@ SAMPLE_STEP_PX = 1.0
 #: Points of strokes that are clipped at once, to bound memory and the length of a step.
 BLOCK_POINTS = 1 << 16
 
+#: Pixels whose depth is computed at once.
+BLOCK_PIXELS = 1 << 20
+
 #: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of the
 #: rasterization.
 MIN_RUN_PX = 2.5
@@ -203,7 +206,11 @@ def depth_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[DepthB
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
     triangle.flat[fragments.pixel] = fragments.triangle
     depth = np.full(triangle.shape, np.inf)
-    depth.flat[fragments.pixel] = -dot(fragments.barycentric, corners[fragments.triangle, :, 2])
+    for start in range(0, len(fragments.pixel), BLOCK_PIXELS):
+        yield Progress(0.8, label)
+        block = slice(start, start + BLOCK_PIXELS)
+        corner_depth = corners[fragments.triangle[block], :, 2]
+        depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
     yield Progress(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     return DepthBuffer(triangle, depth, normal, dot(normal, corners[:, 0]))

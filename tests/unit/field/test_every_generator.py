@@ -45,13 +45,14 @@ def test_every_kind_on_every_mesh(meshes, tmp_path, capsys, kind, name, degree):
         assert status == 2 and "the edges cancel each other" in captured.err
         return
     assert status == 0, captured.err
-    assert ("Möbius" in captured.err) == (name == "moebius")
-    assert captured.err.count("\n") == (name == "moebius")
     assert main(["info", mesh, out, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["degree"] == degree and np.isfinite(facts["energy"])
     low, high = facts["magnitude"]
     assert 0 <= low <= high <= 1 + 1e-6
+    assert ("Möbius" in captured.err) == (name == "moebius")
+    assert ("gives no direction on any face" in captured.err) == (high == 0)
+    assert captured.err.count("\n") == (name == "moebius") + (high == 0)
     degenerate_count = 1000 if name == "faces_without_area" else 0
     if kind == "smoothest":
         assert facts["undefined_faces"] == degenerate_count

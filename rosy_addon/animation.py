@@ -267,7 +267,7 @@ def _frame_task(
             if sidecar.exists():
                 check_writable(sidecar)
             picture = yield from subtask(renderer.render_task(view), start, stop)
-            image_task = image_data_task(picture, as_float=settings.as_float, to_file=True)
+            image_task = image_data_task(picture, as_float=settings.as_float)
             image_data = yield from subtask(image_task, stop, stop)
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)

@@ -92,9 +92,7 @@ def bake_task(
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
         start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
         picture = yield from subtask(renderer.render_task(view), start, stop)
-        image_task = image_data_task(
-            picture, as_float=settings.as_float, to_file=settings.folder is not None
-        )
+        image_task = image_data_task(picture, as_float=settings.as_float)
         image_data = yield from subtask(image_task, stop, stop)
         drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
         rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from))

@@ -33,7 +33,7 @@ from .picture import DegreeLayer, Picture
 from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
-from .streak_statistics import break_steps, look_streak_statistics
+from .streak_statistics import break_steps, look_streak_statistics, look_streak_statistics_task
 from .target_tone import ReferenceRender, target_tone_task
 
 #: Contrast of streaks in colored pictures, relative to gray pictures.
@@ -188,6 +188,7 @@ def _line_modulation_task(
     stages: ComposeStages, field: PixelField, look: Look, tone: np.ndarray
 ) -> Task[LineModulation]:
     """Compute the parts of the `LineModulation` that a look uses."""
+    yield from look_streak_statistics_task(look)  # `line_coverage` finds them in their cache
     break_images = paper_grain = line_tones = None
     if has_breaks(look):
         break_images = yield from stages.lic_task(field, replace(look, length=break_steps(look)))

@@ -8,11 +8,12 @@ straight lines.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from ..cache import Cache
+from ..progress import Progress, Task, run_to_completion, subtask
 from .image_noise import image_noise
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
@@ -37,6 +38,12 @@ SAMPLE_GRAINS, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS = 64, 320, 768
 
 #: Bins of the histogram of a sample.
 HISTOGRAM_BINS = 1600
+
+#: Label of all steps.
+STEP_LABEL = "measuring streaks"
+
+#: The statistics of the latest looks. Those of one take about 2 KB.
+STATISTICS_CACHE = Cache(max_bytes=1 << 15)
 
 
 class NoiseSettings(NamedTuple):
@@ -110,43 +117,57 @@ class StreakStatistics(NamedTuple):
 
 
 def look_streak_statistics(look: Look) -> StreakStatistics:
-    """Return the statistics of the streaks of a look that is in pixels of the frame."""
+    """Return the statistics of streaks, from the cache if they are there.
+
+    See `look_streak_statistics_task`.
+    """
+    return run_to_completion(look_streak_statistics_task(look))
+
+
+def look_streak_statistics_task(look: Look) -> Task[StreakStatistics]:
+    """Measure the statistics of the streaks of a look that is in pixels of the frame."""
     surface_paper_grain = None
     if look.anchor != "picture":
         args = surface_paper_grain_args(look)
         surface_paper_grain = NoiseSettings(args["grain"], args["density"], args["high_pass"])
-    return streak_statistics(
-        StreakSettings(
-            length=(2 * look.length + 1) * look.step,
-            grain=look.grain,
-            density=look.density,
-            high_pass=look.high_pass,
-            crispness=look.crispness,
-            tapered=look.taper,
-            anchored=look.anchor == "surface",
-            break_length=(2 * break_steps(look) + 1) * look.step,
-            breaks=look.breaks,
-            wobble=look.wobble,
-            paper_grain_amplitude=PAPER_GRAIN_STRENGTH * look.paper_grain,
-            surface_paper_grain=surface_paper_grain,
-        )
+    settings = StreakSettings(
+        length=(2 * look.length + 1) * look.step,
+        grain=look.grain,
+        density=look.density,
+        high_pass=look.high_pass,
+        crispness=look.crispness,
+        tapered=look.taper,
+        anchored=look.anchor == "surface",
+        break_length=(2 * break_steps(look) + 1) * look.step,
+        breaks=look.breaks,
+        wobble=look.wobble,
+        paper_grain_amplitude=PAPER_GRAIN_STRENGTH * look.paper_grain,
+        surface_paper_grain=surface_paper_grain,
     )
+    statistics = STATISTICS_CACHE.get(settings)
+    if statistics is None:
+        statistics = STATISTICS_CACHE.put(settings, (yield from streak_statistics_task(settings)))
+        STATISTICS_CACHE.evict_over_limit()
+    return statistics
 
 
-@lru_cache(maxsize=16)
-def streak_statistics(settings: StreakSettings) -> StreakStatistics:
+def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
     """Measure the statistics of streaks in a sample of noise."""
+    yield Progress(0.0, STEP_LABEL)
     side = int(np.clip(SAMPLE_GRAINS * settings.grain, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS))
     length_pixels = max(round(settings.length), 1)
     width = side + length_pixels
     noise = _noise_sample(
         (side, width), settings.grain, settings.density, settings.high_pass, settings.anchored
     )
+    yield Progress(0.2, STEP_LABEL)
     streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.tapered))
     break_pixels = min(max(round(settings.break_length), 1), length_pixels)
+    yield Progress(0.3, STEP_LABEL)
     break_streaks, break_std = _standardized(
         _line_means(noise, break_pixels, side, settings.tapered)
     )
+    yield Progress(0.4, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
     if settings.paper_grain_amplitude and settings.surface_paper_grain is not None:
         heights = _noise_sample(streaks.shape, *settings.surface_paper_grain, anchored=True)
@@ -157,6 +178,7 @@ def streak_statistics(settings: StreakSettings) -> StreakStatistics:
             np.arange(streaks.size, dtype=np.int32), len(streaks[0]), settings.grain, 1
         )
         paper_relief = settings.paper_grain_amplitude * heights[0].reshape(streaks.shape)
+    yield Progress(0.6, STEP_LABEL)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     break_amounts = break_amount(coverages, settings.breaks, settings.wobble)
     break_levels = np.linspace(
@@ -165,7 +187,9 @@ def streak_statistics(settings: StreakSettings) -> StreakStatistics:
     samples = [
         streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
     ]
-    threshold_tables = _threshold_tables(samples, softness(settings.crispness))
+    threshold_tables = yield from subtask(
+        _threshold_tables_task(samples, softness(settings.crispness)), 0.7, 1.0
+    )
     if len(break_levels) == 1:
         return StreakStatistics(threshold_tables[0], streak_std, break_std, paper_grain_std)
     level = (
@@ -213,7 +237,7 @@ def softness(crispness: float) -> float:
     return MAX_SOFTNESS * (MIN_SOFTNESS / MAX_SOFTNESS) ** crispness
 
 
-def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
+def _threshold_tables_task(samples: list[np.ndarray], half_width: float) -> Task[np.ndarray]:
     """(S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
 
     `half_width` is half the width of the step from paper to ink, in the unit of the samples.
@@ -225,10 +249,12 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
         ((edges[:-1] + edges[1:]) / 2 - thresholds[:, None]) / (2 * half_width) + 0.5
     )
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
-    histograms = (np.histogram(sample, edges)[0] / sample.size for sample in samples)
-    return np.array(
-        [np.interp(coverages, ink_fraction @ histogram, thresholds) for histogram in histograms]
-    )
+    tables = []
+    for index, sample in enumerate(samples):
+        yield Progress(index / len(samples), STEP_LABEL)
+        histogram = np.histogram(sample, edges)[0] / sample.size
+        tables.append(np.interp(coverages, ink_fraction @ histogram, thresholds))
+    return np.array(tables)
 
 
 def _noise_sample(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ..color import to_display, to_linear
+from ..color import to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_writable, make_folder, replacing, write_bytes
@@ -35,17 +35,16 @@ class ImageData(NamedTuple):
     Attributes
     ----------
     pixels : (H, W, 4) float32 ndarray
-        With bleed, see `with_bleed`. Linear if the image is stored in single precision or in a
-        file, otherwise display values.
+        Linear, with bleed; see `with_bleed`.
     png : bytes or None
-        The file, if the image is stored as .png.
+        The file of an 8-bit image, None for an image in single precision.
     """
 
     pixels: np.ndarray
     png: bytes | None = None
 
 
-def image_data_task(picture: Picture, *, as_float: bool, to_file: bool) -> Task[ImageData]:
+def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
     """Convert a picture for a Blender image.
 
     Parameters
@@ -53,8 +52,6 @@ def image_data_task(picture: Picture, *, as_float: bool, to_file: bool) -> Task[
     picture : Picture
     as_float : bool
         Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
-    to_file : bool
-        Whether the image is saved to a file, and not packed into the .blend file.
 
     Returns
     -------
@@ -66,11 +63,8 @@ def image_data_task(picture: Picture, *, as_float: bool, to_file: bool) -> Task[
         yield Progress(0.5 * start / height, STEP_LABEL)
         first = max(start - BLEED_PIXELS, 0)
         block = with_bleed(picture.rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
-        block = block[start - first :][:BLOCK_ROWS]
-        if not as_float and not to_file:
-            block[..., :3] = to_display(block[..., :3])
-        pixels[start : start + BLOCK_ROWS] = block
-    if as_float or not to_file:
+        pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
+    if as_float:
         return ImageData(pixels)
     return ImageData(pixels, (yield from subtask(png_task(pixels), 0.5, 1.0, STEP_LABEL)))
 
@@ -101,13 +95,16 @@ def new_image(
     try:
         image.alpha_mode = "CHANNEL_PACKED"
         image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
-        if image_data.png is None:
+        if as_float:
             image.pixels.foreach_set(image_data.pixels.ravel())
             image.update()
-        if stem is None:
+        if stem is not None:
+            _save_image(image, image_data.png, stem)
+        elif as_float:
             image.pack()
         else:
-            _save_image(image, image_data.png, stem)
+            image.pack(data=image_data.png, data_len=len(image_data.png))
+            image.source = "FILE"
     except BaseException:
         bpy.data.images.remove(image)
         raise
@@ -171,7 +168,6 @@ def write_frame(path: Path, image_data: ImageData) -> None:
     ----------
     path : Path
     image_data : ImageData
-        From `image_data_task`, for a file.
 
     Raises
     ------

@@ -122,9 +122,9 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 def traced_peak(work) -> int:
     """Return the largest number of bytes that are allocated at once, as in a new process."""
-    picture_tiles.TILE_CACHE.clear()
-    for function in (image_noise.streak_moments, streak_statistics.streak_statistics):
-        function.cache_clear()
+    for cache in (picture_tiles.TILE_CACHE, streak_statistics.STATISTICS_CACHE):
+        cache.clear()
+    image_noise.streak_moments.cache_clear()
     tracemalloc.start()
     try:
         work()

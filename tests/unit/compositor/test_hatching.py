@@ -32,7 +32,7 @@ from rosy_addon.compositor.shading import diffuse
 from rosy_addon.compositor.streak_statistics import (
     StreakSettings,
     break_steps,
-    streak_statistics,
+    streak_statistics_task,
 )
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
 from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field_task, wobble_angle
@@ -174,7 +174,7 @@ def test_presets_reproduce_a_ramp(name):
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
     settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
-    threshold, deviation, *_ = streak_statistics(settings)
+    threshold, deviation, *_ = run_to_completion(streak_statistics_task(settings))
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric

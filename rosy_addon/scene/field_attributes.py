@@ -28,6 +28,10 @@ from .compat import has_rosy_properties
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
 
+#: Longest name of a new attribute. Before Blender 5.2, creating one with a longer name fails, and may
+#: rename another attribute.
+MAX_NAME_BYTES = 67
+
 #: Data types of attributes with vectors and with angles.
 VECTOR_TYPE, ANGLE_TYPE = "FLOAT_VECTOR", "FLOAT"
 
@@ -92,8 +96,18 @@ def describe_type(attribute: bpy.types.Attribute) -> str:
 def check_attribute_type(
     mesh: bpy.types.Mesh, name: str, data_type: str, domain: str = "FACE"
 ) -> None:
-    """Raise an error if an attribute exists and is not of the given type and domain."""
+    """Check that an attribute can be written: it has a type and domain, or can be created.
+
+    Raises
+    ------
+    RosyError
+        If there is one of another type or domain, or the name is too long for a new one.
+    """
     attribute = mesh.attributes.get(name)
+    if attribute is None and len(name.encode()) > MAX_NAME_BYTES:
+        raise RosyError(
+            f"mesh '{mesh.name}': '{name}' cannot be the name of an attribute: choose a shorter one"
+        )
     if attribute is not None and (attribute.domain, attribute.data_type) != (domain, data_type):
         raise RosyError(
             f"mesh '{mesh.name}' already has an attribute '{name}' of another type "

@@ -213,6 +213,8 @@ def select(monkey: Monkey, obj: bpy.types.Object, *others: bpy.types.Object) -> 
         return False
     for other in objects(monkey):
         other.select_set(False)
+    if any(other.name not in bpy.context.view_layer.objects for other in (obj, *others)):
+        return False
     for other in (obj, *others):
         other.select_set(True)
     bpy.context.view_layer.objects.active = obj

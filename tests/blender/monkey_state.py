@@ -388,11 +388,14 @@ def leftovers() -> list[str]:
 
 
 def _is_used(block: bpy.types.ID) -> bool:
-    """Whether the user needs a datablock of RoSy's, as for strokes that the user has copied."""
+    """Whether the user needs a datablock of RoSy's, as for strokes that the user has copied.
+
+    Also if the user needs another one that uses it.
+    """
     users = bpy.data.user_map(subset=[block])[block]
     stroke_data = ("grease_pencil", "GreasePencil", "GreasePencilv3", "Curves")
     return block.use_fake_user or any(
-        not is_owned(user) or type(user).__name__ in stroke_data for user in users
+        not is_owned(user) or type(user).__name__ in stroke_data or _is_used(user) for user in users
     )
 
 

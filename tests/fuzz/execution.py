@@ -66,6 +66,23 @@ def execute(case: Case, folder: Path) -> Run:
     return Run(status, stdout, stderr, before, listing(folder), seconds, peak)
 
 
+def opens_in_blender(path: Path) -> bool:
+    """Whether Blender alone opens a .blend file, within the limits of a case."""
+    code = "import sys, bpy; bpy.ops.wm.open_mainfile(filepath=sys.argv[1])"
+    try:
+        subprocess.run(
+            [sys.executable, "-c", code, str(path)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=TIME_LIMIT,
+            check=True,
+            preexec_fn=_set_limits,
+        )
+    except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
+        return False
+    return True
+
+
 def listing(folder: Path) -> dict[str, str]:
     """Return the contents of a folder: the hash of each file, the kind of what is not one."""
     contents = {}

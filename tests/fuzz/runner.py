@@ -11,12 +11,11 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, as_completed, wait
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from .cases import CATEGORIES, Case, make_case
-from .execution import Run, execute
+from .execution import Run, execute, opens_in_blender
 from .verdicts import Verdict, judge
 
 #: Share of the cases that run twice, to compare the files that they write.
@@ -115,13 +114,10 @@ def _run_case(arguments: tuple[str, int, Path]) -> Outcome:
         folder.mkdir()
         case = make_case(category, seed, folder)
         run = execute(case, folder)
-        if run.status is None and not case.own_process:
-            # Forks lack Blender's threads, and may wait for one of them without end.
-            folder = Path(parent) / "alone"
-            folder.mkdir()
-            case = replace(make_case(category, seed, folder), own_process=True)
-            run = execute(case, folder)
         verdict, reason = judge(case, run, folder)
+        blend_file = folder / "scene.blend"
+        if verdict is Verdict.HANG and blend_file.is_file() and not opens_in_blender(blend_file):
+            verdict = Verdict.UNREADABLE
         is_repeated = seed % round(1 / REPEATED_SHARE) == 0 and not case.is_stopped
         if verdict is Verdict.DONE and is_repeated:
             again = Path(parent) / "again"

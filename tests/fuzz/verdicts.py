@@ -27,11 +27,12 @@ _BLENDER_LINE = re.compile("Info|Warning|Error|Read |Saved")
 
 
 class Verdict(Enum):
-    """The outcome of a run. All after `ENDED` are faults of the program."""
+    """The outcome of a run. All after `UNREADABLE` are faults of the program."""
 
     DONE = "done"
     REFUSED = "refused in one line"
     ENDED = "ended by its signal or stream"
+    UNREADABLE = "Blender alone hangs, too"
     TRACEBACK = "traceback"
     WARNING = "warning"
     STATUS = "wrong status"
@@ -47,7 +48,7 @@ class Verdict(Enum):
     @property
     def is_fault(self) -> bool:
         """Whether it is a fault of the program."""
-        return self not in (Verdict.DONE, Verdict.REFUSED, Verdict.ENDED)
+        return self not in (Verdict.DONE, Verdict.REFUSED, Verdict.ENDED, Verdict.UNREADABLE)
 
 
 def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:

@@ -115,9 +115,9 @@ def rotate_pixel_field_task(field: PixelField, angle: np.ndarray) -> Task[PixelF
     -------
     PixelField
     """
-    representation = np.empty_like(field.representation)
+    representation = np.empty(len(angle), dtype=np.complex64)
     channels = {
-        channel: np.empty_like(values) if channel[0] == "deviation" else values
+        channel: np.empty(len(angle), np.complex64) if channel[0] == "deviation" else values
         for channel, values in field.channels.items()
     }
     for block in pixel_blocks(len(angle)):

@@ -182,7 +182,8 @@ def output_folder(scene: bpy.types.Scene) -> Path:
         raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
     if directory.startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
-    return Path(bpy.path.abspath(directory))
+    # Blender would take a path that is relative to the working directory for another one later.
+    return Path(bpy.path.abspath(directory)).absolute()
 
 
 def is_beside_blend(folder: Path) -> bool:

@@ -73,6 +73,20 @@ def test_saved_to_a_folder(scene, camera, monkey, tmp_path, image_format, suffix
     assert len(list((tmp_path / "pictures").iterdir())) == 1
 
 
+def test_a_relative_folder_is_that_of_the_working_directory(
+    scene, camera, monkey, tmp_path, monkeypatch
+):
+    """Also after the .blend file was saved elsewhere, which moves relative paths."""
+    monkeypatch.chdir(tmp_path)
+    scene.rosy.store, scene.rosy.directory = "SAVED", "pictures"
+    (baked,) = bake(scene)
+    expected = pixels(baked.image)
+    (tmp_path / "files").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "files/scene.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "files/scene.blend"))
+    np.testing.assert_array_equal(pixels(bpy.data.images["RoSy Camera"]), expected)
+
+
 def test_the_users_materials_and_modifiers_stay(scene, camera, monkey):
     user_material = bpy.data.materials.new("Own")
     monkey.data.materials.append(user_material)

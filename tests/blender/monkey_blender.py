@@ -554,7 +554,7 @@ def new_file(monkey):
 @action(1.5, bare=True)
 def save_and_reopen(monkey):
     """Save and open the file, and check that it is the same."""
-    if bpy.context.mode != "OBJECT":
+    if bpy.context.mode != "OBJECT" or any(mesh.is_editmode for mesh in bpy.data.meshes):
         return
     bpy.ops.outliner.orphans_purge(do_recursive=True)
     path = monkey.folder / "monkey.blend"

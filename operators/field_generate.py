@@ -17,6 +17,7 @@ from ..rosy_addon.field.singularities import description_task
 from ..rosy_addon.field.surface import Surface, orientation_warning
 from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.guides import (
+    annotation_strokes,
     corner_uvs,
     guide_objects,
     guide_strokes_and_empties,
@@ -110,6 +111,11 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         options={"ENUM_FLAG"},
         items=[
             ("OBJECTS", "Objects", "Grease Pencil, curves and empties"),
+            (
+                "ANNOTATIONS",
+                "Annotations",
+                "Annotations of the scene that are drawn on the surface",
+            ),
             ("EDGES", "Edges", "Borders and sharp edges, or marked ones"),
             ("UV", "UV Map", "The axes of a UV map"),
             ("ATTRIBUTE", "Vectors", "A vector attribute, where it is not zero"),
@@ -223,14 +229,22 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 settings, edges=marked_edges(mesh, self.edges) if edges is None else edges
             )
         if "OBJECTS" in self.guides:
-            target = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
+            target = self._first_object(context, mesh)
             strokes, empties = guide_strokes_and_empties(self._guide_objects(context), target)
             settings = replace(settings, strokes=strokes, axis_guides=empties)
+        if "ANNOTATIONS" in self.guides:
+            target = self._first_object(context, mesh)
+            annotations = annotation_strokes(context.scene, target)
+            settings = replace(settings, strokes=[*settings.strokes, *annotations])
         if "UV" in self.guides:
             settings = replace(settings, uv=corner_uvs(mesh, self.uv_map))
         if "ATTRIBUTE" in self.guides:
             settings = replace(settings, vectors=guide_vectors(mesh, self.vectors))
         return settings
+
+    def _first_object(self, context: bpy.types.Context, mesh: bpy.types.Mesh) -> bpy.types.Object:
+        """Return the selected object of a mesh that guides are read for."""
+        return next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
 
     def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """Return the guide objects: the named one, or by default the selected ones."""

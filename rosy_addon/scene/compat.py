@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 
@@ -32,3 +34,13 @@ def path_property_options() -> set[str]:
 def has_grease_pencil_drawings() -> bool:
     """Whether Grease Pencil frames hold drawings with attributes (Blender 4.3 and later)."""
     return hasattr(bpy.types, "GreasePencilDrawing")
+
+
+def scene_annotation(scene: bpy.types.Scene) -> bpy.types.ID | None:
+    """Return the annotations of a scene, or None. The property was renamed in Blender 5.0."""
+    return scene.annotation if hasattr(scene, "annotation") else scene.grease_pencil
+
+
+def is_annotation_in_space(stroke: Any) -> bool:
+    """Whether a stroke of an annotation has coordinates of the scene. Blender 4.3 does not tell."""
+    return getattr(stroke, "display_mode", "3DSPACE") == "3DSPACE"

@@ -1,14 +1,16 @@
-"""Reading guides that a field follows: strokes, curves, empties, UV maps, vector attributes."""
+"""Reading guides that a field follows: strokes, annotations, empties, UV maps, vectors."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils.geometry import interpolate_bezier
 
 from ..errors import RosyError
+from .compat import is_annotation_in_space, scene_annotation
 from .face_values import read_face_vectors
 from .libraries import check_not_missing
 from .meshes import mesh_label, read_attribute
@@ -56,10 +58,7 @@ def guide_strokes_and_empties(
         If an object other than an empty has no stroke or a point that is not finite, if an object is
         missing in its library, or if the owner is scaled to zero.
     """
-    try:
-        world_to_owner = np.linalg.inv(np.array(owner.matrix_world, dtype=np.float64))
-    except np.linalg.LinAlgError:
-        raise RosyError(f"object '{owner.name}' has a scale of zero: scale it up") from None
+    world_to_owner = _world_to_object(owner)
     strokes: list[np.ndarray] = []
     empties: list[EmptyGuide] = []
     for obj in objects:
@@ -78,6 +77,68 @@ def guide_strokes_and_empties(
             raise RosyError(f"object '{obj.name}' has a point that is not finite: remove it")
         strokes += [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in polylines]
     return strokes, empties
+
+
+def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[np.ndarray]:
+    """Read the annotations of a scene as strokes, in the space of an object.
+
+    They are the strokes of the current frame of visible layers that are placed in the scene. Notes
+    that are placed on the view, and rulers, are left out.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    owner : bpy.types.Object
+        The object of the mesh whose field is guided.
+
+    Returns
+    -------
+    list of (n, 3) float64 ndarray
+        Polylines with at least two points.
+
+    Raises
+    ------
+    RosyError
+        If there is no such stroke, or if the owner is scaled to zero.
+    """
+    matrix = _world_to_object(owner)
+    annotation = scene_annotation(scene)
+    frames = [
+        _annotation_frame(layer, scene.frame_current)
+        for layer in (annotation.layers if annotation else ())
+        if not layer.annotation_hide and not layer.is_ruler
+    ]
+    strokes = [
+        _read_coordinates(stroke.points, "co", 3)
+        for frame in frames
+        if frame is not None
+        for stroke in frame.strokes
+        if len(stroke.points) > 1 and is_annotation_in_space(stroke)
+    ]
+    strokes = [stroke for stroke in strokes if np.isfinite(stroke).all()]
+    if not strokes:
+        raise RosyError(
+            f"scene '{scene.name}' has no annotation to follow: draw one on the mesh, with Placement "
+            "set to Surface"
+        )
+    return [stroke @ matrix[:3, :3].T + matrix[:3, 3] for stroke in strokes]
+
+
+def _annotation_frame(layer: Any, number: int) -> Any | None:
+    """Return the frame of an annotation layer that is visible at a frame number.
+
+    The layer's own ``active_frame`` is only valid after the layer was drawn.
+    """
+    frames = [frame for frame in layer.frames if frame.frame_number <= number]
+    return max(frames, key=lambda frame: frame.frame_number, default=None)
+
+
+def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
+    """Return the (4, 4) matrix from the world to the space of an object."""
+    try:
+        return np.linalg.inv(np.array(obj.matrix_world, dtype=np.float64))
+    except np.linalg.LinAlgError:
+        raise RosyError(f"object '{obj.name}' has a scale of zero: scale it up") from None
 
 
 def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:

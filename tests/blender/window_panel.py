@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
@@ -486,6 +487,58 @@ def edited_strokes_are_replaced_on_request():
     check_idle()
 
 
+def annotations_guide_a_field():
+    """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
+    yield from fresh_scene()
+    scene = bpy.context.scene
+    with in_view():
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(0.5, 0.0, 0.0))
+        bpy.ops.view3d.view_axis(type="FRONT")
+    view()[1].spaces.active.region_3d.view_distance = 5.0
+    view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
+    yield 0.5
+    scene.tool_settings.annotation_stroke_placement_view3d = "SURFACE"
+    region = view()[2]
+    region_3d = view()[1].spaces.active.region_3d
+    ends = np.linspace((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), 30)
+    points = [
+        {
+            "name": "",
+            "location": (0.0, 0.0, 0.0),
+            "mouse": location_3d_to_region_2d(region, region_3d, point),
+            "mouse_event": (0.0, 0.0),
+            "pressure": 1.0,
+            "size": 1.0,
+            "pen_flip": False,
+            "x_tilt": 0.0,
+            "y_tilt": 0.0,
+            "time": 0.1 * index,
+            "is_start": index == 0,
+        }
+        for index, point in enumerate(ends)
+    ]
+    # Blender asks for all properties of its version, and for no others.
+    names = bpy.types.OperatorStrokeElement.bl_rna.properties.keys()
+    stroke = [{name: point[name] for name in point if name in names} for point in points]
+    with in_view():
+        bpy.ops.gpencil.annotate("EXEC_DEFAULT", mode="DRAW", stroke=stroke, wait_for_input=False)
+        bpy.ops.rosy.field_generate(
+            "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
+        )
+    yield from save_screenshot("annotations")
+    mesh = bpy.context.object.data
+    vectors = np.empty(3 * len(mesh.polygons), dtype=np.float32)
+    mesh.attributes["rosy"].data.foreach_get("vector", vectors)
+    center = np.array([face.center for face in mesh.polygons])
+    x, y, z = center.T
+    near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
+    assert near.sum() > 5
+    direction = vectors.reshape(-1, 3)[near]
+    angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
+    assert np.abs(angle - 45.0).max() < 5.0, angle
+
+
 def stop_when_an_object_is_deleted():
     def delete():
         with in_view():
@@ -558,6 +611,7 @@ run_steps(
     strokes_from_their_file_browser,
     animation_asks_for_a_folder,
     edited_strokes_are_replaced_on_request,
+    annotations_guide_a_field,
     stop_when_an_object_is_deleted,
     stop_on_undo,
     stop_on_a_change_of_scene,

@@ -14,7 +14,11 @@ from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.render import picture_memory
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.face_values import read_face_scalars
-from rosy.rosy_addon.scene.guides import guide_strokes_and_empties, guide_vectors
+from rosy.rosy_addon.scene.guides import (
+    annotation_strokes,
+    guide_strokes_and_empties,
+    guide_vectors,
+)
 from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import field_objects
@@ -271,6 +275,33 @@ def test_guide_objects(scene, monkey):
     bpy.context.view_layer.update()
     with pytest.raises(RosyError, match="object 'Suzanne' has a scale of zero"):
         guide_strokes_and_empties([line], monkey)
+
+
+def test_a_scene_without_annotations(scene, monkey):
+    with pytest.raises(RosyError, match="has no annotation to follow: draw one on the mesh"):
+        annotation_strokes(scene, monkey)
+
+
+@pytest.mark.skipif(hasattr(bpy.types, "Annotation"), reason="scripts cannot make annotations")
+def test_annotations_that_are_followed(scene, monkey):
+    """Only strokes on visible layers, of the current frame, in the space of the scene."""
+    data = scene.grease_pencil = bpy.data.grease_pencils.new("Notes")
+    for name, frame, mode in (
+        ("Shown", 1, "3DSPACE"),
+        ("Hidden", 1, "3DSPACE"),
+        ("Later", 9, "3DSPACE"),
+        ("On View", 1, "SCREEN"),
+    ):
+        layer = data.layers.new(name)
+        layer.annotation_hide = name == "Hidden"
+        stroke = layer.frames.new(frame).strokes.new()
+        stroke.display_mode = mode
+        stroke.points.add(2)
+        stroke.points.foreach_set("co", [1.0, 0.0, 0.0, 3.0, 0.0, 0.0])
+    monkey.location.x, monkey.scale = 1.0, (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    (stroke,) = annotation_strokes(scene, monkey)
+    np.testing.assert_allclose(stroke, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], atol=1e-6)
 
 
 @pytest.mark.parametrize("form", ["VECTOR", "DIRECTIONS", "ANGLE"])

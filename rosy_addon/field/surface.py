@@ -236,8 +236,10 @@ def smooth_fans_task(
     """
     label = "finding smooth edges"
     yield Progress(0.0, label)
+    edges = build_edges(corner_vertex, face_start)
+    yield Progress(0.4, label)
     pairs = _smooth_corner_pairs(
-        vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+        edges, vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
     )
     yield Progress(0.5, label)
     return (
@@ -355,11 +357,15 @@ def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
-    key = np.minimum(tail, head) * stride + np.maximum(tail, head)
-    edge_key, corner_edge, face_count = np.unique(key, return_inverse=True, return_counts=True)
-    corner_edge = corner_edge.ravel().astype(np.int32)
-    corner_by_edge = np.argsort(corner_edge, kind="stable")
-    first = np.concatenate([[0], np.cumsum(face_count)[:-1]])
+    key, corner_by_edge = _sorted_with_order(
+        np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
+    )
+    is_first = np.ones(len(key), dtype=bool)
+    np.not_equal(key[1:], key[:-1], out=is_first[1:])
+    first = np.flatnonzero(is_first)
+    edge_key, face_count = key[first], np.diff(first, append=len(key))
+    corner_edge = np.empty(len(key), dtype=np.int32)
+    corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
     interior = np.flatnonzero(face_count == 2)
     a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
@@ -370,6 +376,23 @@ def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
         interior=interior[opposite].astype(np.int32),
         halfedges=np.stack([a, b], axis=1)[opposite].astype(np.int32),
     )
+
+
+def _sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return keys from 0 to `limit` - 1 in ascending order, and the stable order that sorts them.
+
+    Keys and indices are sorted as one number if they fit into it, which is faster than `argsort`.
+    """
+    index_bits = len(key).bit_length()
+    if limit.bit_length() + index_bits > 63:
+        order = np.argsort(key, kind="stable")
+        return key[order], order
+    packed = key << index_bits
+    packed |= np.arange(len(key), dtype=np.int64)
+    packed.sort()
+    order = packed & ((1 << index_bits) - 1)
+    packed >>= index_bits
+    return packed, order
 
 
 def count_inconsistent_edges(surface: Surface) -> int:
@@ -431,6 +454,7 @@ def _check_polygons(
 
 
 def _smooth_corner_pairs(
+    edges: Edges,
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
@@ -439,7 +463,6 @@ def _smooth_corner_pairs(
     flat_faces: np.ndarray | None,
 ) -> np.ndarray:
     """(K, 2) pairs of corners at the same vertex of two faces that share a smooth edge."""
-    edges = build_edges(corner_vertex, face_start)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     smooth = np.ones(len(a), dtype=bool)
@@ -492,7 +515,7 @@ def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]
     while len(a):
         yield Progress(1 - len(a) / len(pairs), "finding connected parts")
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
-        np.minimum.at(root, high, low)
+        _lower(root, high, low)
         while True:
             flattened = root[root]
             if np.array_equal(flattened, root):
@@ -500,7 +523,20 @@ def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]
             root = flattened
         unmerged = root[a] != root[b]
         a, b = a[unmerged], b[unmerged]
-    return np.unique(root, return_inverse=True)[1].ravel().astype(np.int32)
+    is_root = root == np.arange(count, dtype=np.int32)
+    return (np.cumsum(is_root, dtype=np.int32) - 1)[root]
+
+
+def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
+    """Do the same as ``np.minimum.at(values, index, limits)``, for limits below the values.
+
+    Most indices occur once or twice, for which plain assignments are faster.
+    """
+    for _ in range(2):
+        values[index] = limits
+        remaining = limits < values[index]
+        index, limits = index[remaining], limits[remaining]
+    np.minimum.at(values, index, limits)
 
 
 def _fan_normals(

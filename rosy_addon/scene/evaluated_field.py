@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
@@ -17,9 +18,10 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from .field_attributes import VECTOR_TYPE, cached_field, field_values
+from ..progress import Progress, Task, run_to_completion
+from .field_attributes import VECTOR_TYPE, field_values, surface_key
 from .meshes import read_attribute
-from .rest_shape import follow_mesh
+from .rest_shape import follow_mesh, read_rest_shape
 
 #: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
 #: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
@@ -86,7 +88,22 @@ def read_evaluated_field(
     label: str,
     cache: Cache | None = None,
 ) -> RosyField:
+    """Run the task of `evaluated_field_reader` to its end."""
+    build_task = evaluated_field_reader(mesh, layout, nonfinite, label, cache)
+    return run_to_completion(build_task(surface))
+
+
+def evaluated_field_reader(
+    mesh: bpy.types.Mesh,
+    layout: FieldLayout,
+    nonfinite: str,
+    label: str,
+    cache: Cache | None = None,
+) -> Callable[[Surface], Task[RosyField]]:
     """Read the field of an evaluated mesh, whose faces a modifier may have created.
+
+    The arrays are read at once. The function that is returned makes a task that builds the field
+    from them and the surface of the mesh. The task does not use the mesh.
 
     Modifiers copy the vector of an original face without changing it. `Surface.rest_vertices` gives
     the new face before any deformation, but its plane can still differ from that of the original
@@ -99,8 +116,6 @@ def read_evaluated_field(
     mesh : bpy.types.Mesh
         Evaluated.
     layout : FieldLayout
-    surface : Surface
-        The surface of the mesh.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     label : str
@@ -108,54 +123,77 @@ def read_evaluated_field(
     cache : Cache, optional
         Keeps fields that have not changed since an earlier call.
 
+    Returns
+    -------
+    function
+        From a Surface to a task that returns a RosyField.
+
     Raises
     ------
     RosyError
-        If a value is not finite and the policy is "error".
+        By the task, if a value is not finite and the policy is "error".
     """
     source = f"{label}, attribute '{layout.name}'"
-    values = field_values(mesh.attributes[layout.name], source, mesh)
-    values = follow_mesh(mesh, layout.name, values, surface)
+    stored_values = field_values(mesh.attributes[layout.name], source, mesh)
+    rest_shape = read_rest_shape(mesh, layout.name)
     original_normals = read_attribute(mesh, FACE_NORMAL_ATTRIBUTE, np.float32, 3)
     deviation_pairs = [
         read_attribute(mesh, name, np.float32, 2) for name in layout.attribute_names[1:]
     ]
 
-    def build_field() -> RosyField:
-        vectors = _transported_vectors(values, original_normals, surface, source, nonfinite)
-        deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
-        return RosyField(
-            layout.degree,
-            vectors,
-            np.stack(deviations, axis=1) if deviations else None,
-            layout.family_count,
-        )
+    def build_task(surface: Surface) -> Task[RosyField]:
+        values = follow_mesh(rest_shape, stored_values, surface)
 
-    key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
-    if cache is None or surface.rest_vertices is None:
-        return cached_field(cache, surface, build_field, "evaluated", *key_parts)
-    # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
-    rest_shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
-    return cache.get_or_create(
-        ("evaluated field", content_hash(*rest_shape, *key_parts)), build_field
-    )
+        def field_task() -> Task[RosyField]:
+            vectors = yield from _transport_task(
+                values, original_normals, surface, source, nonfinite
+            )
+            deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
+            return RosyField(
+                layout.degree,
+                vectors,
+                np.stack(deviations, axis=1) if deviations else None,
+                layout.family_count,
+            )
+
+        def with_surface_task() -> Task[tuple[Surface, RosyField]]:
+            return surface, (yield from field_task())
+
+        if cache is None:
+            return (yield from field_task())
+        key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
+        if surface.rest_vertices is None:
+            key = surface_key(surface, "evaluated", *key_parts)
+            return (yield from cache.get_or_create_task(key, with_surface_task))[1]
+        # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
+        shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
+        key = "evaluated field", content_hash(*shape, *key_parts)
+        return (yield from cache.get_or_create_task(key, field_task))
+
+    return build_task
 
 
-def _transported_vectors(
+def _transport_task(
     values: np.ndarray,
     original_normals: np.ndarray | None,
     surface: Surface,
     source: str,
     nonfinite: str,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """Return the vectors, (F, 3) float64, transported from the original to the evaluated faces."""
+    label = "reading the field"
     vectors = as_float64(values)
     apply_nonfinite_policy(vectors, source, "face", nonfinite)
+    yield Progress(0.0, label)
     normals = tangent_normals(surface, "face")
+    yield Progress(0.3, label)
     if original_normals is not None:
         original_normals = normalize(original_normals.astype(np.float64))
         # A mirrored face has the opposite normal. Only its plane matters.
         original_normals *= np.where(dot(original_normals, normals) < 0, -1.0, 1.0)[:, None]
+        yield Progress(0.4, label)
         vectors = project_to_tangent(vectors, original_normals, 180.0, source, "face")
+        yield Progress(0.6, label)
         vectors = transport(vectors, original_normals, normals)
+        yield Progress(0.7, label)
     return project_to_tangent(vectors, normals, 180.0, source, "face")

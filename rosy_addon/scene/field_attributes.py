@@ -14,7 +14,7 @@ of the attribute and the degree are in ``mesh.rosy``. These forms can be read to
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 import bpy
 import numpy as np
@@ -146,6 +146,13 @@ def cached_field(
     """Return the cached field for a surface and other inputs, or build it."""
     if cache is None:
         return build_field()
-    key = "field", id(surface), content_hash(*key_parts)
-    # The surface is cached too: while it is alive, no other object can have its id.
+    key = surface_key(surface, *key_parts)
     return cache.get_or_create(key, lambda: (surface, build_field()))[1]
+
+
+def surface_key(surface: Surface, *key_parts: object) -> Hashable:
+    """Return the key of a result for a surface and other inputs.
+
+    The result must contain the surface: while it is alive, no other object can have its id.
+    """
+    return "field", id(surface), content_hash(*key_parts)

@@ -124,11 +124,10 @@ def _fans_task(
 
 def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np.ndarray | None]:
     """Return the arguments of `surface_task` that smooth fans depend on."""
+    corner_vertex, face_start = polygon_arrays(mesh)
     return {
-        "corner_vertex": _attribute_or_collection(
-            mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
-        ),
-        "face_start": _face_starts(mesh),
+        "corner_vertex": corner_vertex,
+        "face_start": face_start,
         "sharp_edges": None if occluder_only else _sharp_edges(mesh),
         "flat_faces": (
             np.ones(len(mesh.polygons), dtype=bool)
@@ -152,11 +151,7 @@ def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
     Much faster than reading the surface: normals are left out where they follow from the rest.
     """
     flush_edit_mode(mesh)
-    parts = [
-        vertex_positions(mesh),
-        _attribute_or_collection(mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32),
-        _face_starts(mesh),
-    ]
+    parts = [vertex_positions(mesh), *polygon_arrays(mesh)]
     if not occluder_only:
         sharp_faces = read_attribute(mesh, "sharp_face", bool, 1)
         is_smooth = sharp_faces is None or not sharp_faces.any()
@@ -164,6 +159,14 @@ def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
         if mesh.has_custom_normals:
             parts.append(read_collection(mesh.corner_normals, "vector", np.float32, 3))
     return content_hash(*parts)
+
+
+def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return `Surface.corner_vertex`, (C,) int32, and `Surface.face_start`, (F + 1,) int32."""
+    corner_vertex = _attribute_or_collection(
+        mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
+    )
+    return corner_vertex, _face_starts(mesh)
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:

@@ -29,7 +29,7 @@ from .field_attributes import (
     is_face_vector_field,
 )
 from .meshes import flush_edit_mode, mesh_label, mesh_surface
-from .rest_shape import follow_mesh
+from .rest_shape import follow_mesh, read_rest_shape
 
 #: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
 #: to the smooth surface rather than to the face.
@@ -90,7 +90,7 @@ def read_mesh_field(
     source = f"{label}, attribute '{field_name}'"
     values = field_values(attribute, source, mesh)
     if is_face_vector_field(mesh, field_name):
-        values = follow_mesh(mesh, field_name, values, surface)
+        values = follow_mesh(read_rest_shape(mesh, field_name), values, surface)
 
     def build_field() -> RosyField:
         if attribute.data_type == ANGLE_TYPE:
@@ -134,7 +134,7 @@ def _field_from_directions(
         directions.append(field_values(attribute, source, mesh))
     directions = np.stack(directions, axis=1)
     if first_attribute.domain == "FACE":
-        directions = follow_mesh(mesh, "dir0", directions, surface)
+        directions = follow_mesh(read_rest_shape(mesh, "dir0"), directions, surface)
     source = f"{label}, attributes dir0 to dir{degree - 1}"
     domain = {"FACE": "face", "POINT": "vertex"}[first_attribute.domain]
 

@@ -24,6 +24,9 @@ CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 #: Largest difference of a check, relative to the length of the vector.
 CHECK_TOLERANCE = 1e-4
 
+#: Positions of the vertices and checks of the faces.
+RestShape = tuple[np.ndarray, np.ndarray]
+
 
 def _attribute_names(name: str) -> tuple[str, str]:
     """Return the names of the positions and the checks of a field's attribute."""
@@ -49,10 +52,8 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
     mesh.attributes[check_name].data.foreach_set("value", _checks(vectors).astype(np.float32))
 
 
-def follow_mesh(
-    mesh: bpy.types.Mesh, name: str, vectors: np.ndarray, surface: Surface
-) -> np.ndarray:
-    """Turn stored vectors as the faces were turned since they were stored.
+def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
+    """Return the positions (V, 3) and checks (F,) beside an attribute; None if there are none.
 
     Parameters
     ----------
@@ -60,6 +61,22 @@ def follow_mesh(
         Original or evaluated.
     name : str
         Name of the attribute that was stored with `store_rest_shape`.
+    """
+    if not _has_rest_shape(mesh, name):
+        return None
+    rest_name, check_name = _attribute_names(name)
+    positions = read_attribute(mesh, rest_name, np.float32, 3)
+    checks = read_attribute(mesh, check_name, np.float32, 1)
+    return None if positions is None or checks is None else (positions, checks)
+
+
+def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surface) -> np.ndarray:
+    """Turn stored vectors as the faces were turned since they were stored.
+
+    Parameters
+    ----------
+    rest_shape : (ndarray, ndarray) or None
+        Of `read_rest_shape`.
     vectors : (F, 3) or (F, N, 3) ndarray
         The values of the attribute, or of several whose first it is.
     surface : Surface
@@ -71,13 +88,11 @@ def follow_mesh(
         `vectors` itself if there is nothing to turn. Vectors that were changed since, by a script
         for example, stay as they are; see `carried_vectors` for others that do.
     """
-    if not _has_rest_shape(mesh, name):
+    if rest_shape is None:
         return vectors
-    rest_name, check_name = _attribute_names(name)
-    stored_positions = read_attribute(mesh, rest_name, np.float32, 3)
-    checks = read_attribute(mesh, check_name, np.float32, 1)
+    stored_positions, checks = rest_shape
     positions = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
-    if stored_positions is None or checks is None or len(stored_positions) != len(positions):
+    if len(stored_positions) != len(positions):
         return vectors
     if np.array_equal(stored_positions, positions):
         return vectors

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import bpy
@@ -20,11 +21,18 @@ from ..cache import Cache, content_hash
 from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..progress import Progress, Task
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .evaluated_field import FieldLayout, read_evaluated_field
+from .evaluated_field import FieldLayout, evaluated_field_reader, read_evaluated_field
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
-from .meshes import evaluated_mesh, mesh_surface, read_attribute
+from .meshes import (
+    evaluated_mesh,
+    mesh_surface,
+    mesh_surface_task,
+    polygon_arrays,
+    read_attribute,
+)
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .scene_reader import is_field_enabled, lost_field_error, temp_attributes
@@ -79,20 +87,31 @@ class _MeshState:
 class SceneCache:
     """Cached mesh instances of the RoSy objects of one view layer.
 
+    Parameters
+    ----------
+    cache : Cache, optional
+        Keeps surfaces and fields by their contents.
+
     Attributes
     ----------
+    cache : Cache
     errors : dict of str to str
         By the name of an object: why its field is not drawn.
     is_complete : bool
         Whether the last call of `read` ended before its deadline.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, cache: Cache | None = None) -> None:
         self.errors: dict[str, str] = {}
         self.is_complete = True
+        self.cache = Cache() if cache is None else cache
         self._deadline = math.inf
         self._has_read_any = False
-        self._cache = Cache()
+        # Names of the objects whose meshes were prepared, and the one that is being prepared.
+        self._prepared: set[str] = set()
+        self._preparation: tuple[str, Task[None]] | None = None
+        # The object that `resolve_topologies` has begun.
+        self._resolution: tuple[str, Task[None]] | None = None
         # The error message of a mesh that could not be read.
         self._topologies: dict[_TopologyKey, _TopologyEntry | str] = {}
         # By the name of the object, the pointer of its mesh, and `tone_image_key`. None: no faces.
@@ -121,6 +140,9 @@ class SceneCache:
         for key in [key for key in self._topologies if names is None or key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], str):
                 del self._topologies[key]
+        resolving = None if self._resolution is None else self._resolution[0]
+        if topology_changed and (names is None or resolving in names):
+            self._resolution = None
         for by_name in (self._attempts, self.errors):
             for name in [name for name in by_name if names is None or name in names]:
                 del by_name[name]
@@ -149,8 +171,8 @@ class SceneCache:
         tone_request : ToneRequest, optional
             The source of the surface tones.
         deadline : float
-            Seconds, monotonic. Objects that were not begun by then, except one, are left for the
-            next call; see `is_complete`.
+            Seconds, monotonic. If it is finite, large meshes are prepared in steps. What was not
+            begun by then, except one step, is left for the next call; see `is_complete`.
         """
         if self.is_complete:
             self.errors.clear()
@@ -192,14 +214,14 @@ class SceneCache:
                     instances[instance_key][0], owner, visibility_object, instances[instance_key][1]
                 )
             )
-        waiting = {name for name, _ in self._unresolved}
+        waiting = self._waiting_names()
         self._attempts = {name: n for name, n in self._attempts.items() if name in waiting}
         if self.is_complete:
             self._report_faceless(faceless - {state.owner for state in states}, waiting)
         # The instances of the last call are released only now: while their surfaces are alive, no
         # new object can have the same id.
         self._instances = instances
-        self._cache.evict_over_limit()
+        self.cache.evict_over_limit()
         return states
 
     def _report_faceless(self, owners: set[bpy.types.Object], waiting: set[str]) -> None:
@@ -222,7 +244,12 @@ class SceneCache:
     @property
     def has_unresolved(self) -> bool:
         """Whether there are objects that need `resolve_topologies`."""
-        return bool(self._unresolved)
+        return bool(self._unresolved or self._resolution)
+
+    def _waiting_names(self) -> set[str]:
+        """Return the names of the objects that need `resolve_topologies`."""
+        resolving = () if self._resolution is None else (self._resolution[0],)
+        return {*resolving, *(name for name, _ in self._unresolved)}
 
     def resolve_topologies(
         self,
@@ -233,28 +260,40 @@ class SceneCache:
         """Read the rest positions and fields of meshes whose modifiers change the topology.
 
         This adds temporary attributes to the meshes, so it must not be called while Blender draws.
-        Objects that were not begun by the deadline, except one, are left for the next call.
+        What was not begun by the deadline, except one step, is left for the next call.
         """
-        for name in sorted({name for name, _ in self._unresolved}):
-            unresolved = {key for key in self._unresolved if key[0] == name}
-            self._unresolved -= unresolved
-            self._attempts[name] = self._attempts.get(name, 0) + 1
-            obj = depsgraph.view_layer.objects.get(name) or bpy.data.objects.get(name)
-            if obj is None:
-                continue
-            for key in [key for key in self._topologies if key[0] == name]:
-                del self._topologies[key]
+        while self.has_unresolved:
+            if self._resolution is None:
+                name = min(name for name, _ in self._unresolved)
+                self._resolution = name, self._resolution_task(depsgraph, name, nonfinite)
             try:
-                self._resolve_object(depsgraph, obj, nonfinite)
-            except REPORTED_ERRORS as error:
-                problem = error_text(error)
-            else:
-                problem = str(lost_field_error(obj, attribute_name(obj.data)))
-            # Whatever was not read now is not tried again before the object changes.
-            for key in unresolved:
-                self._topologies.setdefault(key, problem)
+                next(self._resolution[1])
+            except StopIteration:
+                self._resolution = None
             if time.monotonic() > deadline:
                 return
+
+    def _resolution_task(
+        self, depsgraph: bpy.types.Depsgraph, name: str, nonfinite: str
+    ) -> Task[None]:
+        """Read the meshes of an object in the first step, and build their fields in the others."""
+        unresolved = {key for key in self._unresolved if key[0] == name}
+        self._unresolved -= unresolved
+        self._attempts[name] = self._attempts.get(name, 0) + 1
+        obj = depsgraph.view_layer.objects.get(name) or bpy.data.objects.get(name)
+        if obj is None:
+            return
+        for key in [key for key in self._topologies if key[0] == name]:
+            del self._topologies[key]
+        problem = str(lost_field_error(obj, attribute_name(obj.data)))
+        try:
+            for task in self._read_with_attributes(depsgraph, obj, nonfinite):
+                yield from task
+        except REPORTED_ERRORS as error:
+            problem = error_text(error)
+        # Whatever was not read now is not tried again before the object changes.
+        for key in unresolved:
+            self._topologies.setdefault(key, problem)
 
     def _read_cached(
         self, obj: bpy.types.Object, owner: bpy.types.Object, nonfinite: str, draws_field: bool
@@ -270,6 +309,9 @@ class SceneCache:
             self.is_complete = False
             return None
         self._has_read_any = True
+        if not self._prepare(obj, owner, draws_field):
+            self.is_complete = False
+            return None
         try:
             mesh_state = (
                 self._read_evaluated(obj, owner, nonfinite)
@@ -279,9 +321,55 @@ class SceneCache:
         except REPORTED_ERRORS as error:
             self.errors[name] = error_text(error)
             return None
-        if mesh_state is not None or name not in {name for name, _ in self._unresolved}:
+        if mesh_state is not None or name not in self._waiting_names():
             self._mesh_states[key] = mesh_state
         return mesh_state
+
+    def _prepare(self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool) -> bool:
+        """Continue to build what takes long to read, and return whether it is built.
+
+        It is kept in the cache by its contents. If the object changes meanwhile, or has meshes of
+        several instances, they are read without preparation.
+        """
+        name = owner.name
+        if self._deadline == math.inf or name in self._prepared:
+            return True
+        try:
+            if self._preparation is None or self._preparation[0] != name:
+                self._preparation = name, self._preparation_task(obj, name, draws_field)
+            while True:
+                next(self._preparation[1])
+                if time.monotonic() > self._deadline:
+                    return False
+        except StopIteration:
+            pass
+        except REPORTED_ERRORS:
+            pass  # it is left to those who read the mesh
+        self._preparation = None
+        self._prepared.add(name)
+        return time.monotonic() <= self._deadline
+
+    def _preparation_task(self, obj: bpy.types.Object, name: str, draws_field: bool) -> Task[None]:
+        """Cache what is built from the meshes of an object: read one, build, then the other.
+
+        `obj` is the evaluated object, used in the first step alone.
+        """
+        label = f"object '{name}'"
+        with evaluated_mesh(obj) as mesh:
+            if mesh is None:
+                return
+            task = mesh_surface_task(mesh, label, occluder_only=not draws_field, cache=self.cache)
+        yield Progress(0.0, label)
+        yield from task
+        owner = bpy.data.objects.get(name)
+        if not draws_field or owner is None or owner.type != "MESH" or owner.data.is_editmode:
+            return
+        yield Progress(0.5, label)
+        task = mesh_surface_task(owner.data, label, cache=self.cache)
+        yield Progress(0.6, label)
+        surface = yield from task
+        yield Progress(0.9, label)
+        _ = surface.face_normal
 
     def _read_occluder(self, obj: bpy.types.Object) -> _MeshState | None:
         """Read a mesh that only occludes; None if it has no faces."""
@@ -289,9 +377,7 @@ class SceneCache:
             if mesh is None:
                 return None
             label = f"object '{obj.name}'"
-            return _MeshState(
-                mesh_surface(mesh, label, occluder_only=True, cache=self._cache), None
-            )
+            return _MeshState(mesh_surface(mesh, label, occluder_only=True, cache=self.cache), None)
 
     def _read_evaluated(
         self, obj: bpy.types.Object, owner: bpy.types.Object, nonfinite: str
@@ -302,12 +388,12 @@ class SceneCache:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return None
-            surface = mesh_surface(mesh, label, cache=self._cache)
-            tone = read_tone(mesh, owner, surface, self._tone_request, self._cache)
+            surface = mesh_surface(mesh, label, cache=self.cache)
+            tone = read_tone(mesh, owner, surface, self._tone_request, self.cache)
             if original.is_editmode:
                 field_in_edit_mode = self._edit_mode_field(mesh, owner, surface, nonfinite, label)
                 return _MeshState(surface, field_in_edit_mode, tone)
-            original_surface = mesh_surface(original, label, cache=self._cache)
+            original_surface = mesh_surface(original, label, cache=self.cache)
             keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
             if keeps_field and _has_same_topology(surface, original_surface):
                 field = read_mesh_field(
@@ -315,16 +401,18 @@ class SceneCache:
                     nonfinite=nonfinite,
                     label=label,
                     surface=original_surface,
-                    cache=self._cache,
+                    cache=self.cache,
                 )
                 deformed = bool(user_modifiers(owner) or original.shape_keys)
                 rest_surface = (
                     _with_rest(surface, original_surface.vertices) if deformed else surface
                 )
                 return _MeshState(rest_surface, field, tone)
-            key = owner.name, _topology_hash(surface, mesh, original)
+            key = owner.name, _topology_hash(mesh, original)
         entry = self._topologies.get(key)
         if entry is None:
+            if self._resolution is not None and self._resolution[0] == owner.name:
+                return None
             if self._attempts.get(owner.name, 0) >= MAX_ATTEMPTS:
                 raise RosyError(f"{label}: its modifiers make other faces at each evaluation")
             self._unresolved.add(key)
@@ -353,11 +441,15 @@ class SceneCache:
         layout = FieldLayout(name, field_degree(original))
         return read_evaluated_field(mesh, layout, surface, nonfinite, label)
 
-    def _resolve_object(
+    def _read_with_attributes(
         self, depsgraph: bpy.types.Depsgraph, owner: bpy.types.Object, nonfinite: str
-    ) -> None:
-        """Read the rest positions and fields of all meshes of an object, where they have a field."""
-        with temp_attributes(depsgraph, [owner], nonfinite, self._cache) as layouts:
+    ) -> list[Task[None]]:
+        """Read all meshes of an object that have its field, and return tasks that add them.
+
+        The tasks add entries to `_topologies`. They use neither the object nor its meshes.
+        """
+        tasks, keys = [], set()
+        with temp_attributes(depsgraph, [owner], nonfinite, self.cache) as layouts:
             layout, label = layouts[owner], f"object '{owner.name}'"
             for instance in depsgraph.object_instances:
                 obj = instance.object
@@ -366,13 +458,28 @@ class SceneCache:
                 with evaluated_mesh(obj) as mesh:
                     if mesh is None or not layout.is_on(mesh):
                         continue
-                    surface = mesh_surface(mesh, label, read_rest=True, cache=self._cache)
-                    key = owner.name, _topology_hash(surface, mesh, owner.data)
-                    if key not in self._topologies:
-                        field = read_evaluated_field(
-                            mesh, layout, surface, nonfinite, label, self._cache
-                        )
-                        self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
+                    key = owner.name, _topology_hash(mesh, owner.data)
+                    if key in keys:
+                        continue
+                    keys.add(key)
+                    surface_task = mesh_surface_task(mesh, label, read_rest=True, cache=self.cache)
+                    build_field_task = evaluated_field_reader(
+                        mesh, layout, nonfinite, label, self.cache
+                    )
+                    tasks.append(self._add_topology_task(key, surface_task, build_field_task))
+        return tasks
+
+    def _add_topology_task(
+        self,
+        key: _TopologyKey,
+        surface_task: Task[Surface],
+        build_field_task: Callable[[Surface], Task[RosyField]],
+    ) -> Task[None]:
+        """Build a surface and its field, and add them to `_topologies`."""
+        yield Progress(0.0, "reading the field")
+        surface = yield from surface_task
+        field = yield from build_field_task(surface)
+        self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
 
 
 def _has_same_topology(surface: Surface, other: Surface) -> bool:
@@ -384,12 +491,12 @@ def _has_same_topology(surface: Surface, other: Surface) -> bool:
     )
 
 
-def _topology_hash(surface: Surface, mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
+def _topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
     """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
     values = None
     if is_face_vector_field(mesh, attribute_name(original)):
         values = read_attribute(mesh, attribute_name(original), np.float32, 3)
-    return content_hash(surface.corner_vertex, surface.face_start, values)
+    return content_hash(*polygon_arrays(mesh), values)
 
 
 def _with_rest(surface: Surface, rest: np.ndarray | None) -> Surface:

@@ -22,6 +22,7 @@ from .evaluated_field import (
     FieldLayout,
     add_temp_field,
     add_temp_vectors,
+    evaluated_field_reader,
     read_evaluated_field,
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
@@ -159,6 +160,10 @@ def read_scene_task(
     yield Progress(0.5, label)
     with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
         yield Progress(0.7, label)
+        for obj, layout in layouts.items():
+            # Found in the cache by the last step, unless the object has changed until then.
+            task = _prepare_field_task(obj, layout, depsgraph, nonfinite, cache)
+            yield from subtask(task, 0.7, 0.9, label)
         # The scene may have changed since the last step. All instances are read in one step, the
         # last, so that the caller can read what belongs to them before it yields.
         depsgraph.update()
@@ -199,6 +204,34 @@ def _prepare_surfaces_task(
             yield Progress(0.6, label)
             if task is not None:
                 yield from subtask(task, 0.6, 1.0)
+    except RosyError:
+        pass
+
+
+def _prepare_field_task(
+    obj: bpy.types.Object,
+    layout: FieldLayout,
+    depsgraph: bpy.types.Depsgraph,
+    nonfinite: str,
+    cache: Cache,
+) -> Task[None]:
+    """Build the evaluated surface and field of an object, and keep them in the cache.
+
+    Errors are left to those who read them.
+    """
+    label = f"object '{obj.name}'"
+    try:
+        depsgraph.update()
+        with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+            if mesh is None or not layout.is_on(mesh):
+                return
+            task = mesh_surface_task(mesh, label, read_rest=True, cache=cache)
+            build_field_task = evaluated_field_reader(mesh, layout, nonfinite, label, cache)
+        yield Progress(0.0, label)
+        surface = yield from subtask(task, 0.0, 0.5)
+        yield Progress(0.5, label)
+        yield from subtask(build_field_task(surface), 0.5, 1.0)
+        yield Progress(1.0, label)
     except RosyError:
         pass
 

@@ -110,7 +110,9 @@ class LayerStates:
     def forget(self) -> None:
         """Drop everything that was read."""
         self._layers = {
-            key: LayerState(is_starting=layer.is_starting) for key, layer in self._layers.items()
+            # What is cached by its contents is still right.
+            key: LayerState(SceneCache(layer.scene_cache.cache), is_starting=layer.is_starting)
+            for key, layer in self._layers.items()
         }
 
     def invalidate(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:

@@ -8,7 +8,7 @@ import pytest
 from rosy.rosy_addon.scene import scene_cache as scene_cache_module
 from rosy.rosy_addon.scene.scene_cache import SceneCache
 from rosy.rosy_addon.scene.scene_reader import read_instances
-from scenes import add_field, add_mesh, add_plane, contents, member_vectors, set_vectors
+from scenes import add_field, add_mesh, add_plane, contents, link, member_vectors, set_vectors
 
 
 def depsgraph():
@@ -165,7 +165,7 @@ def test_instances_with_other_faces_than_their_owner(monkey):
 
 
 def test_reading_in_slices_ends(scene):
-    """With a deadline that has passed, each call reads one object, also if it cannot be drawn."""
+    """With a deadline that has passed, each call does one step, also if it cannot be drawn."""
     scene_cache, calls = SceneCache(), 0
     for index in range(6):
         plane = add_plane(f"Plane {index}")
@@ -177,11 +177,55 @@ def test_reading_in_slices_ends(scene):
     states = scene_cache.read(depsgraph(), deadline=0.0)
     while not scene_cache.is_complete or scene_cache.has_unresolved:
         calls += 1
-        assert calls < 20
+        assert calls < 200
         scene_cache.resolve_topologies(depsgraph(), deadline=0.0)
         states = scene_cache.read(depsgraph(), deadline=0.0)
     assert [state.owner.name for state in states] == ["Plane 2", "Plane 5"]
     assert sorted(scene_cache.errors) == [f"Plane {index}" for index in (0, 1, 3, 4)]
+
+
+@pytest.mark.parametrize("changes_faces", [False, True])
+def test_one_mesh_is_read_in_steps(monkey, changes_faces):
+    """A mesh is not read at once, and the result is that of reading it at once."""
+    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = 2
+    if not changes_faces:
+        bpy.ops.object.modifier_apply(modifier=modifier.name)
+        add_field(monkey)
+    at_once, in_steps, calls = SceneCache(), SceneCache(), 0
+    assert read(at_once) == ["Suzanne"]
+    (expected,) = at_once.read(depsgraph())
+    states = in_steps.read(depsgraph(), deadline=0.0)
+    while not in_steps.is_complete or in_steps.has_unresolved:
+        calls += 1
+        assert calls < 100
+        if in_steps.is_complete:
+            in_steps.resolve_topologies(depsgraph(), deadline=0.0)
+        states = in_steps.read(depsgraph(), deadline=0.0)
+    assert calls >= 8
+    (state,) = states
+    np.testing.assert_array_equal(state.instance.field.vectors, expected.instance.field.vectors)
+    for name, values in vars(expected.instance.surface).items():
+        np.testing.assert_array_equal(getattr(state.instance.surface, name), values)
+
+
+def test_an_object_that_is_deleted_between_two_steps(monkey):
+    add_field(add_plane("Plane"), kind="axis")
+    monkey.modifiers.new("Subdivision", "SUBSURF")
+    for steps in range(1, 16):
+        obj = monkey.copy()
+        obj.name, obj.data = "Copy", monkey.data.copy()
+        link(obj)
+        scene_cache = SceneCache()
+        for step in range(100):
+            if step == steps:
+                bpy.data.objects.remove(bpy.data.objects["Copy"])
+                scene_cache.invalidate({"Copy"})
+            if scene_cache.has_unresolved:
+                scene_cache.resolve_topologies(depsgraph(), deadline=0.0)
+            states = scene_cache.read(depsgraph(), deadline=0.0)
+        names = sorted(state.owner.name for state in states)
+        assert names == ["Plane", "Suzanne"] and not scene_cache.errors, steps
 
 
 def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatch):
@@ -219,7 +263,7 @@ def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
     def fail(*_, **__):
         raise MemoryError
 
-    for reader in ("read_mesh_field", "read_evaluated_field"):
+    for reader in ("read_mesh_field", "evaluated_field_reader"):
         monkeypatch.setattr(scene_cache_module, reader, fail)
     scene_cache = SceneCache()
     assert read(scene_cache) == [] and "not enough memory" in scene_cache.errors["Suzanne"]

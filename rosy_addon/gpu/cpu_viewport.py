@@ -14,9 +14,10 @@ from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..render.cpu import CpuRenderer
-from ..render.view_input import ViewInput
+from ..render.view_input import Background, ViewInput
+from .background import draw_background
 from .device import Device
-from .passes import COMPOSITE
+from .passes import BACKGROUND, COMPOSITE
 
 
 class CpuViewportRenderer:
@@ -49,7 +50,7 @@ class CpuViewportRenderer:
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """As `ViewportRenderer.prepare_task`."""
-        yield from self._device.compile_task((COMPOSITE,))
+        yield from self._device.compile_task((COMPOSITE, BACKGROUND))
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[MeshInstance]:
         """As `ViewportRenderer.upload`."""
@@ -90,6 +91,10 @@ class CpuViewportRenderer:
         self._device.draw_to_view(
             COMPOSITE, [(self._fullscreen_batch, {})], {"picture": texture}, uniforms
         )
+
+    def draw_background(self, background: Background) -> None:
+        """As `ViewportRenderer.draw_background`."""
+        draw_background(self._device, background)
 
     def finish(self) -> None:
         """As `ViewportRenderer.finish`."""

@@ -400,6 +400,14 @@ COMPOSITE = RasterPass(
     ),
 )
 
+BACKGROUND = RasterPass(
+    "background",
+    (),
+    (("background_position", "vec2"),),
+    "view_color",
+    (("background_color", "vec4"), ("low_corner", "vec2"), ("high_corner", "vec2")),
+)
+
 ALL_PASSES = (
     VISIBILITY,
     VISIBILITY_CLIPPED,
@@ -418,4 +426,5 @@ ALL_PASSES = (
     MAX_REDUCE,
     DOWNSAMPLE,
     COMPOSITE,
+    BACKGROUND,
 )

@@ -20,8 +20,9 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
-from ..render.view_input import ViewInput
+from ..render.view_input import Background, ViewInput
 from . import lookup_tables, passes
+from .background import draw_background
 from .device import Device
 from .frame import Frame
 from .gbuffer_stage import render_gbuffer
@@ -152,6 +153,10 @@ class GpuRenderer:
             if item.field is not None
         ]
         self.device.draw_to_view(passes.COMPOSITE, batches, {"picture": texture}, uniforms)
+
+    def draw_background(self, background: Background) -> None:
+        """As `ViewportRenderer.draw_background`."""
+        draw_background(self.device, background)
 
     def finish(self) -> None:
         """As `ViewportRenderer.finish`."""

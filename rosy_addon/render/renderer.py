@@ -9,7 +9,7 @@ from ..compositor.picture import Picture
 from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .view_input import ViewInput
+from .view_input import Background, ViewInput
 
 
 class Renderer(Protocol):
@@ -105,6 +105,9 @@ class ViewportRenderer(Protocol):
             Its camera and clip planes are those of the 3D view.
         opacity : float
         """
+
+    def draw_background(self, background: Background) -> None:
+        """Fill a part of the 3D view that is being drawn, wherever its depth is at the far end."""
 
     def finish(self) -> None:
         """Wait until the device has done all work."""

@@ -13,6 +13,23 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 
 
+@dataclass(frozen=True)
+class Background:
+    """The color behind everything in a 3D view.
+
+    Attributes
+    ----------
+    color : tuple of float
+        Linear red, green and blue.
+    low_corner, high_corner : (float, float)
+        Lower left and upper right of the part that is filled, in normalized device coordinates.
+    """
+
+    color: tuple[float, float, float]
+    low_corner: tuple[float, float] = (-1.0, -1.0)
+    high_corner: tuple[float, float] = (1.0, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class ViewInput:
     """Everything that a renderer needs to draw one picture.

@@ -119,6 +119,11 @@ class ProgressiveRenderer:
         #: Estimated cost of a final picture; 0 until one is known.
         self._seconds_per_megapixel = 0.0
 
+    @property
+    def is_prepared(self) -> bool:
+        """Whether the shaders are compiled and the meshes uploaded."""
+        return self._is_prepared
+
     def remove_space(self, space_pointer: int) -> None:
         """Drop the pictures of one 3D view."""
         for key in [key for key in self.views if key[0] == space_pointer]:

@@ -17,6 +17,7 @@ from ..scene.lights import read_lights
 from ..scene.look_properties import read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
+from .background import view_background
 from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
@@ -241,6 +242,11 @@ class ViewportSession:
             _picture_key(instances, view_input),
             view_input,
         )
+        if self.progressive.is_prepared:
+            look, camera = view_input.look, view_input.camera
+            background = view_background(context, depsgraph, camera, look)
+            if background is not None:
+                self.progressive.renderer.draw_background(background)
         if view.texture is not None:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY

@@ -261,6 +261,50 @@ def surfaces_in_front_occlude():
     assert changed < 1e-4, f"{changed:.2%} of what is not the field has changed"
 
 
+def paper_is_behind_everything():
+    """The backdrop of a hatching: the whole view, the frame of a camera, nothing if it is off."""
+    yield from fresh_scene(levels=0)
+    scene, space = bpy.context.scene, view()[1].spaces.active
+    bpy.ops.rosy.preset_apply(preset="cross-hatch")
+    scene.rosy.look.paper_colour = (0.8, 0.6, 0.3)
+    hex_color = rosy("rosy_addon.scene.look_properties").read_look(scene.rosy).paper_colour
+    paper = np.array(list(bytes.fromhex(hex_color[1:]))) / 255
+    scene.render.resolution_x = scene.render.resolution_y = 400
+    scene.camera = add_camera("Camera", (0.0, -6.0, 1.0), (math.radians(80), 0.0, 0.0))
+    with in_view():
+        bpy.ops.mesh.primitive_cube_add(size=0.8, location=(0.0, -2.0, 0.3))
+    objects = set(bpy.data.objects)
+    switch("ON")
+
+    def shows_paper(name):
+        seen = capture(name, view()[2])
+        return (np.abs(seen - paper) < 0.02).all(axis=2)
+
+    for device, perspective, backdrop in (
+        ("AUTO", "PERSP", False),
+        ("AUTO", "PERSP", True),
+        ("AUTO", "ORTHO", True),
+        ("AUTO", "CAMERA", True),
+        ("CPU", "PERSP", True),
+    ):
+        scene.rosy.backdrop = backdrop
+        if device == "CPU":
+            switch("OFF")
+            switch("ON", device=device)
+        space.region_3d.view_perspective = perspective
+        yield from wait_for_final_pictures()
+        is_paper = shows_paper(f"paper-{backdrop}-{device}-{perspective}".lower())
+        corners = is_paper[[60, 60, -60, -60], [60, -60, 60, -60]]
+        center = is_paper[is_paper.shape[0] // 2, is_paper.shape[1] // 2]
+        assert corners.all() == (backdrop and perspective != "CAMERA"), perspective
+        assert not backdrop or is_paper.mean() > 0.05, perspective
+        assert perspective != "CAMERA" or not corners.any(), "the paper leaves the frame"
+        assert perspective != "CAMERA" or not center, "the paper covers the cube"
+    assert set(bpy.data.objects) == objects
+    switch("OFF")
+    check_nothing_is_left()
+
+
 def only_visible_objects_are_drawn():
     """Hidden objects, local view, bounds and wireframe; the frame of a camera; a clipped region."""
     yield from fresh_scene()
@@ -1087,6 +1131,7 @@ STEPS = (
     off_restores_the_view,
     screenshot_for_the_documentation,
     surfaces_in_front_occlude,
+    paper_is_behind_everything,
     only_visible_objects_are_drawn,
     clipped_region,
     tones_are_those_of_a_bake,

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.field_io import write_field
-from ..rosy_addon.scene.meshes import mesh_surface
-from ..rosy_addon.scene.read_field import read_mesh_field
+from ..rosy_addon.field.field_io import write_field_task
+from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.scene.read_field import read_mesh_field_task
+from .modal_task import DialogTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
-from .reports import report_error
 
 #: File formats by suffix: label and description in the user interface.
 FIELD_FORMATS = {
@@ -25,12 +26,13 @@ FIELD_FORMATS = {
 }
 
 
-class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
+class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
     """Write the field of the active mesh to a file"""
 
     bl_idname = "rosy.field_export"
     bl_label = "Export Field"
     bl_options = {"REGISTER"}
+    cancel_note = "no file was written"
 
     filename_ext = ".rosy"
     filter_glob: bpy.props.StringProperty(
@@ -42,6 +44,11 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
         items=[(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
         default=".rosy",
     )
+    skip_browser: bpy.props.BoolProperty(
+        name="Skip Browser",
+        description="Start without a file browser",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -51,17 +58,31 @@ class ROSY_OT_field_export(bpy.types.Operator, ExportHelper):
         """Set the suffix of the file name to the format's in the file browser."""
         return sync_suffix(self, self.file_format)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = selected_mesh_objects(context)[0]
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the path of the file."""
+        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        self.skip_browser = True
+
+    def make_task(self, context: bpy.types.Context) -> Task[Path]:
         path = Path(bpy.path.abspath(self.filepath))
-        try:
-            surface = mesh_surface(obj.data)
-            field = read_mesh_field(obj.data, surface=surface)
-            write_field(path, field, surface)
-        except RosyError as error:
-            return report_error(self, error)
-        self.report({"INFO"}, f"Wrote {path}")
-        return {"FINISHED"}
+        return _export_task(selected_mesh_objects(context)[0].data, path)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        obj = selected_mesh_objects(context)[0]
+        return obj, obj.data
+
+    def finish(self, context: bpy.types.Context, result: Path) -> None:
+        self.report({"INFO"}, f"Wrote {result}")
+
+
+def _export_task(mesh: bpy.types.Mesh, path: Path) -> Task[Path]:
+    """Read the field of a mesh, and write it to a file."""
+    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
+    field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
+    yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
+    return path
 
 
 CLASSES = (ROSY_OT_field_export,)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.errors import REPORTED_ERRORS, counted
-from ..rosy_addon.field.field_io import READ_SUFFIXES, load_field
+from ..rosy_addon.errors import counted
+from ..rosy_addon.field.directional_field import field_directions
+from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field_task
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.scene.meshes import mesh_surface
+from ..rosy_addon.progress import Progress, Task, subtask
+from ..rosy_addon.scene.meshes import mesh_surface_task
+from .modal_task import DialogTaskMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
-from .reports import report_error, report_warning
+from .reports import report_warning
 
 
-class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
+class ROSY_OT_field_import(DialogTaskMixin, bpy.types.Operator, ImportHelper):
     """Read the field of the active mesh from a file"""
 
     bl_idname = "rosy.field_import"
@@ -52,35 +58,54 @@ class ROSY_OT_field_import(bpy.types.Operator, ImportHelper):
         description="Name of the mesh attribute that stores the field. An existing field is replaced",
         default="rosy",
     )
+    skip_browser: bpy.props.BoolProperty(
+        name="Skip Browser",
+        description="Start without a file browser",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_editable(cls, context)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        # A dialog if a file was dropped on the view, so that the path is set; else a file browser.
-        return self.invoke_popup(context)
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the settings of a file that was dropped on the view, or for a file."""
+        return None if self.skip_browser else self.invoke_popup(context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = selected_mesh_objects(context)[0]
-        try:
-            field, note = load_field(
-                bpy.path.abspath(self.filepath),
-                mesh_surface(obj.data),
-                self.degree or None,
-                self.undefined,
-                mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
-            )
-            store_fields(self, context, {obj.data: field}, self.attribute)
-        except REPORTED_ERRORS as error:
-            return report_error(self, error)
-        if note:
-            report_warning(self, note)
-        self.report(
-            {"INFO"},
-            f"Read a field of degree {field.degree} on {counted(len(field.vectors), 'face')} of '{obj.name}'",
+    def take_answer(self, context: bpy.types.Context) -> None:
+        self.skip_browser = True
+
+    def make_task(self, context: bpy.types.Context) -> Task[LoadedField]:
+        """Read the field, then store it."""
+        mesh = selected_mesh_objects(context)[0].data
+        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
+        loading = load_field_task(
+            bpy.path.abspath(self.filepath),
+            surface,
+            self.degree or None,
+            self.undefined,
+            mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
         )
-        return {"FINISHED"}
+        field, note = yield from subtask(loading, 0.2, 1.0)
+        if field.direction_ratios is not None and field.source_directions is None:
+            yield Progress(1.0, "computing directions")
+            field = replace(field, source_directions=field_directions(surface, field))
+        yield Progress(1.0, "storing the field")
+        store_fields(self, context, {mesh: field}, self.attribute)
+        return LoadedField(field, note)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        obj = selected_mesh_objects(context)[0]
+        return obj, obj.data
+
+    def finish(self, context: bpy.types.Context, result: LoadedField) -> None:
+        if result.note:
+            report_warning(self, result.note)
+        obj = selected_mesh_objects(context)[0]
+        faces = counted(len(result.field.vectors), "face")
+        self.report(
+            {"INFO"}, f"Read a field of degree {result.field.degree} on {faces} of '{obj.name}'"
+        )
 
 
 class ROSY_FH_field(bpy.types.FileHandler):

@@ -281,9 +281,11 @@ class DialogTaskMixin(ModalTaskMixin):
         if not self._has_asked:
             return super().execute(context)
         self.take_answer(context)
-        names = type(self).__annotations__
+        names = self.properties.bl_rna.properties.keys()
         settings = {
-            name: getattr(self, name) for name in names if self.properties.is_property_set(name)
+            name: getattr(self, name)
+            for name in names
+            if name != "rna_type" and self.properties.is_property_set(name)
         }
         operator = getattr(bpy.ops.rosy, type(self).bl_idname.partition(".")[2])
         try:

@@ -9,13 +9,14 @@ import secrets
 import stat
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from .errors import RosyError
 from .memory import check_memory, format_bytes
+from .progress import Progress, Task
 
 #: Bytes at the beginning of a file that show whether it is binary.
 HEAD_BYTES = 4096
@@ -134,6 +135,31 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """
     with replacing(path) as temporary, open(temporary, "xb") as file:
         file.write(data)
+
+
+def write_blocks_task(
+    path: str | os.PathLike[str], blocks: Iterable[bytes], block_count: float
+) -> Task[None]:
+    """Write a file atomically, block by block; see `replacing`.
+
+    A task that is cancelled leaves an existing file unchanged.
+
+    Parameters
+    ----------
+    path : path-like
+    blocks : iterable of bytes
+    block_count : float
+        About how many there are, for the progress.
+
+    Raises
+    ------
+    RosyError
+        If the folder is missing, or the file cannot be written. An existing file stays unchanged.
+    """
+    with replacing(path) as temporary, open(temporary, "xb") as file:
+        for number, block in enumerate(blocks, 1):
+            file.write(block)
+            yield Progress(min(number / block_count, 1.0), "writing the file")
 
 
 @contextmanager

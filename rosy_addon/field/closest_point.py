@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion
 from .frames import dot
 from .surface import Surface
 
@@ -21,6 +22,13 @@ MAX_PAIRS = 1 << 18
 def closest_triangles(
     surface: Surface, points: np.ndarray, max_distance: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Run `closest_triangles_task` to its end."""
+    return run_to_completion(closest_triangles_task(surface, points, max_distance))
+
+
+def closest_triangles_task(
+    surface: Surface, points: np.ndarray, max_distance: float = np.inf
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Find the triangle closest to each point.
 
     Parameters
@@ -38,7 +46,10 @@ def closest_triangles(
     distance : (n,) float64 ndarray
         Distance of the point from the triangle, Blender units; infinite if no triangle was found.
     """
+    label = "finding the closest faces"
+    yield Progress(0.0, label)
     grid = _TriangleGrid(surface)
+    yield from grid.fill_task()
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     triangle = np.zeros(len(points), dtype=np.int32)
     distance = np.full(len(points), np.inf)
@@ -56,7 +67,8 @@ def closest_triangles(
     # triangle, or only ones beyond the maximum distance.
     ring = 0
     while len(unfinished):
-        grid.search_ring(points, unfinished, ring, triangle, distance)
+        yield Progress(1 - len(unfinished) / len(points), label)
+        yield from grid.search_ring_task(points, unfinished, ring, triangle, distance)
         ring += 1
         searched_distance = (ring - 1) * grid.cell_size + grid.distance_to_cell_border(
             points[unfinished]
@@ -83,15 +95,30 @@ class _TriangleGrid:
         self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(corners) / 6), 1)
         self.shape = np.maximum((extent / self.cell_size).astype(np.int64) + 1, 1)
         self.max_ring = int(self.shape.max()) + 1
-        first, last = self._cells_of(low), self._cells_of(high)
+        self._low, self._high = low, high
+
+    def fill_task(self) -> Task[None]:
+        """Find the cells of the triangles. Call this first."""
+        label = "finding the closest faces"
+        low, high = self._low, self._high
+        yield Progress(0.0, label)
+        first = self._cells_of(low)
+        yield Progress(0.0, label)
+        last = self._cells_of(high)
+        yield Progress(0.0, label)
         is_large = (last - first).max(axis=1) >= MAX_CELLS_PER_AXIS
         self.large_triangles = np.flatnonzero(is_large).astype(np.int32)
+        yield Progress(0.0, label)
         small = np.flatnonzero(~is_large)
         span = last[small] - first[small] + 1
         count = span.prod(axis=1)
+        yield Progress(0.0, label)
         entry = np.repeat(np.arange(len(small)), count)
+        yield Progress(0.0, label)
         cell_number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        yield Progress(0.0, label)
         spans = span[entry]
+        yield Progress(0.0, label)
         offset = np.stack(
             [
                 cell_number // (spans[:, 1] * spans[:, 2]),
@@ -100,8 +127,11 @@ class _TriangleGrid:
             ],
             axis=1,
         )
+        yield Progress(0.0, label)
         cell_key = self._keys_of(first[small][entry] + offset)
+        yield Progress(0.0, label)
         order = np.argsort(cell_key, kind="stable")
+        yield Progress(0.0, label)
         self.key, self.cell_triangle = cell_key[order], small[entry][order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
@@ -118,14 +148,14 @@ class _TriangleGrid:
         fraction = (points - self.origin) / self.cell_size - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
 
-    def search_ring(
+    def search_ring_task(
         self,
         points: np.ndarray,
         selection: np.ndarray,
         ring: int,
         triangle: np.ndarray,
         distance: np.ndarray,
-    ) -> None:
+    ) -> Task[None]:
         """Test the selected points against the triangles in one ring of cells around their own.
 
         Parameters
@@ -143,6 +173,7 @@ class _TriangleGrid:
         offset = offset[np.abs(offset).max(axis=1) == ring]
         block = max(MAX_PAIRS // (8 * len(offset)), 1)
         for start in range(0, len(selection), block):
+            yield Progress(1 - (len(selection) - start) / len(points), "finding the closest faces")
             chunk = selection[start : start + block]
             cell = (self._cells_of(points[chunk])[:, None] + offset).reshape(-1, 3)
             exists = ((cell >= 0) & (cell < self.shape)).all(axis=1)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion
+from .blocks import by_rows_task
 from .frames import dot, tangent_frame, transport
 from .representation import complex_bincount, power
-from .surface import Surface
+from .surface import Surface, face_blocks, next_corners
 
 
 def corner_rotations(
@@ -39,6 +41,21 @@ def corner_rotations(
     return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
 
 
+def corner_rotations_task(
+    face_normal: np.ndarray,
+    face_x: np.ndarray,
+    corner_face: np.ndarray,
+    corner_normal: np.ndarray,
+    label: str,
+) -> Task[np.ndarray]:
+    """`corner_rotations` in steps, with the label of their progress."""
+
+    def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        return corner_rotations(face_normal, face_x, face, normal)
+
+    return (yield from by_rows_task(rotations, corner_face, corner_normal, label=label))
+
+
 def average_over_fans(
     values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
@@ -67,6 +84,11 @@ def average_over_fans(
 
 
 def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndarray:
+    """Run `corner_angles_task` to its end."""
+    return run_to_completion(corner_angles_task(surface, points))
+
+
+def corner_angles_task(surface: Surface, points: np.ndarray | None = None) -> Task[np.ndarray]:
     """The angle between the two edges at each corner of the faces.
 
     Parameters
@@ -80,12 +102,17 @@ def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndar
     (C,) float64 ndarray
         Radians, 0 to pi.
     """
-    positions = (surface.vertices if points is None else points)[surface.corner_vertex]
-    to_next = positions[surface.next_corner] - positions
-    to_previous = np.empty_like(to_next)
-    to_previous[surface.next_corner] = -to_next
-    cross = np.cross(to_next, to_previous)
-    return np.arctan2(np.sqrt(dot(cross, cross)), dot(to_next, to_previous))
+    points = surface.vertices if points is None else points
+    angles = np.empty(len(surface.corner_vertex))
+    for faces, corners, starts in face_blocks(surface.face_start):
+        yield Progress(faces.start / surface.face_count, "measuring angles")
+        positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
+        to_next = positions[following] - positions
+        to_previous = np.empty_like(to_next)
+        to_previous[following] = -to_next
+        cross = np.cross(to_next, to_previous)
+        angles[corners] = np.arctan2(np.sqrt(dot(cross, cross)), dot(to_next, to_previous))
+    return angles
 
 
 def smooth_face_values(

@@ -24,10 +24,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion, subtask
+from .blocks import by_rows_task, row_blocks
 from .frames import dot
-from .representation import face_frames, matching_angles, signed_power, to_representation
+from .representation import face_frames, matching_angles_task, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_edges
+from .surface import Surface, edges_task
 from .symmetry import FieldSymmetry
 
 #: Directions within these tolerances count as a RoSy: the error of the angle between neighboring
@@ -45,6 +47,11 @@ MIN_FAMILY_AGREEMENT = 0.98
 
 
 def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField:
+    """Run `field_from_directions_task` to its end."""
+    return run_to_completion(field_from_directions_task(surface, directions))
+
+
+def field_from_directions_task(surface: Surface, directions: np.ndarray) -> Task[RosyField]:
     """Make a field from N directions on each face.
 
     Parameters
@@ -66,17 +73,32 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     --------
     rosy_addon.field.validate.validated_directions : Check directions from outside first.
     """
+    label = "reading directions"
+    yield Progress(0.0, label)
     x, y = face_frames(surface)
-    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-    within_tolerance = is_rosy(w)
-    first_angle, rho, direction_ratios = closest_rosy(w)
+    yield Progress(0.1, label)
+
+    def coordinates(rows: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return dot(rows, x[:, None]) + 1j * dot(rows, y[:, None])
+
+    task = by_rows_task(coordinates, directions, x, y, label=label)
+    w = yield from subtask(task, 0.1, 0.2)
+    within_tolerance = True
+    for rows in row_blocks(len(w)):
+        within_tolerance &= is_rosy(w[rows])
+        yield Progress(0.3, label)
+        if not within_tolerance:
+            break
+    task = by_rows_task(closest_rosy, w, label=label)
+    first_angle, rho, direction_ratios = yield from subtask(task, 0.3, 0.6)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
         vectors = rho[:, None] * (
             np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
         )
-    return detect_families(surface, RosyField(directions.shape[1], vectors, direction_ratios))
+    field = RosyField(directions.shape[1], vectors, direction_ratios)
+    return (yield from subtask(detect_families_task(surface, field), 0.6, 1.0, label))
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -140,16 +162,17 @@ def _relative_angles(w: np.ndarray) -> np.ndarray:
     return relative
 
 
-def detect_families(surface: Surface, field: RosyField) -> RosyField:
+def detect_families_task(surface: Surface, field: RosyField) -> Task[RosyField]:
     """Set the `family_count` of a field.
 
     It becomes the number of lines if the stored members are on matching lines across at least
     `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
     """
+    yield Progress(0.0, "matching directions")
     line_count = field_symmetry(field).line_count
     if line_count == 1:
         return field
-    faces, matching = field_matching(surface, field)
+    faces, matching = yield from field_matching_task(surface, field)
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
     if not defined.any() or np.mean(matching[defined] % line_count == 0) < MIN_FAMILY_AGREEMENT:
         return field
@@ -209,6 +232,11 @@ def field_symmetry(field: RosyField) -> FieldSymmetry:
 
 
 def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
+    """Run `tensor_field_task` to its end."""
+    return run_to_completion(tensor_field_task(surface, tensors))
+
+
+def tensor_field_task(surface: Surface, tensors: np.ndarray) -> Task[RosyField]:
     """Make a field of degree 4 from the eigenvectors of tensors restricted to the faces.
 
     Parameters
@@ -224,7 +252,18 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
         The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
         zero where the two eigenvalues are equal.
     """
+    label = "reading directions"
+    yield Progress(0.0, label)
     x, y = face_frames(surface)
+    task = by_rows_task(_tensor_directions, tensors, x, y, label=label)
+    vectors, direction_ratios = yield from subtask(task, 0.3, 1.0)
+    return RosyField(4, vectors, direction_ratios, 2)
+
+
+def _tensor_directions(
+    tensors: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)
@@ -241,10 +280,15 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
     direction_ratios = np.stack(
         [major_ratio, 2 - major_ratio, major_ratio, 2 - major_ratio], axis=1
     ).astype(np.complex128)
-    return RosyField(4, vectors, direction_ratios, 2)
+    return vectors, direction_ratios
 
 
 def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
+    """Run `field_matching_task` to its end."""
+    return run_to_completion(field_matching_task(surface, field))
+
+
+def field_matching_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Match the members of neighboring faces across each interior edge.
 
     Returns
@@ -256,13 +300,20 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
         one when the two faces are unfolded into a plane. Members are counted counter-clockwise from
         the stored ones. The same holds for directions.
     """
+    label = "matching directions"
+    yield Progress(0.0, label)
     x, y = face_frames(surface)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    yield Progress(0.1, label)
+    task = edges_task(surface.corner_vertex, surface.face_start)
+    edges = yield from subtask(task, 0.2, 0.3, label)
+    yield Progress(0.3, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)
-    closest_angle = matching_angles(surface, x, y, z, field.degree, a, b)
-    stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b)
+    task = matching_angles_task(surface, x, y, z, field.degree, a, b, label)
+    closest_angle = yield from subtask(task, 0.4, 0.7)
+    task = matching_angles_task(surface, x, y, z_stored, 1, a, b, label)
+    stored_angle = yield from subtask(task, 0.7, 1.0)
     matching = (
         np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
         % field.degree

@@ -10,19 +10,20 @@ import numpy as np
 
 from ..errors import RosyError
 from ..file_io import check_parsing_memory
-from .formats.obj import read_obj
-from .formats.off import read_off
-from .formats.ply import read_ply
+from ..progress import Task, run_to_completion, subtask
+from .formats.obj import read_obj_task
+from .formats.off import read_off_task
+from .formats.ply import read_ply_task
 from .formats.polygons import Polygons
-from .formats.stl import read_stl
-from .surface import Surface, build_surface
+from .formats.stl import read_stl_task
+from .surface import Surface, surface_task
 
 #: The reader of each file name extension.
-READERS: dict[str, Callable[[Path], Polygons]] = {
-    ".obj": read_obj,
-    ".off": read_off,
-    ".ply": read_ply,
-    ".stl": read_stl,
+READERS: dict[str, Callable[[Path], Task[Polygons]]] = {
+    ".obj": read_obj_task,
+    ".off": read_off_task,
+    ".ply": read_ply_task,
+    ".stl": read_stl_task,
 }
 
 #: Bytes of memory that a byte of a binary file takes until its surface is built.
@@ -35,6 +36,16 @@ SHARP_ANGLE = np.radians(60)
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Surface:
+    """Read a mesh from a file; see `read_mesh_task`.
+
+    Examples
+    --------
+    >>> surface = read_mesh("bunny.obj")
+    """
+    return run_to_completion(read_mesh_task(path))
+
+
+def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
     """Read a mesh from an .obj, .off, .ply or .stl file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
@@ -55,10 +66,6 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
     RosyError
         If the file is missing, has another extension, is malformed or truncated, needs more memory
         than there is, or is not a mesh with faces. The message names the file and, in text files, the line.
-
-    Examples
-    --------
-    >>> surface = read_mesh("bunny.obj")
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -68,5 +75,6 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
-    polygons = reader(path)
-    return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    polygons = yield from subtask(reader(path), 0.0, 0.5)
+    task = surface_task(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    return (yield from subtask(task, 0.5, 1.0))

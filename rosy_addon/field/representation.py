@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..progress import Task
+from .blocks import by_rows_task
 from .frames import dot, normalize
 from .rosy_field import RosyField
 from .surface import Surface, face_blocks, next_corners
@@ -151,3 +153,21 @@ def matching_angles(
     modulus = np.abs(unfolding)
     unfolding = np.divide(unfolding, modulus, out=np.ones_like(unfolding), where=modulus > 0)
     return np.angle(z[target_face] * (z[source_face] * power(unfolding, degree)).conj()) / degree
+
+
+def matching_angles_task(
+    surface: Surface,
+    x: np.ndarray,
+    y: np.ndarray,
+    z: np.ndarray,
+    degree: int,
+    a: np.ndarray,
+    b: np.ndarray,
+    label: str,
+) -> Task[np.ndarray]:
+    """`matching_angles` in steps, with the label of their progress."""
+
+    def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return matching_angles(surface, x, y, z, degree, a, b)
+
+    return (yield from by_rows_task(angles, a, b, label=label))

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import counted
-from ..progress import Progress, Task, run_to_completion
+from ..progress import Progress, Task, run_to_completion, subtask
 from .frames import dot
-from .representation import face_frames, matching_angles, to_representation
+from .representation import face_frames, matching_angles_task, to_representation
 from .rosy_field import RosyField
-from .surface import Surface, build_edges
+from .surface import Surface, build_edges, edges_task, face_blocks, next_corners
 
 
 def euler_characteristic(surface: Surface) -> int:
@@ -56,11 +56,15 @@ def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndar
     label = "counting singularities"
     yield Progress(0.0, label)
     x, y = face_frames(surface)
+    yield Progress(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    yield Progress(0.2, label)
+    task = edges_task(surface.corner_vertex, surface.face_start)
+    edges = yield from subtask(task, 0.2, 0.3, label)
     yield Progress(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    matching = matching_angles(surface, x, y, z, field.degree, a, b)
+    task = matching_angles_task(surface, x, y, z, field.degree, a, b, label)
+    matching = yield from subtask(task, 0.4, 0.7)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
     yield Progress(0.7, label)
@@ -68,9 +72,10 @@ def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndar
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
-    angle_defect = 2 * np.pi - np.bincount(
-        corner_vertex, _signed_corner_angles(surface, x, y), count
-    )
+    yield Progress(0.8, label)
+    corner_angles = yield from subtask(_signed_corner_angles_task(surface, x, y), 0.8, 0.9, label)
+    angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
+    yield Progress(0.9, label)
     angle_sum = angle_sum + angle_defect
     index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
 
@@ -112,12 +117,16 @@ def description_task(
     return ", ".join(parts)
 
 
-def _signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _signed_corner_angles_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[np.ndarray]:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
-    points = surface.vertices[surface.corner_vertex]
-    edge = points[surface.next_corner] - points
-    face = surface.corner_face
-    to_next = dot(edge, x[face]) + 1j * dot(edge, y[face])
-    to_previous = np.empty_like(to_next)
-    to_previous[surface.next_corner] = -to_next
-    return np.angle(to_previous * to_next.conj()) % (2 * np.pi)
+    angles = np.empty(len(surface.corner_vertex))
+    for faces, corners, starts in face_blocks(surface.face_start):
+        yield Progress(faces.start / surface.face_count, "measuring angles")
+        points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
+        edge = points[following] - points
+        face = surface.corner_face[corners]
+        to_next = dot(edge, x[face]) + 1j * dot(edge, y[face])
+        to_previous = np.empty_like(to_next)
+        to_previous[following] = -to_next
+        angles[corners] = np.angle(to_previous * to_next.conj()) % (2 * np.pi)
+    return angles

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import RosyError, counted
 from ..progress import Progress, Task, run_to_completion, subtask
 from .frames import dot, normalize
-from .triangulate import triangulate
+from .triangulate import triangulate_task
 
 #: Largest coordinate and smallest extent of a mesh. Beyond them, squares and products of lengths
 #: leave the range of floating-point numbers.
@@ -197,8 +197,8 @@ def surface_task(
     _check_polygons(name, vertices, corner_vertex, face_start)
     yield Progress(0.1, "reading the mesh")
     if triangles is None:
-        triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
-        yield Progress(0.3, "triangulating the mesh")
+        task = triangulate_task(vertices, corner_vertex, face_start)
+        triangles, triangle_face = yield from subtask(task, 0.1, 0.3)
     if corner_fan is None:
         task = smooth_fans_task(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
@@ -206,7 +206,8 @@ def surface_task(
         corner_fan = yield from subtask(task, 0.3, 0.8)
     yield Progress(0.8, "computing normals")
     if corner_normal is None:
-        corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
+        task = _fan_normals_task(vertices, corner_vertex, face_start, corner_fan)
+        corner_normal = yield from subtask(task, 0.8, 1.0)
     return Surface(
         name=name,
         vertices=vertices,
@@ -236,11 +237,10 @@ def smooth_fans_task(
     """
     label = "finding smooth edges"
     yield Progress(0.0, label)
-    edges = build_edges(corner_vertex, face_start)
-    yield Progress(0.4, label)
-    pairs = _smooth_corner_pairs(
-        edges, vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+    task = _smooth_corner_pairs_task(
+        vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
     )
+    pairs = yield from subtask(task, 0.0, 0.5, label)
     yield Progress(0.5, label)
     return (
         yield from subtask(connected_components_task(len(corner_vertex), pairs), 0.5, 1.0, label)
@@ -353,19 +353,29 @@ class Edges:
 
 
 def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
+    """Run `edges_task` to its end."""
+    return run_to_completion(edges_task(corner_vertex, face_start))
+
+
+def edges_task(corner_vertex: np.ndarray, face_start: np.ndarray) -> Task[Edges]:
     """Find the edges of a polygon mesh; the parameters are arrays of `Surface`."""
+    label = "finding edges"
+    yield Progress(0.0, label)
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
+    yield Progress(0.2, label)
     key, corner_by_edge = _sorted_with_order(
         np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
     )
+    yield Progress(0.6, label)
     is_first = np.ones(len(key), dtype=bool)
     np.not_equal(key[1:], key[:-1], out=is_first[1:])
     first = np.flatnonzero(is_first)
     edge_key, face_count = key[first], np.diff(first, append=len(key))
     corner_edge = np.empty(len(key), dtype=np.int32)
     corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
+    yield Progress(0.8, label)
     interior = np.flatnonzero(face_count == 2)
     a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
@@ -453,16 +463,18 @@ def _check_polygons(
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
 
 
-def _smooth_corner_pairs(
-    edges: Edges,
+def _smooth_corner_pairs_task(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
     sharp_edges: np.ndarray | None,
     sharp_angle: float | None,
     flat_faces: np.ndarray | None,
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(K, 2) pairs of corners at the same vertex of two faces that share a smooth edge."""
+    label = "finding smooth edges"
+    edges = yield from subtask(edges_task(corner_vertex, face_start), 0.0, 0.4, label)
+    yield Progress(0.4, label)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     smooth = np.ones(len(a), dtype=bool)
@@ -471,6 +483,7 @@ def _smooth_corner_pairs(
         smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
     if sharp_angle is not None:
         normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
+        yield Progress(0.7, label)
         smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
     if sharp_edges is not None and len(sharp_edges):
         stride = int(corner_vertex.max()) + 1
@@ -539,25 +552,30 @@ def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
     np.minimum.at(values, index, limits)
 
 
-def _fan_normals(
+def _fan_normals_task(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(C, 3) unit corner normals: face normals averaged over each fan, weighted by corner angle.
 
     Where the mean is zero, the face normal; (0, 0, 1) if that is zero, too.
     """
+    label = "computing normals"
     angle = np.empty(len(corner_vertex))
-    for _, corners, starts in face_blocks(face_start):
+    for faces, corners, starts in face_blocks(face_start):
+        yield Progress(0.5 * faces.start / len(face_start), label)
         points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
         following = next_corners(starts)
         to_next = normalize(points[following] - points)
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
         angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
+    yield Progress(0.5, label)
     face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
+    yield Progress(0.7, label)
     face = corner_faces(face_start)
     fan_count = int(corner_fan.max()) + 1
     total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
+    yield Progress(0.8, label)
     normal = normalize(np.stack(total, axis=1))[corner_fan]
     undefined = ~normal.any(axis=1)
     normal[undefined] = face_normal[face[undefined]]

@@ -6,16 +6,31 @@ import heapq
 
 import numpy as np
 
+from ..progress import Progress, Task, run_to_completion
+
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
 
 #: Corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
 
+#: The label of the steps.
+LABEL = "triangulating the mesh"
+
+#: Faces whose corners are compared in a step.
+FACES_PER_STEP = 1 << 14
+
 
 def triangulate(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Run `triangulate_task` to its end."""
+    return run_to_completion(triangulate_task(vertices, corner_vertex, face_start))
+
+
+def triangulate_task(
+    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Split each face with k corners into k - 2 triangles, in the order of the faces.
 
     Triangles of a concave face lie inside it, and collinear corners cause no triangles without
@@ -47,11 +62,14 @@ def triangulate(
     faces = np.flatnonzero(size > 3)
     ear_faces = faces[:0]
     if len(faces):
-        apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
+        task = _fan_apexes_task(vertices, corner_vertex, face_start, faces)
+        apex[faces], needs_ears = yield from task
         ear_faces = faces[needs_ears]
+    yield Progress(0.7, LABEL)
     triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)
-    for face in ear_faces:
+    for rank, face in enumerate(ear_faces):
+        yield Progress(0.8 + 0.2 * rank / len(ear_faces), LABEL)
         corners = np.arange(face_start[face], face_start[face + 1])
         ears = _ear_clip(_project_to_plane(vertices[corner_vertex[corners]]))
         first = first_triangle[face]
@@ -74,9 +92,9 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     return (first[:, None] + local_corners).astype(np.int32), triangle_face
 
 
-def _fan_apexes(
+def _fan_apexes_task(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, faces: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Choose the apex of the fan of each face, and find the faces that need ear clipping.
 
     Parameters
@@ -95,14 +113,18 @@ def _fan_apexes(
     apex = np.zeros(len(faces), dtype=np.int32)
     needs_ears = np.zeros(len(faces), dtype=bool)
     for count in np.unique(size):
-        group = np.flatnonzero(size == count)
-        corners = face_start[faces[group]][:, None] + np.arange(count)
-        sine = _corner_sines(vertices[corner_vertex[corners]])
-        sharpest = np.argmin(sine, axis=1)
-        not_convex = sine.min(axis=1) <= COLLINEAR_SINE
-        apex[group] = np.where(not_convex, sharpest, 0)
-        if count > 4:
-            needs_ears[group] = (sine <= COLLINEAR_SINE).sum(axis=1) > 1
+        same_size = np.flatnonzero(size == count)
+        block_size = max(FACES_PER_STEP * 4 // int(count), 1)
+        for start in range(0, len(same_size), block_size):
+            yield Progress(0.7 * start / len(same_size), LABEL)
+            group = same_size[start : start + block_size]
+            corners = face_start[faces[group]][:, None] + np.arange(count)
+            sine = _corner_sines(vertices[corner_vertex[corners]])
+            sharpest = np.argmin(sine, axis=1)
+            not_convex = sine.min(axis=1) <= COLLINEAR_SINE
+            apex[group] = np.where(not_convex, sharpest, 0)
+            if count > 4:
+                needs_ears[group] = (sine <= COLLINEAR_SINE).sum(axis=1) > 1
     return apex, needs_ears
 
 

@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import RosyError, counted
-from .corner_fans import corner_angles, corner_rotations
+from ..progress import Progress, Task, run_to_completion, subtask
+from .blocks import by_rows_task, row_blocks
+from .corner_fans import corner_angles_task, corner_rotations_task
 from .directional_field import (
     closest_rosy,
-    detect_families,
-    field_from_directions,
+    detect_families_task,
+    field_from_directions_task,
     is_rosy,
     ratio_harmonics,
     ratios_from_harmonics,
@@ -47,6 +49,9 @@ MAX_COMPONENT = 1e30
 #: Vectors whose components are all smaller count as zero, because products would underflow.
 MIN_COMPONENT = 1e-30
 
+#: The label of the steps in which vectors are checked.
+LABEL = "checking the field"
+
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
 #: rounding error of float32, which Blender stores, so such vectors survive a round trip through
 #: files.
@@ -61,6 +66,20 @@ def validated_field(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
+    """Run `validated_field_task` to its end."""
+    return run_to_completion(
+        validated_field_task(surface, vectors, degree, source, nonfinite, domain)
+    )
+
+
+def validated_field_task(
+    surface: Surface,
+    vectors: np.ndarray,
+    degree: int,
+    source: str,
+    nonfinite: str = "error",
+    domain: str | None = None,
+) -> Task[RosyField]:
     """Make a field from one member vector for each face or vertex, after checking them.
 
     Vectors slightly off the tangent plane are rotated into it and keep their length. Vertex values
@@ -104,13 +123,15 @@ def validated_field(
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    normal = tangent_normals(surface, domain)
+    yield Progress(0.0, LABEL)
+    normal = yield from subtask(tangent_normals_task(surface, domain), 0.0, 0.4, LABEL)
     if domain == "face":
-        return RosyField(
-            degree, project_to_tangent(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
-        )
-    vectors = project_to_tangent(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
-    return RosyField(degree, _average_to_faces(surface.in_rest_shape(), vectors, normal, degree))
+        task = project_to_tangent_task(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
+        return RosyField(degree, (yield from subtask(task, 0.4, 1.0)))
+    task = project_to_tangent_task(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
+    vectors = yield from subtask(task, 0.4, 0.6)
+    task = _average_to_faces_task(surface.in_rest_shape(), vectors, normal, degree)
+    return RosyField(degree, (yield from subtask(task, 0.6, 1.0)))
 
 
 def validated_directions(
@@ -120,6 +141,19 @@ def validated_directions(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
+    """Run `validated_directions_task` to its end."""
+    return run_to_completion(
+        validated_directions_task(surface, directions, source, nonfinite, domain)
+    )
+
+
+def validated_directions_task(
+    surface: Surface,
+    directions: np.ndarray,
+    source: str,
+    nonfinite: str = "error",
+    domain: str | None = None,
+) -> Task[RosyField]:
     """Make a field from N directions for each face or vertex, after checking them.
 
     The directions need not be a RoSy.
@@ -145,39 +179,56 @@ def validated_directions(
     directions = np.array(directions, dtype=np.float64)
     count, degree = directions.shape[:2]
     domain = infer_domain(surface, count) if domain is None else domain
-    unusable = ~has_finite_square(directions).all(axis=(1, 2))
-    usable_directions = np.where(unusable[:, None, None], 0.0, directions)
+
+    def usable_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        unusable = ~has_finite_square(rows).all(axis=(1, 2))
+        return unusable, np.where(unusable[:, None, None], 0.0, rows)
+
+    task = by_rows_task(usable_rows, directions, label=LABEL)
+    unusable, usable_directions = yield from subtask(task, 0.0, 0.1)
     source_directions = usable_directions if domain == "face" else None
     directions[unusable] = np.nan
     count_matches = domain is not None and count == _element_count(surface, domain)
+    are_rosys = True
     if count_matches:
-        normal = tangent_normals(surface, domain)
-        x, y = tangent_frame(normal)
-        w = dot(usable_directions, x[:, None]) + 1j * dot(usable_directions, y[:, None])
-    if not count_matches or is_rosy(w):
+        normal = yield from subtask(tangent_normals_task(surface, domain), 0.1, 0.2, LABEL)
+        for rows in row_blocks(count):
+            yield Progress(0.2 + 0.1 * rows.start / count, LABEL)
+            x, y = tangent_frame(normal[rows])
+            usable = usable_directions[rows]
+            are_rosys &= is_rosy(dot(usable, x[:, None]) + 1j * dot(usable, y[:, None]))
+            if not are_rosys:
+                break
+    yield Progress(0.3, LABEL)
+    if are_rosys:
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
-        field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        task = validated_field_task(surface, vectors, degree, source, nonfinite, domain)
+        field = yield from subtask(task, 0.3, 0.6)
+        task = detect_families_task(surface.in_rest_shape(), field)
         return replace(
-            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
+            (yield from subtask(task, 0.6, 1.0, LABEL)), source_directions=source_directions
         )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
+    yield Progress(0.3, LABEL)
     tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    directions = project_to_tangent(
-        flat_directions, normals, tolerance_deg, source, domain
-    ).reshape(count, degree, 3)
+    task = project_to_tangent_task(flat_directions, normals, tolerance_deg, source, domain)
+    directions = (yield from subtask(task, 0.3, 0.5)).reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
+        task = field_from_directions_task(surface, directions)
         return replace(
-            field_from_directions(surface, directions), source_directions=source_directions
+            (yield from subtask(task, 0.5, 1.0, LABEL)), source_directions=source_directions
         )
-    return detect_families(surface, _average_directions_to_faces(surface, directions, normal))
+    task = _average_directions_to_faces_task(surface, directions, normal)
+    field = yield from subtask(task, 0.5, 0.8)
+    return (yield from subtask(detect_families_task(surface, field), 0.8, 1.0, LABEL))
 
 
-def _average_directions_to_faces(
+def _average_directions_to_faces_task(
     surface: Surface, directions: np.ndarray, normal: np.ndarray
-) -> RosyField:
+) -> Task[RosyField]:
     """Average (V, N, 3) directions onto the faces, as means of z and of each harmonic.
 
     (V, 3) `normal` are the vertex normals.
@@ -185,21 +236,34 @@ def _average_directions_to_faces(
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-    first_angle, rho, direction_ratios = closest_rosy(w)
+    yield Progress(0.0, LABEL)
+    task = by_rows_task(closest_rosy, w, label=LABEL)
+    first_angle, rho, direction_ratios = yield from subtask(task, 0.0, 0.2)
     face_x, face_y = face_frames(surface)
-    corner_normal = normal[surface.corner_vertex]
-    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+    yield Progress(0.3, LABEL)
+    task = corner_rotations_task(
+        surface.face_normal,
+        face_x,
+        surface.corner_face,
+        normal[surface.corner_vertex],
+        LABEL,
+    )
+    rotation = yield from subtask(task, 0.3, 0.5)
 
     def corner_mean(values: np.ndarray, order: int) -> np.ndarray:
         face_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
         return mean_per_face(face_values, surface.face_start)
 
     z = corner_mean(rho * np.exp(1j * degree * first_angle), degree)
+    yield Progress(0.6, LABEL)
     member = np.exp(1j * np.angle(z) / degree)
-    coefficients = {
-        j: corner_mean(values * np.exp(-1j * j * first_angle), -j) * signed_power(member, j)
-        for j, values in ratio_harmonics(direction_ratios).items()
-    }
+    harmonics = ratio_harmonics(direction_ratios)
+    coefficients = {}
+    for j, values in harmonics.items():
+        yield Progress(0.7 + 0.2 * len(coefficients) / len(harmonics), LABEL)
+        mean = corner_mean(values * np.exp(-1j * j * first_angle), -j)
+        coefficients[j] = mean * signed_power(member, j)
+    yield Progress(0.9, LABEL)
     vectors = from_representation(z, face_x, face_y, degree)
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
@@ -220,6 +284,11 @@ def infer_domain(surface: Surface, count: int) -> str | None:
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
+    """Run `tangent_normals_task` to its end."""
+    return run_to_completion(tangent_normals_task(surface, domain))
+
+
+def tangent_normals_task(surface: Surface, domain: str) -> Task[np.ndarray]:
     """The normals of the tangent planes of faces or vertices, in the rest shape.
 
     Returns
@@ -229,10 +298,18 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
         on vertices without a face.
     """
     surface = surface.in_rest_shape()
-    return surface.face_normal if domain == "face" else vertex_normals(surface)
+    yield Progress(0.0, "computing normals")
+    if domain == "face":
+        return surface.face_normal
+    return (yield from vertex_normals_task(surface))
 
 
 def vertex_normals(surface: Surface) -> np.ndarray:
+    """Run `vertex_normals_task` to its end."""
+    return run_to_completion(vertex_normals_task(surface))
+
+
+def vertex_normals_task(surface: Surface) -> Task[np.ndarray]:
     """Average the face normals around each vertex, weighted by corner angle.
 
     Sharp edges are ignored. The normals are those of `Surface.vertices`, the deformed shape.
@@ -243,7 +320,12 @@ def vertex_normals(surface: Surface) -> np.ndarray:
         Unit normals; zero on vertices without a face.
     """
     count = len(surface.vertices)
-    weighted = surface.face_normal[surface.corner_face] * corner_angles(surface)[:, None]
+    label = "computing normals"
+    angles = yield from subtask(corner_angles_task(surface), 0.0, 0.5, label)
+    face_normal = surface.face_normal
+    yield Progress(0.7, label)
+    weighted = face_normal[surface.corner_face] * angles[:, None]
+    yield Progress(0.8, label)
     columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
     return normalize(np.stack(columns, axis=1))
 
@@ -251,6 +333,15 @@ def vertex_normals(surface: Surface) -> np.ndarray:
 def project_to_tangent(
     vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
 ) -> np.ndarray:
+    """Run `project_to_tangent_task` to its end."""
+    return run_to_completion(
+        project_to_tangent_task(vectors, normal, tolerance_deg, source, domain)
+    )
+
+
+def project_to_tangent_task(
+    vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
+) -> Task[np.ndarray]:
     """Project vectors to tangent planes and restore their length.
 
     Parameters
@@ -272,20 +363,26 @@ def project_to_tangent(
     RosyError
         If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
-    length = np.sqrt(dot(vectors, vectors))
-    normal_component = dot(vectors, normal)
-    sine = np.divide(
-        np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
-    )
-    angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
+    tangent, angle, is_zero = yield from by_rows_task(_project, vectors, normal, label=LABEL)
     outlier = angle > tolerance_deg
-    if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(length):
+    if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(~is_zero):
         worst = int(np.argmax(angle))
         raise RosyError(
             f"{source}: {outlier.sum()} of {len(vectors)} vectors are not tangent to the surface: they "
             f"are more than {tolerance_deg:g} degrees off, {domain} {worst} by {angle[worst]:.1f} "
             "degrees. It belongs to another mesh or another shape of it: make or import it again"
         )
+    return tangent
+
+
+def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return projected vectors, their angles to the planes in degrees, and whether they are zero."""
+    length = np.sqrt(dot(vectors, vectors))
+    normal_component = dot(vectors, normal)
+    sine = np.divide(
+        np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
+    )
+    angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
     # The projection of a vector parallel to the normal is only rounding error.
     tangent = np.where(
         (sine < 1 - 1e-12)[:, None], vectors - normal_component[:, None] * normal, 0.0
@@ -293,7 +390,7 @@ def project_to_tangent(
     tangent = np.where(
         (sine > ROUNDING_SINE)[:, None], normalize(tangent) * length[:, None], vectors
     )
-    return np.where(normal.any(axis=1)[:, None], tangent, 0.0)
+    return np.where(normal.any(axis=1)[:, None], tangent, 0.0), angle, length == 0
 
 
 def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
@@ -343,16 +440,19 @@ def has_finite_square(values: np.ndarray) -> np.ndarray:
         return np.abs(values) < MAX_COMPONENT
 
 
-def _average_to_faces(
+def _average_to_faces_task(
     surface: Surface, vectors: np.ndarray, normal: np.ndarray, degree: int
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(F, 3) members of the mean RoSy of the vertices of each face, transported to its plane.
 
     (V, 3) `vectors` are members at the vertices, (V, 3) `normal` the vertex normals.
     """
     z = to_representation(vectors, *tangent_frame(normal), degree)[surface.corner_vertex]
+    yield Progress(0.0, LABEL)
     x, y = face_frames(surface)
+    yield Progress(0.2, LABEL)
     corner_normal = normal[surface.corner_vertex]
-    rotation = corner_rotations(surface.face_normal, x, surface.corner_face, corner_normal)
+    task = corner_rotations_task(surface.face_normal, x, surface.corner_face, corner_normal, LABEL)
+    rotation = yield from subtask(task, 0.2, 0.8)
     mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)
     return from_representation(mean, x, y, degree)

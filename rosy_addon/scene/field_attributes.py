@@ -23,6 +23,7 @@ from ..cache import Cache, content_hash
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..progress import Task, run_to_completion
 from .compat import has_rosy_properties
 
 DEFAULT_FIELD_NAME = "rosy"
@@ -144,10 +145,29 @@ def cached_field(
     cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
 ) -> RosyField:
     """Return the cached field for a surface and other inputs, or build it."""
-    if cache is None:
+
+    def build_task() -> Task[RosyField]:
+        yield from ()
         return build_field()
+
+    return run_to_completion(cached_field_task(cache, surface, build_task, *key_parts))
+
+
+def cached_field_task(
+    cache: Cache | None,
+    surface: Surface,
+    build_task: Callable[[], Task[RosyField]],
+    *key_parts: object,
+) -> Task[RosyField]:
+    """Return the cached field for a surface and other inputs, or build it in steps."""
+    if cache is None:
+        return (yield from build_task())
     key = surface_key(surface, *key_parts)
-    return cache.get_or_create(key, lambda: (surface, build_field()))[1]
+
+    def create_task() -> Task[tuple[Surface, RosyField]]:
+        return surface, (yield from build_task())
+
+    return (yield from cache.get_or_create_task(key, create_task))[1]
 
 
 def surface_key(surface: Surface, *key_parts: object) -> Hashable:

@@ -320,6 +320,60 @@ def field_stopped_with_escape():
     assert contents() == before and bpy.context.object.data.rosy.degree == 4
 
 
+def start_exchange(operator, path):
+    """Return a function that starts the import or the export of a field with many faces."""
+
+    def start():
+        with in_view():
+            bpy.context.object.modifiers["Subdivision"].levels = 4
+            bpy.ops.object.modifier_apply(modifier="Subdivision")
+            if operator.idname_py() == "rosy.field_import":
+                bpy.ops.rosy.field_export("EXEC_DEFAULT", filepath=str(path))
+                mesh = bpy.context.object.data
+                mesh.attributes.remove(mesh.attributes["rosy"])
+            bpy.ops.ed.undo_push(message="subdivided")
+        yield from start_task(operator, filepath=str(path), skip_browser=True)
+
+    return start
+
+
+def import_stopped_with_escape():
+    start = start_exchange(bpy.ops.rosy.field_import, SHOTS / "import.txt")
+    yield from check_interruption(press_escape, start, unchanged=False)
+    assert "rosy" not in bpy.context.object.data.attributes
+
+
+def export_stopped_with_escape():
+    path = SHOTS / "export.txt"
+    path.write_bytes(b"old")
+    before = sorted(SHOTS.iterdir())
+    start = start_exchange(bpy.ops.rosy.field_export, path)
+    yield from check_interruption(press_escape, start, unchanged=False)
+    assert path.read_bytes() == b"old" and sorted(SHOTS.iterdir()) == before
+
+
+def export_and_import_from_the_file_browser():
+    """The file browser opens; after its confirmation the operators run as modal tasks."""
+    yield from fresh_scene()
+    make_field()
+    path = SHOTS / "browser.rosy"
+    path.unlink(missing_ok=True)
+    for operator in (bpy.ops.rosy.field_export, bpy.ops.rosy.field_import):
+        with in_view():
+            assert operator("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+        yield 1.0
+        params = browser_params()
+        params.directory, params.filename = str(SHOTS).encode(), path.name
+        if operator.idname_py() == "rosy.field_import":
+            bpy.context.object.data.attributes.remove(bpy.context.object.data.attributes["rosy"])
+        yield 0.5
+        press_return()
+        yield from wait_until(lambda: path.is_file() and status().current is None)
+        yield 0.5
+        check_idle()
+    yield from wait_until(lambda: "rosy" in bpy.context.object.data.attributes)
+
+
 def start_turntable(name, pictures, size=(160, 120)):
     """Start a turntable in a fresh scene, as after the choice of a file. Return its path."""
     yield from fresh_scene()
@@ -604,6 +658,9 @@ run_steps(
     stop_with_escape,
     strokes_stopped_with_escape,
     field_stopped_with_escape,
+    import_stopped_with_escape,
+    export_stopped_with_escape,
+    export_and_import_from_the_file_browser,
     turntable_with_progress,
     turntable_stopped_with_escape,
     turntable_encoded_by_another_blender,

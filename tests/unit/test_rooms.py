@@ -36,7 +36,7 @@ MAY_IMPORT = {
     "processes": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
-    "file_io": {"errors", "memory"},
+    "file_io": {"errors", "memory", "progress"},
     "settings": {"errors"},
     "field": BASE_ROOMS,
     "projection": BASE_ROOMS | {"field"},

@@ -10,13 +10,17 @@ https://github.com/GeometryCollective/fieldgen.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ..corner_fans import corner_angles, corner_rotations
+from ...progress import Progress, Task, subtask
+from ..blocks import row_blocks
+from ..corner_fans import corner_angles_task, corner_rotations_task
 from ..frames import tangent_frame
 from ..representation import (
     complex_bincount,
@@ -27,13 +31,13 @@ from ..representation import (
 )
 from ..rosy_field import RosyField, check_degree
 from ..surface import Surface
-from ..validate import vertex_normals
-from .obj import read_obj
+from ..validate import vertex_normals_task
+from .obj import read_obj_task
 from .raw_field import RawField
-from .text_rows import TextRows, format_rows, read_rows
+from .text_rows import LABEL, ROWS_PER_STEP, TextRows, format_blocks, format_rows, read_rows_task
 
 
-def read_fieldgen(path: Path) -> RawField:
+def read_fieldgen_task(path: Path) -> Task[RawField]:
     """Read the mesh and the field of a fieldgen file.
 
     Returns
@@ -48,15 +52,15 @@ def read_fieldgen(path: Path) -> RawField:
         line for each vertex.
     """
     data = read_bytes(path, reject_binary=True)
-    polygons = read_obj(path)
-    rows = read_rows(path, comment=None, data=data)
-    comments = [
-        (row, words[words[0] == b"#" :])
-        for row, words in enumerate(rows.words)
-        if words[0].startswith(b"#")
-    ]
+    polygons = yield from subtask(read_obj_task(path), 0.0, 0.5)
+    rows = yield from subtask(read_rows_task(path, comment=None, data=data), 0.5, 0.7)
     degree, vertex_lines = None, []
-    for row, words in comments:
+    for row, words in enumerate(rows.words):
+        if row % ROWS_PER_STEP == 0:
+            yield Progress(0.7 + 0.1 * row / len(rows), LABEL)
+        if not words[0].startswith(b"#"):
+            continue
+        words = words[words[0] == b"#" :]
         kind = words[0].lstrip(b"#") if words else b""
         if kind == b"degree" and len(words) == 2 and degree is None:
             try:
@@ -72,7 +76,10 @@ def read_fieldgen(path: Path) -> RawField:
         [words for _, words in vertex_lines],
         [rows.line_numbers[row] for row, _ in vertex_lines],
     )
-    numbers = vertex_rows.floats("part of a vector").reshape(-1, 4)
+    yield Progress(0.8, LABEL)
+    numbers = yield from subtask(vertex_rows.floats_task("part of a vector"), 0.8, 1.0)
+    yield Progress(1.0, LABEL)
+    numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
     if vertex.min() < 0 or vertex.max() >= count or len(np.unique(vertex)) != count:
@@ -80,42 +87,58 @@ def read_fieldgen(path: Path) -> RawField:
             f"{path}: expected one '# field' line for each of {count} vertices, found "
             f"{counted(len(vertex), 'line')} for vertices {vertex.min() + 1} to {vertex.max() + 1}"
         )
+    yield Progress(1.0, LABEL)
     values = np.zeros((count, 1, 3))
     values[vertex, 0] = numbers[:, 1:]
     return RawField(values, degree, domain="vertex", polygons=polygons)
 
 
-def fieldgen_text(surface: Surface, field: RosyField) -> str:
-    """Format a mesh and a field as a fieldgen file.
+def fieldgen_text_task(surface: Surface, field: RosyField) -> Task[Iterator[str]]:
+    """Format a mesh and a field as a fieldgen file, in blocks of lines.
 
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
     It is zero where the mean is zero.
     """
+    label = "averaging the field at the vertices"
     count = len(surface.vertices)
-    angle = corner_angles(surface)
+    angle = yield from subtask(corner_angles_task(surface), 0.0, 0.2, label)
     face, vertex = surface.corner_face, surface.corner_vertex
-    normal = vertex_normals(surface)
+    normal = yield from subtask(vertex_normals_task(surface), 0.2, 0.5, label)
+    yield Progress(0.5, label)
     face_x, face_y = face_frames(surface)
+    yield Progress(0.6, label)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
-    rotation = power(
-        corner_rotations(surface.face_normal, face_x, face, normal[vertex]), field.degree
-    )
+    task = corner_rotations_task(surface.face_normal, face_x, face, normal[vertex], label)
+    rotation = power((yield from subtask(task, 0.6, 0.8)), field.degree)
+    yield Progress(0.8, label)
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     modulus = np.abs(mean)
     mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
+    yield Progress(0.9, label)
     member = from_representation(mean, *tangent_frame(normal), field.degree)
-    starts = surface.face_start
-    corners = [f"{v}//{v}" for v in (vertex + 1).tolist()]
-    return "\n".join(
-        [
-            *(f"v {line}" for line in format_rows(surface.vertices)),
-            *(f"vn {line}" for line in format_rows(normal)),
-            *(
-                f"f {' '.join(corners[start:stop])}"
-                for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True)
-            ),
-            f"# degree {field.degree}",
-            *(f"# field {number} {line}" for number, line in enumerate(format_rows(member), 1)),
-            "",
-        ]
+    return chain(
+        format_blocks(surface.vertices, "v "),
+        format_blocks(normal, "vn "),
+        _face_lines(surface),
+        [f"# degree {field.degree}\n"],
+        _field_lines(member),
     )
+
+
+def _face_lines(surface: Surface) -> Iterator[str]:
+    """Lines `f v//v ...` in blocks."""
+    for faces in row_blocks(surface.face_count, ROWS_PER_STEP):
+        starts = surface.face_start[faces.start : faces.stop + 1]
+        block = surface.corner_vertex[starts[0] : starts[-1]] + 1
+        corners = [f"{v}//{v}" for v in block.tolist()]
+        offsets = (starts - starts[0]).tolist()
+        yield "".join([f"f {' '.join(corners[a:b])}\n" for a, b in pairwise(offsets)])
+
+
+def _field_lines(member: np.ndarray) -> Iterator[str]:
+    """Lines `# field i x y z` in blocks."""
+    for rows in row_blocks(len(member), ROWS_PER_STEP):
+        lines = format_rows(member[rows])
+        yield "".join(
+            [f"# field {number} {line}\n" for number, line in enumerate(lines, rows.start + 1)]
+        )

@@ -6,16 +6,18 @@ Normals, materials and groups are ignored.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import counted
+from ...progress import Progress, Task, run_to_completion, subtask
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import TextRows, read_rows
+from .text_rows import LABEL, ROWS_PER_STEP, TextRows, read_rows_task
 
 
-def read_obj(path: Path) -> Polygons:
+def read_obj_task(path: Path) -> Task[Polygons]:
     """Read the vertices and faces (`v` and `f` lines) of an .obj file.
 
     Corners may have the forms v, v/vt, v//vn and v/vt/vn. Negative indices are relative to the last
@@ -26,19 +28,23 @@ def read_obj(path: Path) -> Polygons:
     RosyError
         If the file cannot be read, a line is malformed, or an index is out of range.
     """
-    rows = read_rows(path)
-    kinds = [words[0] for words in rows.words]
-    is_vertex = np.array([kind == b"v" for kind in kinds], dtype=bool)
-    is_face = np.array([kind == b"f" for kind in kinds], dtype=bool)
-    vertices = _select_rows(rows, is_vertex, 3).points("vertex")
+    rows = yield from subtask(read_rows_task(path), 0.0, 0.4)
+    is_vertex, is_face = yield from subtask(_rows_of_kinds_task(rows, b"v", b"f"), 0.4, 0.5)
+    vertex_rows = _select_rows(rows, is_vertex, 3)
+    yield Progress(0.5, LABEL)
+    vertices = yield from subtask(vertex_rows.points_task("vertex"), 0.5, 0.6)
+    yield Progress(0.6, LABEL)
     corners = _select_rows(rows, is_face)
+    yield Progress(0.6, LABEL)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
                 row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
             )
     sizes = [len(words) for words in corners.words]
-    index = _position_indices(corners).ints("vertex of a face")
+    positions = yield from subtask(_position_indices_task(corners), 0.6, 0.9)
+    index = yield from subtask(positions.ints_task("vertex of a face"), 0.9, 1.0)
+    yield Progress(1.0, LABEL)
     # A negative index is relative to the number of vertices above its line.
     vertices_so_far = np.cumsum(is_vertex)[is_face]
     corner_vertex = np.where(index < 0, index + np.repeat(vertices_so_far, sizes), index - 1)
@@ -52,6 +58,18 @@ def read_obj(path: Path) -> Polygons:
     return Polygons(vertices, corner_vertex, offsets_from_sizes(sizes))
 
 
+def _rows_of_kinds_task(rows: TextRows, *kinds: bytes) -> Task[list[np.ndarray]]:
+    """Whether the first word of each row is that of a kind: a (rows,) bool ndarray for each kind."""
+    masks = [np.zeros(len(rows), dtype=bool) for _ in kinds]
+    for start in range(0, len(rows), ROWS_PER_STEP):
+        yield Progress(start / len(rows), LABEL)
+        block = slice(start, start + ROWS_PER_STEP)
+        first_words = [words[0] for words in rows.words[block]]
+        for mask, kind in zip(masks, kinds, strict=True):
+            mask[block] = [word == kind for word in first_words]
+    return masks
+
+
 def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None = None) -> TextRows:
     """The selected rows without their first word, cut to at most `max_words` further words."""
     end = None if max_words is None else max_words + 1
@@ -63,16 +81,26 @@ def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None 
     )
 
 
-def _position_indices(corners: TextRows) -> TextRows:
+def _position_indices_task(corners: TextRows) -> Task[TextRows]:
     """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
-    joined = b"\n".join(b" ".join(words) for words in corners.words)
-    if b"/" not in joined:
-        return corners
-    lines = re.sub(rb"(?<=\d)/[-\d/]*(?=\s|$)", b"", joined).split(b"\n")
-    return TextRows(corners.path, [line.split() for line in lines], corners.line_numbers)
+    rows: list[Sequence[bytes]] = []
+    for start in range(0, len(corners), ROWS_PER_STEP):
+        yield Progress(start / len(corners), LABEL)
+        words = corners.words[start : start + ROWS_PER_STEP]
+        joined = b"\n".join(b" ".join(row) for row in words)
+        if b"/" in joined:
+            lines = re.sub(rb"(?<=\d)/[-\d/]*(?=\s|$)", b"", joined).split(b"\n")
+            words = [tuple(line.split()) for line in lines]
+        rows += words
+    return TextRows(corners.path, rows, corners.line_numbers)
 
 
 def read_uv(path: Path) -> np.ndarray | None:
+    """Run `read_uv_task` to its end."""
+    return run_to_completion(read_uv_task(path))
+
+
+def read_uv_task(path: Path) -> Task[np.ndarray | None]:
     """Read the texture coordinates (`vt` lines) of the corners of an .obj file.
 
     Returns
@@ -85,7 +113,7 @@ def read_uv(path: Path) -> np.ndarray | None:
     RosyError
         If only some of the corners have texture coordinates, or an index is out of range.
     """
-    rows = read_rows(path)
+    rows = yield from read_rows_task(path)
     is_uv = np.array([words[0] == b"vt" for words in rows.words], dtype=bool)
     is_face = np.array([words[0] == b"f" for words in rows.words], dtype=bool)
     if not is_uv.any():
@@ -94,14 +122,14 @@ def read_uv(path: Path) -> np.ndarray | None:
     for row, words in enumerate(table.words):
         if len(words) < 2:
             raise table.error(row, "a texture coordinate has fewer than 2 numbers")
-    uv = table.floats("texture coordinate").reshape(-1, 2)
+    uv = (yield from table.floats_task("texture coordinate")).reshape(-1, 2)
     corners = _select_rows(rows, is_face)
     words = [[word.split(b"/")[1:2] for word in line] for line in corners.words]
     for row, line in enumerate(words):
         if not all(word and word[0] for word in line):
             raise corners.error(row, "a corner has no texture coordinate")
     uv_rows = TextRows(path, [[word[0] for word in line] for line in words], corners.line_numbers)
-    index = uv_rows.ints("texture coordinate of a corner")
+    index = yield from uv_rows.ints_task("texture coordinate of a corner")
     coordinates_so_far = np.repeat(np.cumsum(is_uv)[is_face], [len(line) for line in words])
     uv_index = np.where(index < 0, index + coordinates_so_far, index - 1)
     out_of_range = (uv_index < 0) | (uv_index >= len(uv))

@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
+from ...progress import Progress, Task, subtask
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
 from .raw_field import RawField
-from .text_rows import format_rows, read_rows
+from .text_rows import LABEL, ROWS_PER_STEP, format_blocks, read_rows_task
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -28,7 +30,7 @@ _NPY_HEADERS = {
 }
 
 
-def read_text(path: Path) -> RawField:
+def read_text_task(path: Path) -> Task[RawField]:
     """Read a text file with rows of 3, 3 N or 9 numbers.
 
     Numbers are separated by commas or white space. ``#`` starts a comment.
@@ -39,7 +41,7 @@ def read_text(path: Path) -> RawField:
         If the file cannot be read, holds no numbers, or its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
-    rows = read_rows(path, data=data)
+    rows = yield from subtask(read_rows_task(path, data=data), 0.0, 0.4)
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
@@ -49,7 +51,9 @@ def read_text(path: Path) -> RawField:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    return _raw_field(rows.floats("part of a vector").reshape(-1, columns))
+    values = yield from subtask(rows.floats_task("part of a vector"), 0.4, 1.0)
+    yield Progress(1.0, LABEL)
+    return _raw_field(values.reshape(-1, columns))
 
 
 def _check_npy_size(data: bytes) -> None:
@@ -62,7 +66,7 @@ def _check_npy_size(data: bytes) -> None:
             raise ValueError(f"it declares the shape {shape}, which is more than it contains")
 
 
-def read_npy(path: Path) -> RawField:
+def read_npy_task(path: Path) -> Task[RawField]:
     """Read an `.npy` array of shape (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
 
     Raises
@@ -85,21 +89,26 @@ def read_npy(path: Path) -> RawField:
         raise RosyError(
             f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
+    yield Progress(0.5, LABEL)
     values = as_float64(values.reshape(len(values), -1))
     _check_columns(str(path), values.shape[1])
+    yield Progress(0.8, LABEL)
     return _raw_field(values)
 
 
-def directions_text(directions: np.ndarray) -> str:
-    """Format (F, N, 3) directions as text, 3 N numbers per row."""
-    return "\n".join([*format_rows(directions.reshape(len(directions), -1)), ""])
+def directions_text(directions: np.ndarray) -> Iterator[str]:
+    """Format (F, N, 3) directions as text, 3 N numbers per row, in blocks of lines."""
+    return format_blocks(directions.reshape(len(directions), -1))
 
 
-def npy_bytes(directions: np.ndarray) -> bytes:
-    """The contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N)."""
-    file = io.BytesIO()
-    np.save(file, np.ascontiguousarray(directions.reshape(len(directions), -1)))
-    return file.getvalue()
+def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
+    """The contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N), in blocks."""
+    rows = np.ascontiguousarray(directions.reshape(len(directions), -1))
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))
+    yield header.getvalue()
+    for start in range(0, len(rows), ROWS_PER_STEP):
+        yield rows[start : start + ROWS_PER_STEP].tobytes()
 
 
 def _check_columns(source: str, columns: int) -> None:

@@ -5,17 +5,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import RosyError, counted
+from ...progress import Task, subtask
 from ..rosy_field import RosyField, check_degree
 from .raw_field import RawField
-from .text_rows import TextRows, abbreviate, format_rows, read_rows
+from .text_rows import TextRows, abbreviate, format_blocks, read_rows_task
 
 
-def read_rosy(path: Path) -> RawField:
+def read_rosy_task(path: Path) -> Task[RawField]:
     """Read a `.rosy` file: a count, N, and rows x y z.
 
     Count and N may be on one line or on two.
@@ -25,14 +27,13 @@ def read_rosy(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    rows = read_rows(path, comment=None)
+    rows = yield from subtask(read_rows_task(path, comment=None), 0.0, 0.4)
     count, degree = _read_header(rows, "count", "degree")
-    return RawField(
-        _vector_table(rows, 3, count).reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count
-    )
+    table = yield from subtask(_vector_table_task(rows, 3, count), 0.4, 1.0)
+    return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
 
 
-def read_rawfield(path: Path) -> RawField:
+def read_rawfield_task(path: Path) -> Task[RawField]:
     """Read a `.rawfield` file: N, a count, and rows of N vectors.
 
     Raises
@@ -40,21 +41,24 @@ def read_rawfield(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    rows = read_rows(path, comment=None)
+    rows = yield from subtask(read_rows_task(path, comment=None), 0.0, 0.4)
     degree, count = _read_header(rows, "degree", "count")
     degree = _validated_degree(rows, 0, degree)
-    return RawField(_vector_table(rows, 3 * degree, count).reshape(-1, degree, 3), degree, count)
+    table = yield from subtask(_vector_table_task(rows, 3 * degree, count), 0.4, 1.0)
+    return RawField(table.reshape(-1, degree, 3), degree, count)
 
 
-def rosy_text(field: RosyField) -> str:
-    """Format the member vectors of a field as a `.rosy` file."""
-    return "\n".join([str(len(field.vectors)), str(field.degree), *format_rows(field.vectors), ""])
+def rosy_text(field: RosyField) -> Iterator[str]:
+    """Format the member vectors of a field as a `.rosy` file, in blocks of lines."""
+    yield f"{len(field.vectors)}\n{field.degree}\n"
+    yield from format_blocks(field.vectors)
 
 
-def rawfield_text(directions: np.ndarray) -> str:
-    """Format (F, N, 3) directions as a `.rawfield` file."""
+def rawfield_text(directions: np.ndarray) -> Iterator[str]:
+    """Format (F, N, 3) directions as a `.rawfield` file, in blocks of lines."""
     count, degree = directions.shape[:2]
-    return "\n".join([f"{degree} {count}", *format_rows(directions.reshape(count, -1)), ""])
+    yield f"{degree} {count}\n"
+    yield from format_blocks(directions.reshape(count, -1))
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
@@ -81,7 +85,7 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
         raise rows.error(rows.row_of_word(word), str(reason)) from None
 
 
-def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
+def _vector_table_task(rows: TextRows, columns: int, count: int) -> Task[np.ndarray]:
     """(n, columns) float64 numbers after the header; line breaks have no meaning.
 
     `count` is the number of rows that the header declares, for the message.
@@ -92,4 +96,5 @@ def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
             f"{rows.path}: declares {counted(count, 'row')} of {columns} numbers, but contains {row_count} and "
             "part of another"
         )
-    return rows.floats("part of a vector")[2:].reshape(row_count, columns)
+    values = yield from rows.floats_task("part of a vector")
+    return values[2:].reshape(row_count, columns)

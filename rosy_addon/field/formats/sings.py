@@ -5,11 +5,12 @@ A file holds the degree, a count, and rows with an element and its singularity i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from .text_rows import read_rows
+from .text_rows import format_blocks, read_rows
 
 #: File name extensions of the format.
 SINGULARITY_SUFFIXES = (".sings", ".sing")
@@ -43,7 +44,7 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     return int(numbers[0]), numbers[2::2], numbers[3::2]
 
 
-def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> str:
+def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> Iterator[str]:
     """Format singularities as a `.sings` file; the parameters are the results of `read_sings`."""
-    rows = [f"{a} {b}" for a, b in zip(element.tolist(), index.tolist(), strict=True)]
-    return "\n".join([f"{degree} {len(rows)}", *rows, ""])
+    yield f"{degree} {len(element)}\n"
+    yield from format_blocks(np.stack([element, index], axis=1))

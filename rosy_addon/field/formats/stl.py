@@ -8,16 +8,17 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
+from ...progress import Progress, Task, subtask
 from ..validate import as_float64
 from .polygons import Polygons
-from .text_rows import TextRows, read_rows
+from .text_rows import LABEL, TextRows, read_rows_task
 
 #: Size of the header of a binary file, with the number of triangles in its last 4 bytes.
 _HEADER_BYTES = 84
 _TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(path: Path) -> Polygons:
+def read_stl_task(path: Path) -> Task[Polygons]:
     """Read an .stl file; corners at exactly the same position share a vertex.
 
     Raises
@@ -34,10 +35,11 @@ def read_stl(path: Path) -> Polygons:
         and data.lstrip()[:5].lower() == b"solid"
         and b"\0" not in data[:_HEADER_BYTES]
     ):
-        points = _text_points(path, data)
+        points = yield from subtask(_text_points_task(path, data), 0.0, 0.8)
     else:
         points = _binary_points(path, data, count)
     points = as_float64(points)
+    yield Progress(0.8, LABEL)
     vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
@@ -82,9 +84,9 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
-def _text_points(path: Path, data: bytes) -> np.ndarray:
+def _text_points_task(path: Path, data: bytes) -> Task[np.ndarray]:
     """(3 T, 3) float64 corners of the triangles of a text file."""
-    rows = read_rows(path, comment=None, data=data)
+    rows = yield from subtask(read_rows_task(path, comment=None, data=data), 0.0, 0.6)
     corner_rows = [row for row, words in enumerate(rows.words) if words[0].lower() == b"vertex"]
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
     if len(corner_rows) != 3 * loops:
@@ -98,4 +100,6 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
         [rows.words[row][1:] for row in corner_rows],
         [rows.line_numbers[row] for row in corner_rows],
     )
-    return vertex_rows.points("corner") if corner_rows else np.zeros((0, 3))
+    if not corner_rows:
+        return np.zeros((0, 3))
+    return (yield from subtask(vertex_rows.points_task("corner"), 0.6, 1.0))

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain
+from itertools import accumulate, chain, islice
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
+from ...progress import Progress, Task, run_to_completion
+
+#: Rows and words of a text file that are parsed or written in a step.
+ROWS_PER_STEP, WORDS_PER_STEP = 1 << 14, 1 << 16
+
+#: The label of the steps in which a file is read.
+LABEL = "reading the file"
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,14 +27,14 @@ class TextRows:
     Attributes
     ----------
     path : Path
-    words : list of list of bytes
+    words : list of sequence of bytes
         The words of each row; at least one, unless a caller selects words.
     line_numbers : list of int
         The line of each row in the file, counted from 1.
     """
 
     path: Path
-    words: list[list[bytes]]
+    words: list[Sequence[bytes]]
     line_numbers: list[int]
 
     def __len__(self) -> int:
@@ -42,15 +49,19 @@ class TextRows:
             return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
         return RosyError(f"{self.path}: {message}")
 
-    def floats(self, label: str) -> np.ndarray:
+    def floats_task(self, label: str) -> Task[np.ndarray]:
         """Parse all words of all rows as one float64 array; `label` is for messages."""
-        return self._parse(float, np.float64, f"a number ({label})")
+        return self._parse_task(float, np.float64, f"a number ({label})")
+
+    def ints_task(self, label: str) -> Task[np.ndarray]:
+        """Parse all words of all rows as one int64 array; `label` is for messages."""
+        return self._parse_task(int, np.int64, f"a whole number ({label})")
 
     def ints(self, label: str) -> np.ndarray:
-        """Parse all words of all rows as one int64 array; `label` is for messages."""
-        return self._parse(int, np.int64, f"a whole number ({label})")
+        """Run `ints_task` to its end."""
+        return run_to_completion(self.ints_task(label))
 
-    def points(self, label: str) -> np.ndarray:
+    def points_task(self, label: str) -> Task[np.ndarray]:
         """Parse the first three words of each row as a point.
 
         Returns
@@ -67,10 +78,9 @@ class TextRows:
                 raise self.error(
                     row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
                 )
-        points = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers).floats(
-            label
-        )
-        points = points.reshape(-1, 3)
+        yield Progress(0.0, LABEL)
+        coordinates = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers)
+        points = (yield from coordinates.floats_task(label)).reshape(-1, 3)
         finite = np.isfinite(points).all(axis=1)
         if not finite.all():
             row = int(np.argmin(finite))
@@ -82,16 +92,23 @@ class TextRows:
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
-    def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
+    def _parse_task(self, convert: Callable, dtype: type, expected: str) -> Task[np.ndarray]:
         """Convert all words of all rows, or raise an error that names the first bad one."""
-        try:
-            return np.array(list(map(convert, chain.from_iterable(self.words))), dtype=dtype)
-        except (ValueError, OverflowError):
-            raise self._parse_error(convert, expected) from None
+        count = sum(map(len, self.words))
+        values = np.empty(count, dtype=dtype)
+        words = chain.from_iterable(self.words)
+        for start in range(0, count, WORDS_PER_STEP):
+            yield Progress(start / count, LABEL)
+            stop = min(start + WORDS_PER_STEP, count)
+            try:
+                values[start:stop] = list(map(convert, islice(words, stop - start)))
+            except (ValueError, OverflowError):
+                raise self._parse_error(convert, expected, self.row_of_word(start)) from None
+        return values
 
-    def _parse_error(self, convert: Callable, expected: str) -> RosyError:
-        """The error for the first word that cannot be converted."""
-        for row, words in enumerate(self.words):
+    def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
+        """The error for the first word that cannot be converted, which is not above `first_row`."""
+        for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
                 try:
                     if abs(convert(word)) >= 2**63 and convert is int:
@@ -102,6 +119,13 @@ class TextRows:
 
 
 def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = None) -> TextRows:
+    """Run `read_rows_task` to its end."""
+    return run_to_completion(read_rows_task(path, comment=comment, data=data))
+
+
+def read_rows_task(
+    path: Path, *, comment: bytes | None = b"#", data: bytes | None = None
+) -> Task[TextRows]:
     """Read the rows of a text file; empty lines are left out.
 
     Parameters
@@ -118,12 +142,26 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
+    yield Progress(0.0, LABEL)
     # Also accept a lone CR, but not the other separators of `splitlines`.
-    lines = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-    if comment is not None and comment in data:
-        lines = [line.partition(comment)[0] for line in lines]
-    numbered = [(words, number) for number, line in enumerate(lines, 1) if (words := line.split())]
-    return TextRows(path, [words for words, _ in numbered], [number for _, number in numbered])
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        yield Progress(0.0, LABEL)
+    lines = data.split(b"\n")
+    has_comments = comment is not None and comment in data
+    # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
+    words: list[Sequence[bytes]] = []
+    line_numbers: list[int] = []
+    for start in range(0, len(lines), ROWS_PER_STEP):
+        yield Progress(start / len(lines), LABEL)
+        block = lines[start : start + ROWS_PER_STEP]
+        if has_comments:
+            block = [line.partition(comment)[0] for line in block]
+        for number, line in enumerate(block, start + 1):
+            if line_words := tuple(line.split()):
+                words.append(line_words)
+                line_numbers.append(number)
+    return TextRows(path, words, line_numbers)
 
 
 def abbreviate(word: bytes) -> str:
@@ -135,3 +173,10 @@ def abbreviate(word: bytes) -> str:
 def format_rows(rows: np.ndarray) -> list[str]:
     """Format each row of (n, k) numbers as text that reads back as exactly the same float64."""
     return [" ".join(map(repr, row)) for row in rows.tolist()]
+
+
+def format_blocks(rows: np.ndarray, prefix: str = "") -> Iterator[str]:
+    """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_STEP`."""
+    for start in range(0, len(rows), ROWS_PER_STEP):
+        lines = format_rows(rows[start : start + ROWS_PER_STEP])
+        yield "".join([f"{prefix}{line}\n" for line in lines])

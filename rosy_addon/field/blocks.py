@@ -1,0 +1,46 @@
+"""Rows of arrays in blocks, so that long work on a large mesh is done in short steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..progress import Progress, Task
+
+#: Rows of an array (faces, corners, edges) in a step. A step with them takes hundredths of a second.
+ROWS_PER_STEP = 1 << 16
+
+
+def row_blocks(count: int, size: int | None = None) -> Iterator[slice]:
+    """Split `count` rows into consecutive blocks of `size`; one empty block for no rows."""
+    size = ROWS_PER_STEP if size is None else size
+    for start in range(0, max(count, 1), size):
+        yield slice(start, min(start + size, count))
+
+
+def by_rows_task(
+    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
+    *arrays: np.ndarray,
+    label: str,
+) -> Task[np.ndarray | tuple[np.ndarray, ...]]:
+    """Apply a function of arrays to blocks of their rows, and join the results.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a block of each array and returns one array, or a tuple of arrays, with as many rows.
+        A row of the result depends on the same rows of the arrays alone.
+    arrays : (n, ...) ndarray
+    label : str
+        Of the progress.
+    """
+    count = len(arrays[0])
+    parts = []
+    for block in row_blocks(count):
+        yield Progress(block.start / max(count, 1), label)
+        parts.append(function(*(array[block] for array in arrays)))
+    yield Progress(1.0, label)
+    if isinstance(parts[0], tuple):
+        return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return np.concatenate(parts)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import connection_task, laplacian
+from .connection import connection_task, laplacian_task
 from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH, magnitude_task
@@ -221,7 +221,7 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
     yield Progress(0.15, "smoothing the field")
-    matrix = laplacian(connection, degree)
+    matrix = yield from subtask(laplacian_task(connection, degree), 0.15, 0.2)
     yield Progress(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)

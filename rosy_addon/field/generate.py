@@ -14,12 +14,12 @@ import numpy as np
 from ..errors import NoFeaturesError, RosyError
 from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
-from .corner_fans import corner_angles, corner_rotations, smooth_face_values
+from .corner_fans import corner_angles_task, corner_rotations_task, smooth_face_values
 from .frames import dot, normalize
 from .guided import guided_task
 from .guides import (
     average_guides,
-    feature_edges,
+    feature_edges_task,
     guides_from_axes,
     guides_from_edges,
     guides_from_strokes,
@@ -177,7 +177,8 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
-        ends = feature_edges(surface, settings.sharp_angle)
+        task = feature_edges_task(surface, settings.sharp_angle)
+        ends = yield from subtask(task, 0.0, 0.0, "finding guides")
         yield Progress(0.0, "finding guides")
     if not len(ends):
         raise NoFeaturesError(
@@ -383,11 +384,15 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
     yield Progress(0.65, label)
-    rotation = corner_rotations(
-        smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
+    task = corner_rotations_task(
+        smooth_surface.face_normal,
+        x,
+        smooth_surface.corner_face,
+        smooth_surface.corner_normal,
+        label,
     )
-    yield Progress(0.68, label)
-    weights = corner_angles(smooth_surface)
+    rotation = yield from subtask(task, 0.65, 0.68)
+    weights = yield from subtask(corner_angles_task(smooth_surface), 0.68, 0.7, label)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         yield Progress(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)

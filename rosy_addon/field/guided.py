@@ -12,11 +12,11 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import connection_task, laplacian
+from .connection import connection_task, laplacian_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import corner_frame_angles, node_sum_per_face
-from .sparse_multigrid import CSRMatrix, from_coo, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
 from .surface import Surface
 
 #: Residual norm relative to that of the right-hand side at which conjugate gradients stop.
@@ -103,9 +103,10 @@ def guided_task(
     z = fixed_z.copy()
     free = np.flatnonzero(~fixed)
     if len(free):
-        matrix = laplacian(connection, degree)
+        matrix = yield from subtask(laplacian_task(connection, degree), 0.06, 0.08)
         yield Progress(0.08, "building the connection Laplacian")
-        matrix, fixed_terms = _eliminate_fixed(matrix, penalty, fixed, fixed_z)
+        task = _eliminate_fixed_task(matrix, penalty, fixed, fixed_z)
+        matrix, fixed_terms = yield from subtask(task, 0.08, 0.09)
         yield Progress(0.09, "building the connection Laplacian")
         solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free])
         z[free] = yield from subtask(solver, 0.1, 0.95)
@@ -119,9 +120,9 @@ def guided_task(
     return RosyField(degree, from_representation(face_z, x, y, degree))
 
 
-def _eliminate_fixed(
+def _eliminate_fixed_task(
     matrix: CSRMatrix, penalty: np.ndarray, fixed: np.ndarray, fixed_z: np.ndarray
-) -> tuple[CSRMatrix, np.ndarray]:
+) -> Task[tuple[CSRMatrix, np.ndarray]]:
     """Eliminate the fixed nodes from the linear system.
 
     Returns
@@ -131,20 +132,29 @@ def _eliminate_fixed(
     fixed_terms : (n,) complex128 ndarray
         The product of the full matrix and `fixed_z`, to subtract from the right-hand side.
     """
+    label = "building the connection Laplacian"
     fixed_terms = matrix @ fixed_z
+    yield Progress(0.2, label)
     row, column = matrix.row_indices, matrix.indices
+    yield Progress(0.25, label)
     is_free = ~fixed[row] & ~fixed[column]
     free_index = np.cumsum(~fixed) - 1
-    row, column, value = free_index[row[is_free]], free_index[column[is_free]], matrix.data[is_free]
+    yield Progress(0.3, label)
+    row = free_index[row[is_free]]
+    yield Progress(0.35, label)
+    column, value = free_index[column[is_free]], matrix.data[is_free]
+    yield Progress(0.4, label)
     diagonal = penalty[~fixed] + 1e-12 * matrix.diagonal[~fixed]
+    yield Progress(0.6, label)
     diagonal_index = np.arange(len(diagonal))
-    return from_coo(
+    task = from_coo_task(
         np.concatenate([row, diagonal_index]),
         np.concatenate([column, diagonal_index]),
         np.concatenate([value, diagonal]),
         len(diagonal),
         len(diagonal),
-    ), fixed_terms
+    )
+    return (yield from subtask(task, 0.6, 1.0, label)), fixed_terms
 
 
 def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarray]:

@@ -15,7 +15,7 @@ from ..progress import Progress, Task, run_to_completion
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
-from .surface import Surface, build_edges, mean_per_face, sum_per_face
+from .surface import Surface, edges_task, mean_per_face, sum_per_face
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
 #: away are ignored.
@@ -57,6 +57,11 @@ def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.nda
 
 
 def feature_edges(surface: Surface, angle: float) -> np.ndarray:
+    """Run `feature_edges_task` to its end."""
+    return run_to_completion(feature_edges_task(surface, angle))
+
+
+def feature_edges_task(surface: Surface, angle: float) -> Task[np.ndarray]:
     """Find the border edges and the sharp edges of a surface.
 
     Parameters
@@ -70,10 +75,13 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
+    label = "finding guides"
+    edges = yield from edges_task(surface.corner_vertex, surface.face_start)
+    yield Progress(0.0, label)
     is_feature = np.ones(len(edges.ends), dtype=bool)
     is_feature[edges.interior] = False
     normal = surface.face_normal
+    yield Progress(0.5, label)
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
     # Faces without area have no normal, so their edges have no angle.
     dihedral = np.arccos(np.clip(dot(normal_a, normal_b), -1, 1))

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import BLOCK_TRIANGLES, Connection, connection_task, laplacian
+from .connection import BLOCK_TRIANGLES, Connection, connection_task, laplacian_task
 from .frames import dot
 from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
@@ -93,7 +93,7 @@ def smallest_eigenvectors_task(
     mass = connection.positive_mass
     yield Progress(0.05, label)
     shift = SPECTRAL_SHIFT * 4 * np.pi / mass.sum()
-    matrix = laplacian(connection, degree, shift)
+    matrix = yield from subtask(laplacian_task(connection, degree, shift), 0.05, 0.1)
     levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.4)
     masses, components = [mass], [component]
     for level in levels[:-1]:

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import Progress, Task, run_to_completion, subtask
 
 #: Relative increase of the diagonal of a matrix that is singular.
 SINGULAR_SHIFT = 1e-10
@@ -26,7 +26,7 @@ DIRECT_SOLVE_SIZE = 400
 BLOCK_ROWS = 1 << 12
 
 #: Blocks of rows of a new matrix that are assembled at once.
-BLOCKS_PER_STEP = 16
+BLOCKS_PER_STEP = 4
 
 #: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
 #: connect unknowns to an aggregate.
@@ -90,6 +90,13 @@ class CSRMatrix:
 def from_coo(
     row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
 ) -> CSRMatrix:
+    """Run `from_coo_task` to its end."""
+    return run_to_completion(from_coo_task(row, column, value, row_count, column_count))
+
+
+def from_coo_task(
+    row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
+) -> Task[CSRMatrix]:
     """Make a matrix from entries in any order.
 
     Entries with the same row and column add up. No row may be empty.
@@ -102,9 +109,12 @@ def from_coo(
     """
     # A radix sort by digits of 16 bits, the low digit first: numpy's stable sort takes linear time
     # only for integers of at most 16 bits.
+    label = "sorting a matrix"
     order = np.argsort(row.astype(np.uint16), kind="stable")
+    yield Progress(0.3, label)
     if row_count > 1 << 16:
         order = order.take(np.argsort((row >> 16).astype(np.uint16).take(order), kind="stable"))
+    yield Progress(0.6, label)
     indptr = np.zeros(row_count + 1, dtype=np.intp)
     np.cumsum(np.bincount(row, minlength=row_count), out=indptr[1:])
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
@@ -160,6 +170,7 @@ def _assemble_by_rows_task(
         row_counts.append(np.bincount(key >> bits, minlength=last - first))
         index_blocks.append(key & ((1 << bits) - 1))
         value_blocks.append(value)
+    yield Progress(1.0, "building multigrid levels")
     indptr = np.concatenate([[0], np.cumsum(np.concatenate(row_counts))])
     return CSRMatrix(
         indptr, np.concatenate(index_blocks), np.concatenate(value_blocks), column_count
@@ -230,9 +241,10 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
         prolongation = yield from subtask(task, middle, middle, label)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
         product = yield from subtask(matrix_product_task(matrix, prolongation), middle, stop)
-        matrix = yield from subtask(
-            matrix_product_task(prolongation.adjoint, product), stop, stop, label
-        )
+        yield Progress(stop, label)
+        adjoint = prolongation.adjoint
+        yield Progress(stop, label)
+        matrix = yield from subtask(matrix_product_task(adjoint, product), stop, stop, label)
 
 
 def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:

@@ -31,8 +31,8 @@ MIN_WALKED_RATIO = 0.999
 #: Gaps that are wider than this in spacings are divided for two strokes, other gaps for one.
 MIN_TWO_STROKE_GAP = 2.5
 
-#: Seeds that are compared with samples at once. Bounds memory.
-SEED_BATCH_SIZE = 1 << 14
+#: Seeds that are compared with samples in a step. Bounds its time and memory.
+SEED_BATCH_SIZE = 1 << 12
 
 
 # --- on the mesh ----------------------------------------------------------------------------------
@@ -79,6 +79,7 @@ def uncovered_seeds_task(samples: StrokeSamples, seeds: SurfaceParticles) -> Tas
         with samples.probes(seeds.take(batch)) as probes:
             neighbors = find_lateral_neighbors(samples, probes, MAX_COVERED_GAP, np.inf)
         is_uncovered[batch] = ~neighbors.rejected
+    yield Progress(samples.coverage, "looking for gaps")
     return seeds.take(np.flatnonzero(is_uncovered))
 
 

@@ -136,13 +136,16 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
         if len(placer.tips):
             placer.step()
     placer.suspend()
+    yield Progress(0.0, label)
     seeds = candidate_seeds(placer.mesh, placer.corner_spacing)
     seeds = yield from uncovered_seeds_task(placer.samples, seeds)
     seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.corner_spacing))
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     while len(seeds):
         yield Progress(placer.samples.coverage, label)
-        placer.add_seeds(thinned_seeds(placer.mesh, seeds, seed_spacing * median_spacing))
+        thinned = thinned_seeds(placer.mesh, seeds, seed_spacing * median_spacing)
+        yield Progress(placer.samples.coverage, label)
+        placer.add_seeds(thinned)
         yield from _grow_until(placer, label, STRAGGLER_RATIO)
         if seed_spacing <= MIN_SEED_SPACING:
             break

@@ -66,7 +66,7 @@ def test_products_of_sparse_matrices():
 def test_products_of_larger_matrices_take_more_steps(monkeypatch):
     monkeypatch.setattr(sparse_multigrid, "BLOCKS_PER_STEP", 1)
     small, large = (laplacian(build_connection(icosphere(level)), 4, shift=1.0) for level in (3, 5))
-    assert sum(1 for _ in matrix_product_task(small, small)) == 1
+    assert sum(1 for _ in matrix_product_task(small, small)) <= 2
     assert sum(1 for _ in matrix_product_task(large, large)) >= len(large) / 2**13
 
 

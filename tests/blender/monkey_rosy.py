@@ -511,6 +511,7 @@ def remove_everything(monkey):
     if bpy.context.mode != "OBJECT":
         return
     original = window.scene.name
+    was_pressed = False
     for name in [scene.name for scene in bpy.data.scenes]:
         scene = bpy.data.scenes[name]
         if scene.library is not None:
@@ -520,11 +521,15 @@ def remove_everything(monkey):
         for operator in ("remove", "strokes_remove"):
             if getattr(bpy.ops.rosy, operator).poll():
                 monkey.rosy(operator)
+                was_pressed = True
         for obj in meshes(monkey, editable=False):
             if select(monkey, obj) and bpy.ops.rosy.singularities.poll():
                 monkey.rosy("singularities", show="NONE")
     window.scene = bpy.data.scenes[original]
     yield
+    if not was_pressed:
+        # The user has deleted all that RoSy could remove; what that used is unused data in the file.
+        bpy.ops.outliner.orphans_purge(do_recursive=True)
     if left := [text for text in leftovers() if not expected_leftover(text)]:
         raise CheckError("left after everything was removed: " + "; ".join(left[:8]))
 

@@ -11,7 +11,7 @@ import bpy
 
 from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert_task
-from ..rosy_addon.field.generate import MAGNITUDES
+from ..rosy_addon.field.curvature import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars

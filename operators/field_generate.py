@@ -68,7 +68,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         name="From",
         description="Method that generates the field",
         items=KIND_ITEMS,
-        default="smoothest",
+        default="form",
     )
     degree: bpy.props.IntProperty(
         name="Degree",

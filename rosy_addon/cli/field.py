@@ -12,9 +12,9 @@ import numpy as np
 from ..errors import RosyError, counted
 from ..field.analysis import angle_errors, dirichlet_energy, error_statistics
 from ..field.convert import Conversion, convert
+from ..field.curvature import MAGNITUDES
 from ..field.field_io import WRITE_SUFFIXES, load_field, write_field
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
-from ..field.generate import MAGNITUDES
 from ..field.rosy_field import RosyField
 from ..field.singularities import euler_characteristic, find_singularities
 from ..field.surface import Surface

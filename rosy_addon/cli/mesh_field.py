@@ -50,7 +50,7 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
         "--generate",
         choices=list(GENERATORS),
         help="generate a field instead of reading one; by default guided if there are guides, "
-        "otherwise curvature for degrees 2 and 4 and axis for all others",
+        "otherwise form",
     )
     parser.add_argument(
         "--axis",
@@ -122,8 +122,7 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField
     print_note(orientation_warning(surface))
     degree = 4 if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
-    default_kind = "guided" if has_guides else "curvature" if degree in (2, 4) else "axis"
-    kind = options.generate or default_kind
+    kind = options.generate or ("guided" if has_guides else "form")
     field = generate(surface, _generator_settings(options, surface, kind, degree), degree)
     if surface.face_count and not field.vectors.any():
         print_note(

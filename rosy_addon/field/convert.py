@@ -9,9 +9,10 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
 from .connection import connection_task, laplacian_task
+from .curvature import magnitude_task
 from .directional_field import field_matching
 from .frames import normalize
-from .generate import MIN_SMOOTHING_LENGTH, magnitude_task
+from .generate import MIN_SMOOTHING_LENGTH
 from .guided import conjugate_gradient_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree

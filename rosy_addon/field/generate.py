@@ -1,7 +1,7 @@
 """Field generators: make a field on a surface by the name of its kind.
 
-Two of the generators, along an axis and along the curvature, are implemented here. Fields are cut
-along edges whose faces disagree on orientation; see `surface.count_inconsistent_edges`.
+The field along an axis is implemented here. Fields are cut along edges whose faces disagree on
+orientation; see `surface.count_inconsistent_edges`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ import numpy as np
 from ..errors import NoFeaturesError, RosyError
 from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
-from .corner_fans import corner_angles_task, corner_rotations_task, smooth_face_values
-from .frames import dot, normalize
-from .guided import guided_task
+from .curvature import TINY, curvature_task
+from .form import form_task
+from .frames import normalize
+from .guided import guided_or_smoothest_task
 from .guides import (
     average_guides,
     feature_edges_task,
@@ -25,42 +26,35 @@ from .guides import (
     guides_from_strokes,
     uv_guides_task,
 )
-from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_task
-from .surface import Surface, sum_per_face, surface_task
-
-#: The smallest number whose inverse is finite.
-TINY = float(np.finfo(np.float64).tiny)
+from .surface import Surface
 
 #: Smallest distance of smoothing, relative to `Surface.extent`. Shorter ones change nothing.
 MIN_SMOOTHING_LENGTH = 1e-6
 
 #: Kinds of generated fields, with the descriptions shown in the interface.
 GENERATORS = {
+    "form": "Along the form: clear curvature and sharp edges, and smooth between them",
     "smoothest": "The smoothest field, with few singularities",
-    "curvature": "Along the principal directions of curvature (even degrees)",
+    "curvature": "Along the principal directions of each face's own curvature (even degrees)",
     "features": "Along borders and sharp edges, and smooth between them",
     "guided": "Along guides (strokes, edges, a UV map, vectors or empties), and smooth between them",
     "axis": "Along a direction, projected to the surface",
     "uv": "Along the axes of a UV map",
 }
 
-#: Kinds of magnitudes of a field, with the descriptions shown in the interface.
-MAGNITUDES = {
-    "unit": "1 on all faces",
-    "confidence": "How well the principal directions are defined, from 0 to 1",
-    "curvature": "The larger principal curvature, multiplied by the size of the mesh",
-}
-
 #: Shorter projections of a unit axis are rounding errors: the face is perpendicular to the axis.
 MIN_PROJECTION = 1e-12
 
-#: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
-CURVATURE_SMOOTHING_ROUNDS = 2
-
 #: Bytes of memory that a face takes at the peak, by kind. The other kinds take little.
-BYTES_PER_FACE = {"smoothest": 750, "curvature": 720, "features": 1000, "guided": 1000}
+BYTES_PER_FACE = {
+    "form": 1000,
+    "smoothest": 750,
+    "curvature": 720,
+    "features": 1000,
+    "guided": 1000,
+}
 
 
 @dataclass(frozen=True)
@@ -146,6 +140,8 @@ def generate_task(
         "choose a smaller mesh, or another kind of field",
     )
     yield Progress(0.0, "generating the field")
+    if settings.kind == "form":
+        return (yield from form_task(surface, degree))
     if settings.kind == "smoothest":
         return (yield from smoothest_task(surface, degree))
     if settings.kind == "axis":
@@ -158,7 +154,7 @@ def generate_task(
         # The extent is zero if all faces are points; then so is the magnitude.
         length = max(settings.smoothing_length * surface.extent, TINY)
         weight = (field.magnitude / length) ** 2
-        task = _guided_or_smoothest_task(surface, degree, normalize(field.vectors), weight)
+        task = guided_or_smoothest_task(surface, degree, normalize(field.vectors), weight)
         return (yield from subtask(task, split, 1.0))
     if settings.kind == "features":
         return (yield from _features_task(surface, settings, degree))
@@ -190,27 +186,7 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
             f"{surface.name}: on each face, the edges cancel each other in a field of degree "
             f"{degree}: choose another degree"
         )
-    return (yield from _guided_or_smoothest_task(surface, degree, guides))
-
-
-def _guided_or_smoothest_task(
-    surface: Surface,
-    degree: int,
-    guides: np.ndarray,
-    weight: np.ndarray | float | None = None,
-) -> Task[RosyField]:
-    """A guided field, with the smoothest field on connected components without a guide.
-
-    Guides are followed exactly if `weight` is None.
-    """
-    hard = guides.any(axis=1) if weight is None else None
-    task = guided_task(surface, degree, guides, 0.0 if weight is None else weight, hard)
-    field = yield from subtask(task, 0.0, 0.6)
-    unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
-    if not unguided.any():
-        return field
-    smoothest = yield from subtask(smoothest_task(surface, degree), 0.6, 1.0)
-    return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))
+    return (yield from guided_or_smoothest_task(surface, degree, guides))
 
 
 def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
@@ -244,7 +220,7 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
     weight = (
         (settings.smoothing_length * surface.extent) ** -2 if settings.smoothing_length else None
     )
-    return (yield from _guided_or_smoothest_task(surface, degree, guides, weight))
+    return (yield from guided_or_smoothest_task(surface, degree, guides, weight))
 
 
 def axis_field(
@@ -280,158 +256,3 @@ def axis_field(
     vectors = direction - (normal @ direction)[:, None] * normal
     vectors[~normal.any(axis=1) | (np.linalg.norm(vectors, axis=1) < MIN_PROJECTION)] = 0.0
     return RosyField(degree, vectors)
-
-
-def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
-    """Compute magnitudes of one of the kinds in `MAGNITUDES`.
-
-    "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
-    unit.
-
-    Returns
-    -------
-    (F,) float64 ndarray
-
-    Raises
-    ------
-    RosyError
-        If the kind is unknown.
-    """
-    if kind == "unit":
-        return np.ones(surface.face_count)
-    if kind == "confidence":
-        field = yield from curvature_task(surface, 4)
-        return field.magnitude
-    if kind != "curvature":
-        raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
-    smooth_surface = yield from _smooth_normals_task(surface)
-    x, y = face_frames(smooth_surface)
-    yield Progress(0.5, "computing the curvature")
-    mean, deviator = yield from subtask(_face_curvature_task(smooth_surface, x, y), 0.5, 1.0)
-    return (np.abs(mean) + np.abs(deviator)) * surface.extent
-
-
-def _smooth_normals_task(surface: Surface) -> Task[Surface]:
-    """The surface with smooth normals everywhere, without flat faces and sharp edges."""
-    task = surface_task(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
-    return (yield from subtask(task, 0.0, 0.3, "averaging normals"))
-
-
-def curvature_field(surface: Surface, degree: int) -> RosyField:
-    """Compute a curvature field; see `curvature_task`."""
-    return run_to_completion(curvature_task(surface, degree))
-
-
-def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
-    """Compute a field along the principal directions of curvature.
-
-    Degree 2 follows the direction of the greater signed curvature (positive where the surface is
-    convex). Degree 4 follows both principal directions. In fields of other even degrees, one member
-    follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
-    possible.
-
-    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``. It is 0 at
-    umbilics and in planes, which have no principal directions, and about 1 on cylinders and
-    saddles. k0 is 0.02 divided by the root mean square radius of the mesh. It suppresses rounding
-    errors in nearly flat regions.
-
-    Yields
-    ------
-    Progress
-
-    Returns
-    -------
-    RosyField
-
-    Raises
-    ------
-    RosyError
-        If the degree is odd.
-
-    References
-    ----------
-    The second fundamental form of a face is fitted to the differences of its corner normals, as in
-    Rusinkiewicz, "Estimating Curvatures and Their Derivatives on Triangle Meshes", 3DPVT 2004, but
-    for polygons. Representations are then averaged over the vertices.
-    """
-    degree = check_degree(degree)
-    if degree % 2:
-        raise RosyError(f"a curvature field needs an even degree, not {degree}")
-    label = "computing principal directions"
-    yield Progress(0.0, label)
-    smooth_surface = yield from _smooth_normals_task(surface)
-    yield Progress(0.3, label)
-    x, y = face_frames(smooth_surface)
-    yield Progress(0.4, label)
-    mean, deviator = yield from subtask(_face_curvature_task(smooth_surface, x, y), 0.4, 0.6)
-    yield Progress(0.6, label)
-    deviator_norm = np.abs(deviator)
-    center = smooth_surface.face_center.mean(axis=0)
-    offset = smooth_surface.face_center - center
-    radius = np.sqrt(np.mean(dot(offset, offset)))
-    # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
-    confidence = deviator_norm / (
-        np.maximum(np.abs(mean), deviator_norm) + 0.01 / max(radius, 1e-30)
-    )
-    is_curved = deviator_norm > TINY
-    phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
-    z = confidence * phase ** (degree // 2)
-    yield Progress(0.65, label)
-    task = corner_rotations_task(
-        smooth_surface.face_normal,
-        x,
-        smooth_surface.corner_face,
-        smooth_surface.corner_normal,
-        label,
-    )
-    rotation = yield from subtask(task, 0.65, 0.68)
-    weights = yield from subtask(corner_angles_task(smooth_surface), 0.68, 0.7, label)
-    for index in range(CURVATURE_SMOOTHING_ROUNDS):
-        yield Progress(0.7 + 0.1 * index, label)
-        z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
-    yield Progress(0.95, label)
-    return RosyField(degree, from_representation(z, x, y, degree))
-
-
-def _face_curvature_task(
-    surface: Surface, x: np.ndarray, y: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
-    """Fit the second fundamental form of each face.
-
-    The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
-    of the normals at its ends, in the least squares sense.
-
-    Returns
-    -------
-    mean : (F,) float64 ndarray
-        Mean curvature (k1 + k2) / 2, in 1 / Blender unit.
-    deviator : (F,) complex128 ndarray
-        (a - c) / 2 + i b. Its modulus is (k1 - k2) / 2, its phase twice the angle of the direction
-        of k1 in the frame x, y.
-    """
-    face, next_corner = surface.corner_face, surface.next_corner
-    points = surface.vertices[surface.corner_vertex]
-    edge = points[next_corner] - points
-    normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
-    yield Progress(0.3, "computing principal directions")
-    u, v = dot(edge, x[face]), dot(edge, y[face])
-    p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
-    yield Progress(0.6, "computing principal directions")
-    products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
-    uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
-    trace = uu + vv
-    trace[trace == 0] = 1.0
-    regularization = 1e-9 * trace  # faces without area get curvature 0 instead of a singular system
-    uu, vv = uu + regularization, vv + regularization
-    # uu a + uv b = up,  uv a + (uu + vv) b + uv c = mixed,  uv b + vv c = vq
-    b = uu * vv * mixed - uv * (vv * up + uu * vq)
-    b /= (uu + vv) * (uu * vv - uv * uv)
-    a, c = (up - uv * b) / uu, (vq - uv * b) / vv
-    return (a + c) / 2, (a - c) / 2 + 1j * b

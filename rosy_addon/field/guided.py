@@ -15,11 +15,11 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from .connection import connection_task, laplacian_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .smoothest import corner_frame_angles, node_sum_per_face
+from .smoothest import corner_frame_angles, node_sum_per_face, smoothest_task
 from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
 from .surface import Surface
 
-#: Residual norm relative to that of the right-hand side at which conjugate gradients stop.
+#: Residual norm relative to that of the right-hand side at which conjugate gradients stop, by default.
 RELATIVE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 400
 
@@ -41,6 +41,7 @@ def guided_task(
     guides: np.ndarray,
     weight: np.ndarray | float,
     hard: np.ndarray | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
 ) -> Task[RosyField]:
     """Compute the smooth field that follows guides.
 
@@ -56,6 +57,8 @@ def guided_task(
         falls off over a distance of about 1 / sqrt(w).
     hard : (F,) bool ndarray, optional
         Faces on which the guide is followed exactly.
+    tolerance : float
+        Residual norm relative to that of the right-hand side at which the solver stops.
 
     Yields
     ------
@@ -108,7 +111,7 @@ def guided_task(
         task = _eliminate_fixed_task(matrix, penalty, fixed, fixed_z)
         matrix, fixed_terms = yield from subtask(task, 0.08, 0.09)
         yield Progress(0.09, "building the connection Laplacian")
-        solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free])
+        solver = conjugate_gradient_task(matrix, (rhs - fixed_terms)[free], tolerance)
         z[free] = yield from subtask(solver, 0.1, 0.95)
     yield Progress(0.95, "averaging the field on the faces")
     face_z = node_sum_per_face(surface, connection, z, frame_angle, degree)
@@ -118,6 +121,29 @@ def guided_task(
     face_z = np.divide(face_z, modulus, out=np.zeros_like(face_z), where=defined)
     face_z[hard] = target[hard] / np.abs(target[hard])
     return RosyField(degree, from_representation(face_z, x, y, degree))
+
+
+def guided_or_smoothest_task(
+    surface: Surface,
+    degree: int,
+    guides: np.ndarray,
+    weight: np.ndarray | float | None = None,
+    hard: np.ndarray | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
+) -> Task[RosyField]:
+    """A guided field, with the smoothest field on connected components without a guide.
+
+    Without `weight`, all guides are followed exactly. The parameters are those of `guided_task`.
+    """
+    if weight is None:
+        weight, hard = 0.0, guides.any(axis=1)
+    task = guided_task(surface, degree, guides, weight, hard, tolerance)
+    field = yield from subtask(task, 0.0, 0.6)
+    unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
+    if not unguided.any():
+        return field
+    smoothest = yield from subtask(smoothest_task(surface, degree), 0.6, 1.0)
+    return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))
 
 
 def _eliminate_fixed_task(
@@ -157,7 +183,9 @@ def _eliminate_fixed_task(
     return (yield from subtask(task, 0.6, 1.0, label)), fixed_terms
 
 
-def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarray]:
+def conjugate_gradient_task(
+    matrix: CSRMatrix, rhs: np.ndarray, tolerance: float = RELATIVE_TOLERANCE
+) -> Task[np.ndarray]:
     """Solve ``matrix @ solution = rhs`` by conjugate gradients, preconditioned with W-cycles.
 
     Parameters
@@ -165,6 +193,8 @@ def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarr
     matrix : CSRMatrix
         (n, n), Hermitian and positive definite.
     rhs : (n,) complex ndarray
+    tolerance : float
+        Residual norm relative to that of `rhs` at which the iteration stops.
 
     Yields
     ------
@@ -177,7 +207,7 @@ def conjugate_gradient_task(matrix: CSRMatrix, rhs: np.ndarray) -> Task[np.ndarr
     """
     levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
     solution, residual = np.zeros_like(rhs), rhs.copy()
-    tolerance = RELATIVE_TOLERANCE * np.sqrt(_real_inner_product(rhs, rhs))
+    tolerance *= np.sqrt(_real_inner_product(rhs, rhs))
     direction, previous = None, 1.0
     for iteration in range(MAX_ITERATIONS):
         yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), "interpolating between the guides")

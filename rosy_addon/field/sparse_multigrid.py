@@ -9,7 +9,7 @@ Vanek, Mandel and Brezina 1996).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -67,6 +67,10 @@ class CSRMatrix:
             terms *= self.data[block]
             np.add.reduceat(terms, starts[:-1] - starts[0], out=result[first : first + BLOCK_ROWS])
         return result
+
+    def with_values(self, data: np.ndarray) -> CSRMatrix:
+        """Return a matrix with other values of the same entries."""
+        return replace(self, data=data)
 
     @cached_property
     def row_indices(self) -> np.ndarray:

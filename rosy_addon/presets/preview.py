@@ -9,7 +9,7 @@ import numpy as np
 from ..color import from_hex, to_linear
 from ..compositor.compose import compose
 from ..compositor.look import Look, is_hatched
-from ..field.generate import curvature_field
+from ..field.curvature import curvature_field
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, build_surface
 from ..projection.camera import orbit_camera

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
+from ..field.curvature import magnitude_task
 from ..field.frames import dot, normalize
-from ..field.generate import magnitude_task
 from ..field.surface import Surface, sum_per_fan
 from ..progress import Task
 from ..projection.camera import Camera

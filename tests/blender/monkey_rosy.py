@@ -33,7 +33,7 @@ def attribute_argument(monkey):
 def make_field(monkey):
     if monkey.chance(0.95):
         select_mesh(monkey)
-    kinds = ["smoothest", "curvature", "features", "axis", "uv"]
+    kinds = ["form", "smoothest", "curvature", "features", "axis", "uv"]
     settings = {
         "kind": monkey.pick(kinds),
         "degree": monkey.pick([1, 2, 2, 3, 4, 4, 4, 5, 6, 7, 8, 12]),

@@ -12,7 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 from awkward import AWKWARD
 
-KINDS = ("smoothest", "curvature", "features", "guided", "axis", "uv")
+KINDS = ("form", "smoothest", "curvature", "features", "guided", "axis", "uv")
 
 #: Errors of kinds on meshes where they are undefined. Curvature has no direction on flat meshes and on
 #: those that are alike in all directions at each corner; the edges of an octahedron's triangles cancel
@@ -55,7 +55,7 @@ def test_every_kind_on_every_mesh(scene, kind, name, capfd):
     values = np.empty(3 * len(faces), dtype=np.float32)
     mesh.attributes["rosy"].data.foreach_get("vector", values)
     assert np.isfinite(values).all()
-    if kind == "smoothest":
+    if kind in ("form", "smoothest"):
         length = np.linalg.norm(values.reshape(-1, 3), axis=1)
         area = np.array([face.area > 0 for face in mesh.polygons])
         np.testing.assert_allclose(length, area, atol=1e-5)

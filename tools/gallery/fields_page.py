@@ -45,6 +45,7 @@ def write() -> None:
         for degree in (2, 4, 6)
     ]
     save(sheet([smooth]), IMAGES / "fields-smoothest.png")
+    save(sheet(_form(monkey)), IMAGES / "fields-form.png")
     curved = [
         _panel(
             monkey, GeneratorSettings("curvature", smoothing_length=reach), 4, (-26, 8), text, WIDE
@@ -65,6 +66,25 @@ def write() -> None:
     save(sheet([_free()]), IMAGES / "fields-directions.png")
     save(sheet([_tensor()]), IMAGES / "fields-tensor.png")
     save(sheet([_singular(monkey)]), IMAGES / "fields-singularities.png")
+
+
+def _form(monkey: Surface) -> list[list[Panel]]:
+    """Draw curvature of each face and form: of a noisy torus, Suzanne and a box."""
+    ring = torus()
+    size = np.linalg.norm(np.ptp(ring.vertices, axis=0))
+    noise = 0.002 * size * np.random.default_rng(0).standard_normal(ring.vertices.shape)
+    noisy = build_surface(ring.vertices + noise, ring.corner_vertex, ring.face_start)
+    return [
+        [
+            _panel(surface, kind, 4, position, f"{text}, {kind_text}")
+            for surface, position, text in (
+                (noisy, (20, 40), "Noisy torus"),
+                (monkey, (-26, 8), "Suzanne"),
+                (_box(), (32, 28), "Box"),
+            )
+        ]
+        for kind, kind_text in (("curvature", "curvature"), ("form", "form"))
+    ]
 
 
 def _strokes(monkey: Surface) -> list[Panel]:

@@ -7,7 +7,7 @@ import numpy as np
 from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
-from rosy_addon.field.generate import curvature_field
+from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
 from rosy_addon.field.surface import Surface

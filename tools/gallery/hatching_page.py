@@ -9,7 +9,8 @@ import numpy as np
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
-from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.curvature import curvature_field
+from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.surface import Surface

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from rosy_addon.field.generate import curvature_field
+from rosy_addon.field.curvature import curvature_field
 
 from .figure_11 import PLAID, smoothed_a_little
 from .looks import SOLID

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import curvature_field
+from rosy_addon.field.curvature import curvature_field
 from rosy_addon.presets.store import load_preset, preset_keys
 from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
 

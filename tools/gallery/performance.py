@@ -13,8 +13,9 @@ import numpy as np
 
 from rosy_addon.compositor.compose import compose_planar
 from rosy_addon.compositor.look import Look
+from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.field_io import read_field
-from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from shapes import from_triangles, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
+from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import load_field, read_field, write_field
 from rosy_addon.field.formats.sings import read_sings
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.generate import axis_field, curvature_field
+from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField

@@ -11,11 +11,11 @@ from shapes import cylinder, from_quads, from_triangles, icosphere, plane, torus
 from rosy_addon.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
+from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.generate import (
     GeneratorSettings,
     axis_field,
-    curvature_field,
     generate,
 )
 from rosy_addon.field.representation import (

@@ -1,0 +1,181 @@
+"""Principal directions and curvatures of the faces of a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion, subtask
+from .corner_fans import corner_angles_task, corner_rotations_task, smooth_face_values
+from .frames import dot
+from .representation import face_frames, from_representation
+from .rosy_field import RosyField, check_degree
+from .surface import Surface, sum_per_face, surface_task
+
+#: The smallest number whose inverse is finite.
+TINY = float(np.finfo(np.float64).tiny)
+
+#: Kinds of magnitudes of a field, with the descriptions shown in the interface.
+MAGNITUDES = {
+    "unit": "1 on all faces",
+    "confidence": "How well the principal directions are defined, from 0 to 1",
+    "curvature": "The larger principal curvature, multiplied by the size of the mesh",
+}
+
+#: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
+CURVATURE_SMOOTHING_ROUNDS = 2
+
+
+def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
+    """Compute magnitudes of one of the kinds in `MAGNITUDES`.
+
+    "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
+    unit.
+
+    Returns
+    -------
+    (F,) float64 ndarray
+
+    Raises
+    ------
+    RosyError
+        If the kind is unknown.
+    """
+    if kind == "unit":
+        return np.ones(surface.face_count)
+    if kind == "confidence":
+        field = yield from curvature_task(surface, 4)
+        return field.magnitude
+    if kind != "curvature":
+        raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
+    smooth_surface = yield from smooth_normals_task(surface)
+    x, y = face_frames(smooth_surface)
+    yield Progress(0.5, "computing the curvature")
+    mean, deviator = yield from subtask(face_curvature_task(smooth_surface, x, y), 0.5, 1.0)
+    return (np.abs(mean) + np.abs(deviator)) * surface.extent
+
+
+def smooth_normals_task(surface: Surface) -> Task[Surface]:
+    """The surface with smooth normals everywhere, without flat faces and sharp edges."""
+    task = surface_task(
+        surface.vertices,
+        surface.corner_vertex,
+        surface.face_start,
+        name=surface.name,
+        triangles=surface.triangles,
+        triangle_face=surface.triangle_face,
+    )
+    return (yield from subtask(task, 0.0, 0.3, "averaging normals"))
+
+
+def curvature_field(surface: Surface, degree: int) -> RosyField:
+    """Compute a curvature field; see `curvature_task`."""
+    return run_to_completion(curvature_task(surface, degree))
+
+
+def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
+    """Compute a field along the principal directions of curvature.
+
+    Degree 2 follows the direction of the greater signed curvature (positive where the surface is
+    convex). Degree 4 follows both principal directions. In fields of other even degrees, one member
+    follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
+    possible.
+
+    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``. It is 0 at
+    umbilics and in planes, which have no principal directions, and about 1 on cylinders and
+    saddles. k0 is 0.02 divided by the root mean square radius of the mesh. It suppresses rounding
+    errors in nearly flat regions.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
+
+    Raises
+    ------
+    RosyError
+        If the degree is odd.
+
+    References
+    ----------
+    The second fundamental form of a face is fitted to the differences of its corner normals, as in
+    Rusinkiewicz, "Estimating Curvatures and Their Derivatives on Triangle Meshes", 3DPVT 2004, but
+    for polygons. Representations are then averaged over the vertices.
+    """
+    degree = check_degree(degree)
+    if degree % 2:
+        raise RosyError(f"a curvature field needs an even degree, not {degree}")
+    label = "computing principal directions"
+    yield Progress(0.0, label)
+    smooth_surface = yield from smooth_normals_task(surface)
+    yield Progress(0.3, label)
+    x, y = face_frames(smooth_surface)
+    yield Progress(0.4, label)
+    mean, deviator = yield from subtask(face_curvature_task(smooth_surface, x, y), 0.4, 0.6)
+    yield Progress(0.6, label)
+    deviator_norm = np.abs(deviator)
+    center = smooth_surface.face_center.mean(axis=0)
+    offset = smooth_surface.face_center - center
+    radius = np.sqrt(np.mean(dot(offset, offset)))
+    # |k1 - k2| = 2 |d|; |k1| + |k2| is the larger of 2 |H| and 2 |d|.
+    confidence = deviator_norm / (
+        np.maximum(np.abs(mean), deviator_norm) + 0.01 / max(radius, 1e-30)
+    )
+    is_curved = deviator_norm > TINY
+    phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
+    z = confidence * phase ** (degree // 2)
+    yield Progress(0.65, label)
+    task = corner_rotations_task(
+        smooth_surface.face_normal,
+        x,
+        smooth_surface.corner_face,
+        smooth_surface.corner_normal,
+        label,
+    )
+    rotation = yield from subtask(task, 0.65, 0.68)
+    weights = yield from subtask(corner_angles_task(smooth_surface), 0.68, 0.7, label)
+    for index in range(CURVATURE_SMOOTHING_ROUNDS):
+        yield Progress(0.7 + 0.1 * index, label)
+        z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
+    yield Progress(0.95, label)
+    return RosyField(degree, from_representation(z, x, y, degree))
+
+
+def face_curvature_task(
+    surface: Surface, x: np.ndarray, y: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Fit the second fundamental form of each face.
+
+    The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
+    of the normals at its ends, in the least squares sense.
+
+    Returns
+    -------
+    mean : (F,) float64 ndarray
+        Mean curvature (k1 + k2) / 2, in 1 / Blender unit.
+    deviator : (F,) complex128 ndarray
+        (a - c) / 2 + i b. Its modulus is (k1 - k2) / 2, its phase twice the angle of the direction
+        of k1 in the frame x, y.
+    """
+    face, next_corner = surface.corner_face, surface.next_corner
+    points = surface.vertices[surface.corner_vertex]
+    edge = points[next_corner] - points
+    normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
+    yield Progress(0.3, "computing principal directions")
+    u, v = dot(edge, x[face]), dot(edge, y[face])
+    p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
+    yield Progress(0.6, "computing principal directions")
+    products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
+    uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
+    trace = uu + vv
+    trace[trace == 0] = 1.0
+    regularization = 1e-9 * trace  # faces without area get curvature 0 instead of a singular system
+    uu, vv = uu + regularization, vv + regularization
+    # uu a + uv b = up,  uv a + (uu + vv) b + uv c = mixed,  uv b + vv c = vq
+    b = uu * vv * mixed - uv * (vv * up + uu * vq)
+    b /= (uu + vv) * (uu * vv - uv * uv)
+    a, c = (up - uv * b) / uu, (vq - uv * b) / vv
+    return (a + c) / 2, (a - c) / 2 + 1j * b

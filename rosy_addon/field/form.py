@@ -1,0 +1,315 @@
+"""Fields that follow the form of a surface, as an illustrator's hatching does.
+
+The field follows salient edges, and principal directions where they are clear: where the curvature
+differs between the directions, and by more than the noise of the mesh makes it differ. It is smooth
+between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Progress, Task, subtask
+from .connection import Connection, connection_task, laplacian_task
+from .curvature import face_curvature_task
+from .frames import dot, normalize
+from .guided import guided_or_smoothest_task
+from .guides import guides_from_edges
+from .representation import complex_bincount, face_frames, from_representation
+from .rosy_field import RosyField, check_degree
+from .salient_edges import filtered_normals_task, salient_edges_task, weighted_median
+from .smoothest import corner_frame_angles, node_sum_per_face, smoothest_task
+from .sparse_multigrid import CSRMatrix
+from .surface import Surface, edges_task, face_area_vectors, surface_task
+from .vertex_noise import noise_sample_task
+
+#: Lengths over which curvature is averaged, relative to `Surface.extent`.
+SCALES = (0.01, 0.02, 0.04, 0.08)
+
+#: The smallest scale is used at which noise turns half of the directions by less than this angle, in
+#: radians, as measured by adding as much noise again.
+MAX_TURN = np.radians(6)
+
+#: Ratio of curvature and noise at which the confidence in a direction is half.
+CLEAR_RATIO = 3.0
+
+#: Confidence below which directions are ignored, as on spheres.
+MIN_CONFIDENCE = 0.05
+
+#: Curvature below which a surface is flat, relative to the inverse root mean square radius.
+FLAT_CURVATURE = 0.02
+
+#: Distance over which directions of full confidence spread, relative to `Surface.extent`.
+REACH = 0.04
+
+#: Relative residual norms at which conjugate gradients stop: for averages, and for the field. The
+#: directions that they follow are not more exact.
+AVERAGE_TOLERANCE, FIELD_TOLERANCE = 1e-2, 1e-4
+
+#: Largest number of steps of conjugate gradients for averages.
+MAX_STEPS = 500
+
+
+def follows_curvature(degree: int) -> bool:
+    """Return whether the rotations of a degree map the lines or crosses of curvature to themselves."""
+    return degree == 2 or degree % 4 == 0
+
+
+def form_task(surface: Surface, degree: int) -> Task[RosyField]:
+    """Generate a field that follows the form of a surface.
+
+    For degree 2 and the multiples of 4. Fields of other degrees cannot follow principal directions, and
+    are the smoothest ones.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
+        Of magnitude 1; 0 on faces without area.
+
+    Raises
+    ------
+    RosyError
+        If no face has an area, or the degree is out of range.
+
+    References
+    ----------
+    Averages of curvature are as robust as those of Cohen-Steiner and Morvan, "Restricted Delaunay
+    Triangulations and Normal Cycle", SoCG 2003. Choosing the scale by adding noise is a parametric
+    bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993).
+    """
+    degree = check_degree(degree)
+    if not follows_curvature(degree):
+        return (yield from smoothest_task(surface, degree))
+    edges = yield from subtask(
+        edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.04, "finding edges"
+    )
+    normals, noise_angle = yield from subtask(filtered_normals_task(surface, edges), 0.04, 0.1)
+    task = salient_edges_task(surface, edges, normals, noise_angle)
+    ends = yield from subtask(task, 0.1, 0.12, "finding sharp edges")
+    noise = yield from subtask(noise_sample_task(surface, edges, noise_angle), 0.12, 0.15)
+    guides, confidence = yield from subtask(
+        _curvature_guides_task(surface, degree, ends, noise), 0.15, 0.5
+    )
+    # The extent is zero if all faces are points; then so is the confidence.
+    weight = (confidence / max(REACH * surface.extent, 1e-150)) ** 2
+    yield Progress(0.5, "finding guides")
+    edge_guides = guides_from_edges(surface, ends, degree)
+    yield Progress(0.5, "finding guides")
+    at_edge = edge_guides.any(axis=1)
+    guides = np.where(at_edge[:, None], edge_guides, guides)
+    if not guides.any():
+        return (yield from subtask(smoothest_task(surface, degree), 0.5, 1.0))
+    task = guided_or_smoothest_task(
+        surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
+    )
+    return (yield from subtask(task, 0.5, 1.0))
+
+
+def _curvature_guides_task(
+    surface: Surface, degree: int, ends: np.ndarray, noise: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Find principal directions, and how clear they are.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+    ends : (E, 2) int ndarray
+        Edges across which there is no curvature.
+    noise : (V, 3) float64 ndarray
+        Displacements of the vertices.
+
+    Returns
+    -------
+    guides : (F, 3) float64 ndarray
+        Unit vectors, or zero.
+    confidence : (F,) float64 ndarray
+        From 0 to 1.
+    """
+    x, y = face_frames(surface)
+    yield Progress(0.02, "computing principal directions")
+    mean, deviator = yield from subtask(_bounded_curvature_task(surface, ends, x, y), 0.02, 0.15)
+    with_noise = yield from subtask(
+        surface_task(
+            surface.vertices + noise,
+            surface.corner_vertex,
+            surface.face_start,
+            name=surface.name,
+            triangles=surface.triangles,
+            triangle_face=surface.triangle_face,
+        ),
+        0.15,
+        0.2,
+        "computing principal directions",
+    )
+    yield Progress(0.2, "computing principal directions")
+    normal = with_noise.face_normal
+    x_noise = normalize(x - dot(x, normal)[:, None] * normal)
+    task = _bounded_curvature_task(with_noise, ends, x_noise, np.cross(normal, x_noise))
+    _, deviator_noise = yield from subtask(task, 0.2, 0.3)
+    connection = yield from subtask(connection_task(surface), 0.3, 0.38)
+    yield Progress(0.38, "averaging curvature")
+    averages = _Averages(surface, connection, x, y)
+    yield Progress(0.38, "averaging curvature")
+    matrix = yield from subtask(laplacian_task(connection, 2), 0.38, 0.4)
+    flat_matrix = yield from subtask(laplacian_task(connection, 0), 0.4, 0.42)
+    matrix = matrix.with_values(matrix.data.astype(np.complex64))
+    flat_matrix = flat_matrix.with_values(flat_matrix.data.real.astype(np.float32))
+    deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)
+    z = z_noise = None
+    for index, scale in enumerate(SCALES):
+        area = (scale * surface.extent) ** 2
+        start = 0.45 + 0.1 * index
+        z = yield from subtask(averages.smooth_task(matrix, area, deviators[0], z), start, start)
+        z_noise = yield from subtask(
+            averages.smooth_task(matrix, area, deviators[1], z_noise), start, start
+        )
+        # The angle of a cross is a quarter of that of the square of a deviator.
+        turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
+        modulus = np.abs(z)
+        clear = averages.mass * modulus / (modulus + 1 / max(surface.extent, 1e-150))
+        if weighted_median(turn, clear) <= MAX_TURN:
+            break
+    task = averages.smooth_task(flat_matrix, area, averages.node_sums(mean, 0))
+    mean = yield from subtask(task, 0.85, 0.85)
+    power = averages.mass * np.abs(z_noise) ** 2
+    power = yield from subtask(averages.smooth_task(flat_matrix, 4 * area, power), 0.9, 0.9)
+    yield Progress(0.95, "averaging curvature")
+    power = np.maximum(power, 0.0) * CLEAR_RATIO**2
+    offset = surface.face_center - surface.face_center.mean(axis=0)
+    radius = np.sqrt(np.mean(dot(offset, offset)))
+    modulus = np.abs(z)
+    curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE / max(float(radius), 1e-150)
+    yield Progress(0.96, "averaging curvature")
+    signal = modulus**2
+    confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
+    confidence = np.clip((confidence - MIN_CONFIDENCE) / (1 - MIN_CONFIDENCE), 0.0, 1.0)
+    z = confidence * np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+    face_z = averages.face_means(z, 2)
+    yield Progress(0.98, "averaging curvature")
+    confidence = np.abs(face_z)
+    phase = np.divide(face_z, confidence, out=np.zeros_like(face_z), where=confidence > 0)
+    return from_representation(phase ** (degree // 2), x, y, degree), confidence
+
+
+def _bounded_curvature_task(
+    surface: Surface, ends: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Curvature of each face, with normals that are smooth except at the given edges.
+
+    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
+    """
+    task = surface_task(
+        surface.vertices,
+        surface.corner_vertex,
+        surface.face_start,
+        name=surface.name,
+        sharp_edges=ends,
+        triangles=surface.triangles,
+        triangle_face=surface.triangle_face,
+    )
+    smooth = yield from subtask(task, 0.0, 0.6, "averaging normals")
+    mean, deviator = yield from subtask(face_curvature_task(smooth, x, y), 0.6, 1.0)
+    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
+    modulus = np.abs(deviator)
+    deviator = deviator * np.divide(limit, modulus, out=np.ones_like(limit), where=modulus > limit)
+    return np.clip(mean, -limit, limit), deviator
+
+
+class _Averages:
+    """Averages of face values over a length, by way of the nodes of a connection.
+
+    Parameters
+    ----------
+    surface : Surface
+    connection : Connection
+    x, y : (F, 3) float64 ndarray
+        Frames of the faces.
+    """
+
+    def __init__(
+        self, surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
+    ) -> None:
+        self.surface, self.connection = surface, connection
+        self.frame_angle = corner_frame_angles(surface, connection, x, y)
+        self.corner_face = np.repeat(surface.triangle_face, 3)
+        self.corner_area = np.repeat(connection.area / 3, 3)
+        self.mass = connection.positive_mass
+
+    def node_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
+        """(n,) ndarray: integrals of face values around the nodes; complex if the degree is not 0."""
+        terms = self.corner_area * values[self.corner_face]
+        node, count = self.connection.corner_node, self.connection.node_count
+        if not degree:
+            return np.bincount(node, terms, count)
+        return complex_bincount(node, terms * np.exp(-1j * degree * self.frame_angle), count)
+
+    def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
+        """(F,) complex128: mean of the node values of a degree on each face."""
+        total = node_sum_per_face(self.surface, self.connection, values, self.frame_angle, degree)
+        area = np.bincount(
+            self.surface.triangle_face, 3 * self.connection.area, self.surface.face_count
+        )
+        return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
+
+    def smooth_task(
+        self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None
+    ) -> Task[np.ndarray]:
+        """Solve (M + area L) z = sums by conjugate gradients, with M the masses and L the Laplacian.
+
+        Parameters
+        ----------
+        matrix : CSRMatrix
+            L, of single precision.
+        area : float
+            The square of the length of the average, in square Blender units.
+        sums : (n,) ndarray
+            From `node_sums`.
+        start : (n,) ndarray, optional
+            An estimate of the solution.
+
+        Returns
+        -------
+        (n,) ndarray
+            Of the precision of `sums`.
+        """
+        dtype = matrix.data.dtype
+        # All numbers are of order 1 after this, whatever the size of the mesh.
+        mass = (self.mass / self.mass.mean()).astype(np.float32)
+        area = np.float32(area / self.mass.mean())
+        scale = float(np.abs(sums).max()) or 1.0
+        diagonal = mass + area * matrix.diagonal.astype(np.float32)
+
+        def apply(vector: np.ndarray) -> np.ndarray:
+            return mass * vector + area * (matrix @ vector)
+
+        right = (sums / scale).astype(dtype)
+        unit = scale / self.mass.mean()
+        solution = np.zeros_like(right) if start is None else (start / unit).astype(dtype)
+        residual = right - apply(solution)
+        limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real
+        direction, previous = np.zeros_like(right), np.float32(1.0)
+        for step in range(MAX_STEPS):
+            yield Progress(1 - 0.95**step, "averaging curvature")
+            preconditioned = residual / diagonal
+            current = np.vdot(residual, preconditioned).real
+            if current <= limit:
+                break
+            direction = preconditioned + current / previous * direction
+            image = apply(direction)
+            length = current / np.vdot(direction, image).real
+            solution += length * direction
+            residual -= length * image
+            previous = current
+        return solution.astype(sums.dtype) * unit

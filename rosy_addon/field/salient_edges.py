@@ -1,0 +1,142 @@
+"""Edges at which the form of a surface breaks, told from the noise of scans and coarse meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Progress, Task
+from .frames import dot, normalize
+from .surface import Edges, Surface, connected_components_task, face_area_vectors
+
+#: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
+FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
+
+#: Edges with a larger angle than the second are salient, in radians. Between the two angles, an edge is
+#: salient if its angle is at least `MIN_RATIO` times those of the other edges of its two faces.
+MIN_ANGLE, SHARP_ANGLE = np.pi / 6, np.pi / 3
+MIN_RATIO = 2.0
+
+#: Both angles are at least this multiple of the angle by which noise turns the normals.
+NOISE_MULTIPLE = 5.0
+
+#: Shortest line of salient edges, relative to `Surface.extent`.
+MIN_LINE_LENGTH = 0.05
+
+
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """Return the value at which half of the total weight is reached; 0 without any weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    if not len(total) or not total[-1] > 0:
+        return 0.0
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the angles between rows of vectors, in radians; 0 where a vector is zero."""
+    cross = np.cross(a, b)
+    return np.arctan2(np.sqrt(dot(cross, cross)), dot(a, b))
+
+
+def filtered_normals_task(surface: Surface, edges: Edges) -> Task[tuple[np.ndarray, float]]:
+    """Smooth the face normals over edges, but not across large angles.
+
+    Returns
+    -------
+    normals : (F, 3) float64 ndarray
+        Unit, or zero.
+    noise_angle : float
+        The median angle, by area, between the normals before and after, in radians.
+
+    References
+    ----------
+    Zheng, Fu, Au and Tai, "Bilateral Normal Filtering for Mesh Denoising", TVCG 2011.
+    """
+    label = "filtering normals"
+    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
+    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    area = np.sqrt(dot(vectors, vectors))
+    area /= max(float(area.max(initial=0.0)), 1e-300)
+    normals = surface.face_normal
+    for index in range(FILTER_ROUNDS):
+        yield Progress(index / FILTER_ROUNDS, label)
+        normal_a, normal_b = normals[face_a], normals[face_b]
+        difference = normal_a - normal_b
+        weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
+        weight_a, weight_b = weight * area[face_b], weight * area[face_a]
+        yield Progress((index + 0.5) / FILTER_ROUNDS, label)
+        total = normals * area[:, None]
+        for axis in range(3):
+            total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
+            total[:, axis] += np.bincount(face_b, weight_b * normal_a[:, axis], len(area))
+        normals = normalize(total)
+    return normals, weighted_median(angle_between(surface.face_normal, normals), area)
+
+
+def salient_edges_task(
+    surface: Surface, edges: Edges, normals: np.ndarray, noise_angle: float
+) -> Task[np.ndarray]:
+    """Find the borders and the edges at which the surface bends more sharply than around them.
+
+    On a coarse mesh of a smooth surface, neighboring edges have similar angles, and none of them is
+    salient unless it is very sharp.
+
+    Parameters
+    ----------
+    surface : Surface
+    edges : Edges
+    normals, noise_angle
+        From `filtered_normals_task`.
+
+    Returns
+    -------
+    (E, 2) int32 ndarray
+        Pairs of vertices.
+    """
+    label = "finding sharp edges"
+    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
+    angle = np.zeros(len(edges.ends))
+    # Faces without area have no normal, so their edges have no angle.
+    angle[edges.interior] = angle_between(normals[face_a], normals[face_b])
+    yield Progress(0.3, label)
+    interior = angle[edges.interior]
+    others = np.maximum(*_largest_of_others(surface, angle[edges.corner_edge], edges.halfedges))
+    noise = NOISE_MULTIPLE * noise_angle
+    is_sharp = interior >= max(SHARP_ANGLE, noise)
+    is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
+    is_salient = np.ones(len(edges.ends), dtype=bool)
+    is_salient[edges.interior] = is_sharp
+    ends = edges.ends[is_salient]
+    if not len(ends):
+        return ends
+    line = yield from connected_components_task(len(surface.vertices), ends)
+    line = line[ends[:, 0]]
+    edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
+    length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]
+    return ends[length >= MIN_LINE_LENGTH * surface.extent]
+
+
+def _largest_of_others(
+    surface: Surface, corner_angle: np.ndarray, halfedges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest angle of the other edges of the two faces at each interior edge.
+
+    Parameters
+    ----------
+    surface : Surface
+    corner_angle : (C,) float64 ndarray
+        Angle of the edge from each corner to the next.
+    halfedges : (I, 2) int32 ndarray
+        `Edges.halfedges`.
+    """
+    first = surface.face_start[:-1]
+    largest = np.maximum.reduceat(corner_angle, first)
+    is_largest = corner_angle == largest[surface.corner_face]
+    second = np.maximum.reduceat(np.where(is_largest, 0.0, corner_angle), first)
+    is_tied = np.add.reduceat(is_largest.astype(np.int32), first) > 1
+    second = np.where(is_tied, largest, second)
+    a, b = (
+        np.where(is_largest[side], second[face], largest[face])
+        for side, face in ((side, surface.corner_face[side]) for side in halfedges.T)
+    )
+    return a, b

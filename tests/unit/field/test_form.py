@@ -1,0 +1,170 @@
+"""Fields that follow the form, against closed forms, with noise, and on the first meshes people try."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
+
+from rosy_addon.field.form import form_task
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import generate
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.salient_edges import filtered_normals_task, salient_edges_task
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.surface import Surface, build_edges, build_surface
+from rosy_addon.field.vertex_noise import noise_sample_task
+from rosy_addon.progress import run_to_completion
+
+AXES = np.array([1.0, 0.8, 0.6])
+
+
+def ellipsoid() -> Surface:
+    ball = icosphere(5)
+    return with_vertices(ball, ball.vertices * AXES)
+
+
+def with_vertices(surface: Surface, vertices: np.ndarray) -> Surface:
+    return build_surface(vertices, surface.corner_vertex, surface.face_start)
+
+
+def with_noise(surface: Surface, share: float) -> Surface:
+    """Displace the vertices along their normals by a share of the diagonal of the bounding box."""
+    normal = np.zeros_like(surface.vertices)
+    np.add.at(normal, surface.corner_vertex, surface.corner_normal)
+    amplitude = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
+    noise = np.random.default_rng(3).standard_normal((len(normal), 1))
+    return with_vertices(surface, surface.vertices + amplitude * noise * normalize(normal))
+
+
+def direction_on_torus(center: np.ndarray) -> np.ndarray:
+    angle = np.arctan2(center[:, 1], center[:, 0])
+    return np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+
+
+def direction_on_ellipsoid(center: np.ndarray) -> np.ndarray:
+    """A principal direction, an eigenvector of the tangential part of the Hessian of the quadric."""
+    normal = normalize(center / AXES**2)
+    tangential = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+    operator = tangential @ np.diag(1 / AXES**2) @ tangential
+    return np.linalg.eigh(operator)[1][:, :, 2]  # the normal has the eigenvalue 0, the smallest
+
+
+def cross_errors(surface: Surface, field: RosyField, expected: np.ndarray) -> np.ndarray:
+    """The angles in degrees from the nearest of the directions at right angles to a given one."""
+    normal = surface.face_normal
+    expected = normalize(expected - dot(expected, normal)[:, None] * normal)
+    angle = np.degrees(
+        np.arctan2(dot(np.cross(expected, field.vectors), normal), dot(expected, field.vectors))
+    )
+    return np.abs((angle + 45) % 90 - 45)
+
+
+def salient(surface: Surface) -> np.ndarray:
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    filtered = run_to_completion(filtered_normals_task(surface, edges))
+    return run_to_completion(salient_edges_task(surface, edges, *filtered))
+
+
+@pytest.mark.parametrize(("share", "bound"), [(0.0, 0.5), (0.0005, 2.0), (0.002, 4.0)])
+@pytest.mark.parametrize("form", ["torus", "ellipsoid"])
+def test_principal_directions_with_noise(form, share, bound):
+    surface = torus(200, 100) if form == "torus" else ellipsoid()
+    surface = with_noise(surface, share) if share else surface
+    field = generate(surface, "form", 4)
+    center = surface.face_center
+    expected = direction_on_torus(center) if form == "torus" else direction_on_ellipsoid(center)
+    assert np.median(cross_errors(surface, field, expected)) <= bound
+
+
+def test_lines_run_around_a_torus_tube():
+    """In the direction of the greater curvature, where both principal directions are clear."""
+    surface = torus()
+    field = generate(surface, "form", 2)
+    outside = np.hypot(*surface.face_center[:, :2].T) > 1
+    along = direction_on_torus(surface.face_center)
+    assert np.abs(dot(field.vectors, along))[outside].max() < 0.02
+
+
+def test_noise_is_measured():
+    for surface, share in ((torus(200, 100), 0.002), (ellipsoid(), 0.0005)):
+        noisy = with_noise(surface, share)
+        edges = build_edges(noisy.corner_vertex, noisy.face_start)
+        _, angle = run_to_completion(filtered_normals_task(noisy, edges))
+        sample = run_to_completion(noise_sample_task(noisy, edges, angle))
+        expected = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
+        assert np.sqrt(dot(sample, sample).mean()) == pytest.approx(expected, rel=0.2)
+
+
+def test_a_ball_has_no_clear_direction():
+    ball = icosphere(4)
+    np.testing.assert_array_equal(
+        generate(ball, "form", 4).vectors, generate(ball, "smoothest", 4).vectors
+    )
+
+
+@pytest.mark.parametrize("share", [0.0005, 0.002])
+def test_a_noisy_ball_has_as_few_singularities_as_possible(share):
+    ball = with_noise(icosphere(4), share)
+    vertices, index = find_singularities(ball, generate(ball, "form", 4))
+    assert len(vertices) == 8 and (index == 1).all()
+
+
+def test_the_field_follows_the_edges_of_a_cube():
+    field = generate(cube(), "form", 4)
+    np.testing.assert_allclose(np.sort(np.abs(field.vectors), axis=1), [[0, 0, 1]] * 6, atol=1e-9)
+
+
+def test_the_field_follows_the_border_of_a_plane():
+    field = generate(plane(8, 8), "form", 4)
+    np.testing.assert_allclose(np.abs(field.vectors).max(axis=1), 1.0, atol=1e-9)
+
+
+def test_salient_edges():
+    """All edges of a cube, the border of an open tube but none of its eight edges, none of noise."""
+    assert len(salient(cube())) == 12
+    tube = cylinder(8, 3)
+    border = salient(tube)
+    assert len(border) == 16
+    assert len(np.unique(tube.vertices[border.ravel(), 2])) == 2
+    assert len(salient(icosphere(1))) == 0
+    assert len(salient(with_noise(torus(200, 100), 0.001))) == 0
+
+
+@pytest.mark.parametrize("degree", [1, 3, 6])
+def test_other_degrees_are_smoothest(degree):
+    surface = torus(24, 12)
+    np.testing.assert_array_equal(
+        generate(surface, "form", degree).vectors, generate(surface, "smoothest", degree).vectors
+    )
+
+
+def test_rotated_and_scaled_meshes_have_the_same_field():
+    surface = with_noise(torus(60, 30), 0.001)
+    turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    turned = with_vertices(surface, 1e3 * surface.vertices @ turn.T + 7.0)
+    expected = generate(surface, "form", 4).vectors @ turn.T
+    errors = cross_errors(turned, generate(turned, "form", 4), expected)
+    # The extent is that of the bounding box, which is not that of the rotated mesh.
+    assert np.median(errors) < 0.5
+
+
+def test_disconnected_parts_and_stray_faces():
+    ring, ball = torus(48, 24), icosphere(3)
+    offset = len(ring.vertices)
+    quads = ring.corner_vertex.reshape(-1, 4)
+    triangles = np.concatenate(
+        [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], ball.corner_vertex.reshape(-1, 3) + offset]
+    )
+    triangles = np.concatenate([triangles, [[0, 0, 1]]])
+    both = from_triangles(np.concatenate([ring.vertices, ball.vertices + 4.0]), triangles)
+    field = generate(both, "form", 4)
+    np.testing.assert_allclose(field.magnitude[:-1], 1.0, atol=1e-6)
+    assert field.magnitude[-1] == 0
+
+
+def test_long_work_is_done_in_steps():
+    steps = [progress.fraction for progress in form_task(torus(64, 32), 4)]
+    assert len(steps) > 60
+    assert steps == sorted(steps)

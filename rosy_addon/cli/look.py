@@ -22,6 +22,9 @@ from ..settings import settings_of
 from .mesh_field import load_uv_map
 from .presets import user_presets_folder
 
+#: Samples per pixel along each axis in pictures of mesh files, unless the preset has more.
+FILE_SUPERSAMPLING = 2
+
 #: Name of the color attribute of vertices, as in Blender.
 VERTEX_COLOR = "Color"
 
@@ -62,6 +65,11 @@ def add_tone_options(parser: argparse.ArgumentParser) -> None:
 def requested_look(options: argparse.Namespace, default: Look) -> Look:
     """Return the look of --preset, by default `default`, with the settings of --set."""
     look = load_preset(options.preset, user_presets_folder()).look if options.preset else default
+    return _with_options(look, options)
+
+
+def _with_options(look: Look, options: argparse.Namespace) -> Look:
+    """Return a look with the settings of --set."""
     return look.with_settings(dict(_parse_setting(text) for text in options.set))
 
 
@@ -88,8 +96,11 @@ def mesh_file_look(options: argparse.Namespace) -> Look:
     RosyError
         If there are two tone sources, or the look uses the lights of a scene.
     """
-    # Supersampled by default: nothing smooths the edges of the picture later.
-    look = requested_look(options, Look(supersampling=2))
+    look = load_preset(options.preset, user_presets_folder()).look if options.preset else Look()
+    if look.supersampling == Look().supersampling:
+        # Nothing smooths the edges of the picture later.
+        look = replace(look, supersampling=FILE_SUPERSAMPLING)
+    look = _with_options(look, options)
     check_light(look.light, str(options.mesh))
     sources = [
         source

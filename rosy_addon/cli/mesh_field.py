@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import RosyError
+from ..errors import RosyError, counted
 from ..field.field_io import READ_SUFFIXES, load_field
 from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.formats.obj import read_uv
@@ -124,12 +124,25 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField
     has_guides = options.strokes is not None or options.guides is not None
     kind = options.generate or ("guided" if has_guides else "form")
     field = generate(surface, _generator_settings(options, surface, kind, degree), degree)
-    if surface.face_count and not field.vectors.any():
-        print_note(
-            f"{surface.name}: {kind} gives no direction on any face: choose another kind with "
-            "--generate, such as smoothest"
-        )
+    print_note(_undefined_note(surface, field, kind))
     return surface, field
+
+
+def _undefined_note(surface: Surface, field: RosyField, kind: str) -> str:
+    """Say on how many faces a generated field has no direction; empty if it has one on all faces.
+
+    Faces without area do not count.
+    """
+    has_area = surface.face_normal.any(axis=1)
+    count = int((has_area & ~field.vectors.any(axis=1)).sum())
+    if not count:
+        return ""
+    total = int(has_area.sum())
+    where = "any face" if count == total else f"{count:,} of {counted(total, 'face')}"
+    return (
+        f"{surface.name}: {kind} gives no direction on {where}: choose another kind with --generate, "
+        "such as form"
+    )
 
 
 def _generator_settings(

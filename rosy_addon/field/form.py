@@ -7,6 +7,8 @@ between them.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..progress import Progress, Task, subtask
@@ -36,8 +38,8 @@ CLEAR_RATIO = 3.0
 #: Confidence below which directions are ignored, as on spheres.
 MIN_CONFIDENCE = 0.05
 
-#: Curvature below which a surface is flat, relative to the inverse root mean square radius.
-FLAT_CURVATURE = 0.02
+#: Curvature below which a surface is flat, relative to the inverse of `Surface.extent`.
+FLAT_CURVATURE = 0.05
 
 #: Distance over which directions of full confidence spread, relative to `Surface.extent`.
 REACH = 0.04
@@ -88,8 +90,9 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
     bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993).
     """
     degree = check_degree(degree)
-    if not follows_curvature(degree):
+    if not follows_curvature(degree) or not surface.face_normal.any():
         return (yield from smoothest_task(surface, degree))
+    original, surface = surface, _of_unit_extent(surface)
     edges = yield from subtask(
         edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.04, "finding edges"
     )
@@ -100,19 +103,27 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
     guides, confidence = yield from subtask(
         _curvature_guides_task(surface, degree, ends, noise), 0.15, 0.5
     )
-    # The extent is zero if all faces are points; then so is the confidence.
-    weight = (confidence / max(REACH * surface.extent, 1e-150)) ** 2
+    weight = (confidence / REACH) ** 2
     yield Progress(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, ends, degree)
     yield Progress(0.5, "finding guides")
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     if not guides.any():
-        return (yield from subtask(smoothest_task(surface, degree), 0.5, 1.0))
+        return (yield from subtask(smoothest_task(original, degree), 0.5, 1.0))
     task = guided_or_smoothest_task(
         surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
     )
     return (yield from subtask(task, 0.5, 1.0))
+
+
+def _of_unit_extent(surface: Surface) -> Surface:
+    """Return a surface of extent 1 around the origin, so that no number is very large or small."""
+    used = surface.used_vertices
+    vertices = np.zeros_like(surface.vertices)
+    low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
+    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / surface.extent
+    return replace(surface, vertices=vertices, rest_vertices=None)
 
 
 def _curvature_guides_task(
@@ -168,7 +179,7 @@ def _curvature_guides_task(
     deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)
     z = z_noise = None
     for index, scale in enumerate(SCALES):
-        area = (scale * surface.extent) ** 2
+        area = scale**2
         start = 0.45 + 0.1 * index
         z = yield from subtask(averages.smooth_task(matrix, area, deviators[0], z), start, start)
         z_noise = yield from subtask(
@@ -177,7 +188,7 @@ def _curvature_guides_task(
         # The angle of a cross is a quarter of that of the square of a deviator.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
         modulus = np.abs(z)
-        clear = averages.mass * modulus / (modulus + 1 / max(surface.extent, 1e-150))
+        clear = averages.mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
     task = averages.smooth_task(flat_matrix, area, averages.node_sums(mean, 0))
@@ -186,10 +197,8 @@ def _curvature_guides_task(
     power = yield from subtask(averages.smooth_task(flat_matrix, 4 * area, power), 0.9, 0.9)
     yield Progress(0.95, "averaging curvature")
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2
-    offset = surface.face_center - surface.face_center.mean(axis=0)
-    radius = np.sqrt(np.mean(dot(offset, offset)))
     modulus = np.abs(z)
-    curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE / max(float(radius), 1e-150)
+    curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE
     yield Progress(0.96, "averaging curvature")
     signal = modulus**2
     confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
@@ -273,7 +282,7 @@ class _Averages:
         matrix : CSRMatrix
             L, of single precision.
         area : float
-            The square of the length of the average, in square Blender units.
+            The square of the length of the average.
         sums : (n,) ndarray
             From `node_sums`.
         start : (n,) ndarray, optional

@@ -294,15 +294,27 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
     Raises
     ------
     NothingInViewError
-        Always. The message says whether the surfaces are hidden or outside the frame.
+        Always. The message says whether the surfaces are hidden, cover no pixel, or are outside the
+        frame.
     """
     field_instances = [instance for instance in instances if instance.field is not None]
     fragments, _ = rasterize_instances(field_instances, camera)
     names = ", ".join(instance.surface.name for instance in field_instances)
-    reason = "hidden behind other objects" if len(fragments.pixel) else "outside the frame"
+    if len(fragments.pixel):
+        reason = "hidden behind other objects"
+    elif any(_has_vertex_in_frame(instance, camera) for instance in field_instances):
+        reason = "seen exactly edge-on, or smaller than a pixel: turn the camera, or move it closer"
+    else:
+        reason = "outside the frame"
     raise NothingInViewError(
         f"no RoSy object is in view of camera '{camera.name}': {names} is {reason}"
     )
+
+
+def _has_vertex_in_frame(instance: MeshInstance, camera: Camera) -> bool:
+    """Return whether a camera has a used vertex of an instance in its frame."""
+    x, y, z, w = _to_clip_space(instance, camera)[:, instance.surface.used_vertices]
+    return bool((np.maximum(np.abs(x), np.maximum(np.abs(y), np.abs(z))) <= w).any())
 
 
 def _new_gbuffer_task(

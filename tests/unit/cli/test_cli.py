@@ -101,6 +101,15 @@ def test_same_command_same_bytes(ring, tmp_path):
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
+def test_the_default_preset_is_no_preset(ring, tmp_path):
+    common = ["render", str(ring), "--size", "40x40", "-o"]
+    assert main([*common, str(tmp_path / "a.png")]) == 0
+    assert main([*common, str(tmp_path / "b.png"), "--preset", "default"]) == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    alpha = pixels_of(tmp_path / "a.png")[..., 3]
+    assert ((alpha > 0) & (alpha < alpha.max())).any()
+
+
 def test_y_is_up_in_off_files_by_default(tmp_path):
     tall = torus(24, 12)
     path = write_off(tmp_path / "a.off", tall)  # around z

@@ -488,6 +488,13 @@ def test_errors_of_projection():
         project([MeshInstance(ball, np.full((4, 4), np.inf), field)], camera)
 
 
+def test_a_mesh_seen_edge_on_covers_no_pixel():
+    square = plane()
+    camera = lens(look_at((5, 0, 0), (0, 0, 0)), 50, 50)
+    with pytest.raises(RosyError, match="is seen exactly edge-on, or smaller than a pixel"):
+        project([MeshInstance(square, IDENTITY, tangent_field(square, 4))], camera)
+
+
 def test_progress_grows_and_the_task_can_be_closed():
     surface = torus()
     instances = [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))] * 2

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from skimage.measure import marching_cubes
 
@@ -121,19 +123,38 @@ def suzanne(subdivisions: int = 3) -> Surface:
     """Return Blender's monkey, subdivided."""
     import bpy
 
+    return evaluated_surface(
+        bpy.ops.mesh.primitive_monkey_add, "SUBSURF", name="Suzanne", levels=subdivisions
+    )
+
+
+def evaluated_surface(
+    add: Callable[[], object], modifier: str = "", name: str = "mesh", **settings: float
+) -> Surface:
+    """Return the mesh that an operator of Blender adds, with a modifier."""
+    import bpy
+
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.mesh.primitive_monkey_add()
-    monkey = bpy.context.object
-    modifier = monkey.modifiers.new("Subdivision", "SUBSURF")
-    modifier.levels = subdivisions
-    mesh = monkey.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    add()
+    obj = bpy.context.object
+    if modifier:
+        added = obj.modifiers.new(modifier, modifier)
+        for key, value in settings.items():
+            setattr(added, key, value)
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
     mesh.vertices.foreach_get("co", vertices.ravel())
     corners = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     start = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", start)
-    return build_surface(vertices, corners, np.append(start, len(corners)), name="Suzanne")
+    flat = np.zeros(len(mesh.polygons), dtype=bool)
+    if not modifier:
+        mesh.polygons.foreach_get("use_smooth", flat)
+        flat = ~flat
+    return build_surface(
+        vertices, corners, np.append(start, len(corners)), name=name, flat_faces=flat
+    )
 
 
 def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray) -> Surface:

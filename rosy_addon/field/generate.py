@@ -47,14 +47,11 @@ GENERATORS = {
 #: Shorter projections of a unit axis are rounding errors: the face is perpendicular to the axis.
 MIN_PROJECTION = 1e-12
 
-#: Bytes of memory that a face takes at the peak, by kind. The other kinds take little.
-BYTES_PER_FACE = {
-    "form": 1000,
-    "smoothest": 750,
-    "curvature": 720,
-    "features": 1000,
-    "guided": 1000,
-}
+#: Bytes of memory that a triangle takes at the peak, by kind. The other kinds take little.
+BYTES_PER_TRIANGLE = {"form": 1200, "smoothest": 640, "features": 1000, "guided": 950}
+
+#: For "curvature", bytes that a face takes, and bytes that a triangle takes with a reach.
+CURVATURE_BYTES_PER_FACE, REACH_BYTES_PER_TRIANGLE = 710, 950
 
 
 @dataclass(frozen=True)
@@ -135,7 +132,7 @@ def generate_task(
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
     check_memory(
-        BYTES_PER_FACE.get(settings.kind, 0) * surface.face_count,
+        _peak_memory(surface, settings),
         f"{surface.name}: a field on {surface.face_count:,} faces",
         "choose a smaller mesh, or another kind of field",
     )
@@ -166,6 +163,15 @@ def generate_task(
         task = uv_guides_task(surface, settings.uv, check_degree(degree))
         return RosyField(degree, (yield from task))
     raise RosyError(f"unknown generator '{settings.kind}': choose {', '.join(GENERATORS)}")
+
+
+def _peak_memory(surface: Surface, settings: GeneratorSettings) -> int:
+    """Estimate the bytes that `generate_task` takes at its peak."""
+    triangle_count = len(surface.triangles)
+    if settings.kind != "curvature":
+        return BYTES_PER_TRIANGLE.get(settings.kind, 0) * triangle_count
+    reach_bytes = REACH_BYTES_PER_TRIANGLE * triangle_count if settings.smoothing_length else 0
+    return max(CURVATURE_BYTES_PER_FACE * surface.face_count, reach_bytes)
 
 
 def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:

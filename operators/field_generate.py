@@ -202,7 +202,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         kind = KIND_LABELS.get(self.kind, self.kind.capitalize())
         return RosyError(
             f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
-            "Smoothest"
+            "Form"
         )
 
     def _notes_task(self, fields: list[tuple[Surface, RosyField]]) -> Task[str]:

@@ -358,20 +358,23 @@ def export_and_import_from_the_file_browser():
     make_field()
     path = SHOTS / "browser.rosy"
     path.unlink(missing_ok=True)
-    for operator in (bpy.ops.rosy.field_export, bpy.ops.rosy.field_import):
+    attributes = bpy.context.object.data.attributes
+    for operator, is_done in (
+        (bpy.ops.rosy.field_export, path.is_file),
+        (bpy.ops.rosy.field_import, lambda: "rosy" in attributes),
+    ):
         with in_view():
             assert operator("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
         yield 1.0
         params = browser_params()
         params.directory, params.filename = str(SHOTS).encode(), path.name
         if operator.idname_py() == "rosy.field_import":
-            bpy.context.object.data.attributes.remove(bpy.context.object.data.attributes["rosy"])
+            attributes.remove(attributes["rosy"])
         yield 0.5
         press_return()
-        yield from wait_until(lambda: path.is_file() and status().current is None)
-        yield 0.5
+        yield from wait_until(lambda is_done=is_done: is_done() and status().current is None)
+        yield 0.2
         check_idle()
-    yield from wait_until(lambda: "rosy" in bpy.context.object.data.attributes)
 
 
 def start_turntable(name, pictures, size=(160, 120)):

@@ -50,13 +50,16 @@ def outline_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     # The frame has an empty margin that is wider than the lines.
     stride = width + 2 * radius + 2
     entry_of_cell = np.full((height + 2 * radius + 2) * stride, -1, dtype=np.int32)
-    row, column = np.divmod(gbuffer.pixel, np.int32(width))
-    cell = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
-    entry_of_cell[cell] = np.arange(len(cell), dtype=np.int32)
+    cell = np.empty(len(gbuffer.pixel), dtype=np.int32)
+    for block in pixel_blocks(len(cell)):
+        yield Progress(0.1 * block.start / len(cell), STEP_LABEL)
+        row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
+        cell[block] = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
+        entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
     # Larger depths are nearer to the eye.
     depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
     for block in pixel_blocks(len(cell)):
-        yield Progress(0.2 * block.start / len(cell), STEP_LABEL)
+        yield Progress(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
         depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
     edge_pixels, line_width = yield from subtask(
         _outline_edges_task(gbuffer, look, entry_of_cell, cell, stride, depth, tolerance), 0.2, 0.9

@@ -13,7 +13,7 @@ import numpy as np
 from ..field.frames import dot_components, transport_components, view_frame
 from ..progress import Progress, Task, run_to_completion
 from .gbuffer import GBuffer
-from .pixel_blocks import BLOCK_PIXELS
+from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 
 #: Upper bound of the slope of a tangent plane against the picture, in pixels of depth per pixel.
 #: Corresponds to 88 degrees.
@@ -95,25 +95,31 @@ def neighbor_masks_task(
     parallel layers whose distance is one pixel. Depth is measured in a quantity that is linear on
     screen for planes: z, or -1 / z under perspective.
     """
-    width = np.int32(gbuffer.camera.width)
-    row, column = np.divmod(gbuffer.pixel, width)
-    masks = np.full(len(row), 1 << 4, dtype=np.uint16)
-    if not len(row):
+    label = "finding neighbors"
+    count = len(gbuffer.pixel)
+    masks = np.full(count, 1 << 4, dtype=np.uint16)
+    if not count:
         return masks
-    left_column = column.min()
-    column -= left_column - 1
+    row, column = np.empty((2, count), dtype=np.int32)
+    left_column, right_column = gbuffer.camera.width, 0
+    for block in pixel_blocks(count):
+        yield Progress(0.1 * block.start / count, label)
+        row[block], column[block] = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
+        left_column = min(left_column, int(column[block].min()))
+        right_column = max(right_column, int(column[block].max()))
     # One empty column on either side.
-    width = int(column.max()) + 2
+    width = right_column - left_column + 3
     min_normal_cosine = None if cross_creases else np.float32(np.cos(crease_angle))
     band_rows = max(BLOCK_PIXELS // width, 1)
     first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
     for row_start in range(first_row, first_row + row_count, band_rows):
-        yield Progress((row_start - first_row) / row_count, "finding neighbors")
+        yield Progress(0.1 + 0.9 * (row_start - first_row) / row_count, label)
         # The grid has one more row: the first row of the next band, or an empty row.
         first, stop = np.searchsorted(
             row, np.array([row_start, row_start + band_rows + 1], row.dtype)
         ).tolist()
-        grid_index = (row[first:stop] - row_start) * width + column[first:stop]
+        grid_index = (row[first:stop] - row_start) * width
+        grid_index += column[first:stop] - (left_column - 1)
         grid = _pixel_grid(gbuffer, slice(first, stop), grid_index, (band_rows + 1, width))
         grid_masks = np.zeros((band_rows + 1, width), dtype=np.uint16)
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):

@@ -22,7 +22,7 @@ from .rosy_field import RosyField, check_degree
 from .salient_edges import filtered_normals_task, salient_edges_task, weighted_median
 from .smoothest import corner_frame_angles, node_sum_per_face, smoothest_task
 from .sparse_multigrid import CSRMatrix
-from .surface import Surface, edges_task, face_area_vectors, surface_task
+from .surface import Surface, edges_task, face_area_vectors, smooth_fans_task, surface_task
 from .vertex_noise import noise_sample_task
 
 #: Lengths over which curvature is averaged, relative to `Surface.extent`.
@@ -149,24 +149,16 @@ def _curvature_guides_task(
     """
     x, y = face_frames(surface)
     yield Progress(0.02, "computing principal directions")
-    mean, deviator = yield from subtask(_bounded_curvature_task(surface, ends, x, y), 0.02, 0.15)
-    with_noise = yield from subtask(
-        surface_task(
-            surface.vertices + noise,
-            surface.corner_vertex,
-            surface.face_start,
-            name=surface.name,
-            triangles=surface.triangles,
-            triangle_face=surface.triangle_face,
-        ),
-        0.15,
-        0.2,
-        "computing principal directions",
+    task = smooth_fans_task(
+        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
     )
+    fans = yield from subtask(task, 0.02, 0.1)
+    mean, deviator = yield from subtask(_bounded_curvature_task(surface, fans, x, y), 0.1, 0.2)
+    with_noise = replace(surface, vertices=surface.vertices + noise)
     yield Progress(0.2, "computing principal directions")
     normal = with_noise.face_normal
     x_noise = normalize(x - dot(x, normal)[:, None] * normal)
-    task = _bounded_curvature_task(with_noise, ends, x_noise, np.cross(normal, x_noise))
+    task = _bounded_curvature_task(with_noise, fans, x_noise, np.cross(normal, x_noise))
     _, deviator_noise = yield from subtask(task, 0.2, 0.3)
     connection = yield from subtask(connection_task(surface), 0.3, 0.38)
     yield Progress(0.38, "averaging curvature")
@@ -212,9 +204,9 @@ def _curvature_guides_task(
 
 
 def _bounded_curvature_task(
-    surface: Surface, ends: np.ndarray, x: np.ndarray, y: np.ndarray
+    surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> Task[tuple[np.ndarray, np.ndarray]]:
-    """Curvature of each face, with normals that are smooth except at the given edges.
+    """Curvature of each face, with normals that are smooth within the given fans of corners.
 
     A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
     """
@@ -223,7 +215,7 @@ def _bounded_curvature_task(
         surface.corner_vertex,
         surface.face_start,
         name=surface.name,
-        sharp_edges=ends,
+        corner_fan=corner_fan,
         triangles=surface.triangles,
         triangle_face=surface.triangle_face,
     )

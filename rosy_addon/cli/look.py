@@ -64,8 +64,12 @@ def add_tone_options(parser: argparse.ArgumentParser) -> None:
 
 def requested_look(options: argparse.Namespace, default: Look) -> Look:
     """Return the look of --preset, by default `default`, with the settings of --set."""
-    look = load_preset(options.preset, user_presets_folder()).look if options.preset else default
-    return _with_options(look, options)
+    return _with_options(_preset_look(options, default), options)
+
+
+def _preset_look(options: argparse.Namespace, default: Look) -> Look:
+    """Return the look of --preset, by default `default`."""
+    return load_preset(options.preset, user_presets_folder()).look if options.preset else default
 
 
 def _with_options(look: Look, options: argparse.Namespace) -> Look:
@@ -96,7 +100,7 @@ def mesh_file_look(options: argparse.Namespace) -> Look:
     RosyError
         If there are two tone sources, or the look uses the lights of a scene.
     """
-    look = load_preset(options.preset, user_presets_folder()).look if options.preset else Look()
+    look = _preset_look(options, Look())
     if look.supersampling == Look().supersampling:
         # Nothing smooths the edges of the picture later.
         look = replace(look, supersampling=FILE_SUPERSAMPLING)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..progress import Progress, Task, run_to_completion
 from .blocks import by_rows_task
-from .frames import dot, tangent_frame, transport
+from .frames import angle_between, dot, tangent_frame, transport
 from .representation import complex_bincount, power
 from .surface import Surface, face_blocks, next_corners
 
@@ -110,8 +110,7 @@ def corner_angles_task(surface: Surface, points: np.ndarray | None = None) -> Ta
         to_next = positions[following] - positions
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
-        cross = np.cross(to_next, to_previous)
-        angles[corners] = np.arctan2(np.sqrt(dot(cross, cross)), dot(to_next, to_previous))
+        angles[corners] = angle_between(to_next, to_previous)
     return angles
 
 

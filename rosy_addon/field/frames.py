@@ -143,3 +143,9 @@ def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x = np.stack([1 - wx * wx * a, xy_term, -wx])
     y = np.stack([xy_term, 1 - wy * wy * a, -wy])
     return np.moveaxis(x, 0, -1), np.moveaxis(y, 0, -1)
+
+
+def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the angles between rows of vectors, in radians; 0 where a vector is zero."""
+    cross = np.cross(a, b)
+    return np.arctan2(np.sqrt(dot(cross, cross)), dot(a, b))

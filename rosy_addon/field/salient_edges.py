@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Progress, Task
-from .frames import dot, normalize
+from .frames import angle_between, dot, normalize
 from .surface import Edges, Surface, connected_components_task, face_area_vectors
 
 #: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
@@ -30,12 +30,6 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     if not len(total) or not total[-1] > 0:
         return 0.0
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
-
-
-def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angles between rows of vectors, in radians; 0 where a vector is zero."""
-    cross = np.cross(a, b)
-    return np.arctan2(np.sqrt(dot(cross, cross)), dot(a, b))
 
 
 def filtered_normals_task(surface: Surface, edges: Edges) -> Task[tuple[np.ndarray, float]]:

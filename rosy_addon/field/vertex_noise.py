@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Progress, Task
-from .frames import dot, normalize
-from .salient_edges import angle_between, weighted_median
+from .frames import angle_between, dot, normalize
+from .salient_edges import weighted_median
 from .surface import Edges, Surface, face_area_vectors
 
 #: Seed of the sample.

@@ -85,7 +85,7 @@ def _scene_command(rng: Generator) -> Case:
         case.arguments += ["--frames", str(rng.choice(["1-2", "3", "1-5:3", "2-1", "-1", "x"]))]
     if command == "strokes":
         case.arguments += ["-o", "out-##.svg"]
-        case.outputs = {"out-##.svg", *(f"out-{frame:02}.svg" for frame in range(1, 6))}
+        case.outputs = {"out-##.svg", *(f"out-{frame:02}.svg" for frame in range(-1, 6))}
         return case
     if rng.random() < 0.9:
         case.arguments += ["--out", "out"]

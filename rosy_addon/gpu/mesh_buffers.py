@@ -24,6 +24,9 @@ from ..projection.surface_tone import SurfaceTone
 ROW_BITS = 13
 ROW_TEXELS = 1 << ROW_BITS
 
+#: Triangles whose records are written in one step.
+RECORDS_PER_STEP = 1 << 17
+
 #: Maximum triangles of a mesh: shaders handle their ids in single precision.
 MAX_TRIANGLES = 1 << 24
 
@@ -44,7 +47,7 @@ class MeshBuffers:
         Origin of all positions, so that surfaces far from the origin keep their precision.
     triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
         The record of each triangle: `texels_per_record` consecutive texels, see
-        `_triangle_records`. None without a field.
+        `_write_records_task`. None without a field.
     texels_per_record : int
     bounds : (8, 3) float64 ndarray
         Corners of the bounding box, relative to `center`.
@@ -154,63 +157,73 @@ def mesh_buffers_task(
     corners = np.empty((count, 3, 4), dtype=np.float32)
     corners[:, :, :3] = positions.transpose(1, 2, 0)
     corners[:, :, 3] = np.arange(count, dtype=np.float32)[:, None]
-    records, texels = None, 0
+    rows, texels = None, 0
     if field is not None:
         matrix = np.eye(4)
         matrix[:3, :3] = linear
         task = corner_field_task(surface, matrix, field, display)
         corner_field = yield from subtask(task, 0.2, 0.7)
-        yield Progress(0.7, "preparing the mesh")
-        rest = rest_positions(surface).take(surface.triangle_vertex, axis=0)
         tone_values = None if tone is None else tone.values[surface.triangles]
-        records = _triangle_records(
-            corners, rest, corner_field, field.degree, channels, tone_values
-        )
-        texels = records.shape[1]
-        yield Progress(0.9, "preparing the mesh")
-        records = _to_texture_rows(records)
+        texels = record_texels(len(channels), tone is not None)
+        rows, records = _empty_records(count, texels)
+        task = _write_records_task(
+            records, corners, rest_positions(surface), surface, corner_field, field.degree, channels,
+            tone_values,
+        )  # fmt: skip
+        yield from subtask(task, 0.7, 1.0, "preparing the mesh")
     has_tone = field is not None and tone is not None
-    return MeshBuffers(corners.reshape(-1, 4), center, records, texels, bounds - center, has_tone)
+    return MeshBuffers(corners.reshape(-1, 4), center, rows, texels, bounds - center, has_tone)
 
 
-def _triangle_records(
+def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows of the record texture, filled with zeros, and a (count, texels, 4) view of them."""
+    row_count = max(-(-count * texels // ROW_TEXELS), 1)
+    flat = np.zeros((row_count * ROW_TEXELS, 4), dtype=np.float32)
+    return flat.reshape(row_count, ROW_TEXELS, 4), flat[: count * texels].reshape(count, texels, 4)
+
+
+def _write_records_task(
+    records: np.ndarray,
     corners: np.ndarray,
     rest: np.ndarray,
+    surface: Surface,
     corner_field: CornerField,
     degree: int,
     channels: Sequence[FieldChannel],
     tone: np.ndarray | None,
-) -> np.ndarray:
-    """Return the (T, texels, 4) float32 records.
+) -> Task[None]:
+    """Fill the (T, texels, 4) float32 records, in steps of some triangles.
 
     Texels 0 to 2 are the positions of the corners, 3 to 5 their normals, 6 and 7 the values of
     `CornerField.representation` with the order of its rotation. Each channel has two texels, with
     the order of its rotation and its layer. A tone with (T, 3, 1 or 2) values has two texels. The
-    (T, 3, 3) rest positions are in the fourth components of positions (x) and normals (y), and in
-    the last texel (z).
+    rest positions, (V, 3), are in the fourth components of positions (x) and normals (y), and in the
+    last texel (z).
     """
-    texels = record_texels(len(channels), tone is not None)
-    records = np.zeros((len(corners), texels, 4), dtype=np.float32)
-    records[:, POSITION_TEXEL:NORMAL_TEXEL, 3], records[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = (
-        rest[..., 0],
-        rest[..., 1],
-    )
-    records[:, -1, :3] = rest[..., 2]
-    records[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[:, :, :3]
-    records[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = corner_field.corner_normals.transpose(2, 0, 1)
-    _write_values(records, VALUE_TEXEL, corner_field.representation, degree, 0)
-    for layer, channel in enumerate(channels):
-        # A RoSy has the constant harmonic 1.
-        default = np.full_like(corner_field.representation, 1 if channel == ("deviation", 0) else 0)
-        values = corner_field.channels.get(channel, default)
-        _write_values(
-            records, VALUE_TEXEL + 2 + 2 * layer, values, rotation_order(channel, degree), layer
+    channel_values = [corner_field.channels.get(channel) for channel in channels]
+    for start in range(0, len(records), RECORDS_PER_STEP):
+        yield Progress(start / len(records), "preparing the mesh")
+        extent = slice(start, start + RECORDS_PER_STEP)
+        part = records[extent]
+        rest_corners = rest.take(surface.triangle_vertex[extent], axis=0)
+        part[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[extent, :, :3]
+        part[:, POSITION_TEXEL:NORMAL_TEXEL, 3] = rest_corners[..., 0]
+        part[:, NORMAL_TEXEL:VALUE_TEXEL, :3] = corner_field.corner_normals[..., extent].transpose(
+            2, 0, 1
         )
-    if tone is not None:
-        for corner in range(3):
-            texel, column = texels - 3 + corner // 2, corner % 2 * 2
-            records[:, texel, column : column + tone.shape[2]] = tone[:, corner]
-    return records
+        part[:, NORMAL_TEXEL:VALUE_TEXEL, 3] = rest_corners[..., 1]
+        part[:, -1, :3] = rest_corners[..., 2]
+        _write_values(part, VALUE_TEXEL, corner_field.representation[:, extent], degree, 0)
+        for layer, (channel, values) in enumerate(zip(channels, channel_values, strict=True)):
+            # A RoSy has the constant harmonic 1.
+            default = np.complex64(1 if channel == ("deviation", 0) else 0)
+            part_values = (default,) * 3 if values is None else values[:, extent]
+            texel = VALUE_TEXEL + 2 + 2 * layer
+            _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
+        if tone is not None:
+            for corner in range(3):
+                texel, column = records.shape[1] - 3 + corner // 2, corner % 2 * 2
+                part[:, texel, column : column + tone.shape[2]] = tone[extent, corner]
 
 
 def record_texels(channel_count: int, has_tone: bool = False) -> int:
@@ -219,20 +232,12 @@ def record_texels(channel_count: int, has_tone: bool = False) -> int:
 
 
 def _write_values(
-    records: np.ndarray, first_texel: int, values: np.ndarray, order: int, layer: int
+    records: np.ndarray, first_texel: int, values: Sequence[np.ndarray], order: int, layer: int
 ) -> None:
     for corner, z in enumerate(values):
         texel, column = first_texel + corner // 2, corner % 2 * 2
         records[:, texel, column], records[:, texel, column + 1] = z.real, z.imag
     records[:, first_texel + 1, 2], records[:, first_texel + 1, 3] = order, layer
-
-
-def _to_texture_rows(records: np.ndarray) -> np.ndarray:
-    """Return records as (rows, ROW_TEXELS, 4), padded with zeros."""
-    flat = records.reshape(-1, 4)
-    rows = np.zeros((max(-(-len(flat) // ROW_TEXELS), 1) * ROW_TEXELS, 4), dtype=np.float32)
-    rows[: len(flat)] = flat
-    return rows.reshape(-1, ROW_TEXELS, 4)
 
 
 def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, int], int]:

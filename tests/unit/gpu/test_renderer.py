@@ -216,6 +216,16 @@ def test_channels_are_in_their_layers():
     np.testing.assert_array_equal(records[:, 14], np.tile([0, 0, 0, 0], (count, 1)))
 
 
+def test_records_are_written_in_steps_of_some_triangles(monkeypatch):
+    surface = icosphere(1)
+    arguments = surface, np.eye(3), smooth_field(surface, 4), "smooth"
+    at_once = build_mesh_buffers(*arguments)
+    monkeypatch.setattr(mesh_buffers, "RECORDS_PER_STEP", 7)
+    step_count = sum(1 for _ in mesh_buffers_task(*arguments))
+    assert step_count > len(surface.triangles) / 7
+    assert np.array_equal(build_mesh_buffers(*arguments).triangle_records, at_once.triangle_records)
+
+
 def test_occluders_have_no_records(error_of, monkeypatch):
     monkeypatch.setattr(mesh_buffers, "MAX_TRIANGLES", 79)
     surface = icosphere(1)

@@ -197,7 +197,8 @@ def _line_modulation_task(
     if has_overshoot(look):
         line_tones = yield from _tone_along_lines_task(field, look, tone)
     outline = (yield from stages.outline_task(field, look)) if has_outline(look) else None
-    return LineModulation(break_images, paper_grain, line_tones, outline)
+    undirected = yield from stages.undirected_texture_task(field, look)
+    return LineModulation(break_images, paper_grain, line_tones, outline, undirected)
 
 
 def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> Task[np.ndarray]:

@@ -64,21 +64,26 @@ class LineModulation(NamedTuple):
         of the tone along the line. Lines then overshoot the borders of tones and get thinner there.
     outline : (P,) float32 ndarray or None
         Coverage of each pixel by lines along silhouettes and creases, 0 to 1.
+    undirected : (P,) float32 ndarray or None
+        Undirected texture where the field is undefined, and NaN elsewhere; see
+        `undirected_texture_task`.
     """
 
     break_images: LicImages | None = None
     paper_grain: np.ndarray | None = None
     line_tones: np.ndarray | None = None
     outline: np.ndarray | None = None
+    undirected: np.ndarray | None = None
 
     def part(self, extent: slice) -> LineModulation:
         """Return the modulation at some of the pixels."""
-        breaks, grain, tones, outline = self
+        breaks, grain, tones, outline, undirected = self
         return LineModulation(
             None if breaks is None else breaks.part(extent),
             None if grain is None else grain[:, extent],
             None if tones is None else tones[:, extent],
             None if outline is None else outline[extent],
+            None if undirected is None else undirected[extent],
         )
 
 
@@ -211,8 +216,18 @@ def line_coverage(
         ) / statistics.break_std
         streak += break_amount(target_coverage, look.breaks, look.wobble) * (break_streak - streak)
     if modulation.paper_grain is not None:
-        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
-    threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), statistics.threshold)
+        relief = np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
+        streak += relief
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+    threshold = np.interp(target_coverage, coverages, statistics.threshold)
+    if modulation.undirected is not None:
+        undefined = ~np.isnan(modulation.undirected)
+        streak[undefined] = modulation.undirected[undefined] / np.float32(statistics.disc_std)
+        if modulation.paper_grain is not None:
+            streak[undefined] += relief[undefined]
+        threshold[undefined] = np.interp(
+            target_coverage[undefined], coverages, statistics.disc_threshold
+        )
     return smoothstep((streak - threshold) / (2 * softness(look.crispness)) + 0.5)
 
 
@@ -298,7 +313,8 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
     Returns
     -------
     list of M (P,) float32 ndarrays
-        If all lines have the same target, the shares sum to 1 at each pixel.
+        If all lines have the same target, the shares sum to 1 at each pixel. Where the field is
+        undefined, the first line has the share 1.
     """
     onsets = [_onset_darkness(rank, look) for rank in _line_ranks(field, look)]
     first_onset = np.minimum.reduce(onsets)
@@ -311,8 +327,13 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
         ]
         total = np.add.reduce(onset_weights)
         if len(transmittance) == 1:
-            return [weight / total for weight in onset_weights]
+            shares = [weight / total for weight in onset_weights]
+            break
         shares.append(onset_weights[len(shares)] / total)
+    undefined = field.representation == 0
+    if undefined.any():
+        for line, share in enumerate(shares):
+            share[undefined] = line == 0
     return shares
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..cache import Cache
 from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
-from .lic import lic_task, noise_args
+from .lic import lic_task, look_noise_task, noise_args
 from .lic_images import LicImages
 from .look import Look, lic_key
 from .look_units import cell_size_args
@@ -17,6 +17,7 @@ from .outline import outline_task
 from .paper_grain import surface_paper_grain_args
 from .pixel_field import PixelField, surface_pixel_field_task
 from .surface_noise import surface_noise_task
+from .undirected import undirected_texture_task
 from .wobble import has_wobble, rotate_pixel_field_task, wobble_angle_task
 
 #: Share of the progress of LIC that the noise takes.
@@ -61,6 +62,15 @@ class ComposeStages:
 
         key = "LIC images", self._gbuffer, field.degree, lic_key(look)
         return (yield from self._cache.get_or_create_task(key, compute_task))
+
+    def undirected_texture_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:
+        """Compute the texture where the field is undefined; see `undirected_texture_task`."""
+        if field.representation.all():
+            return None
+        noise = yield from self._noise_task(field, look)
+        if noise is None:
+            noise = yield from look_noise_task(field, look)
+        return (yield from undirected_texture_task(field, noise, look.grain))
 
     def outline_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""

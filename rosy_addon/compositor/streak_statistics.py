@@ -18,6 +18,7 @@ from .image_noise import image_noise
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
 from .surface_noise import OCTAVES, octave_weights
+from .undirected import disc_means
 
 #: Half the width of the step from paper to ink, in standard deviations of the streaks, for the
 #: crispness 0 and 1.
@@ -42,8 +43,8 @@ HISTOGRAM_BINS = 1600
 #: Label of all steps.
 STEP_LABEL = "measuring streaks"
 
-#: The statistics of the latest looks. Those of one take about 2 KB.
-STATISTICS_CACHE = Cache(max_bytes=1 << 15)
+#: The statistics of the latest looks. Those of one take about 4 KB.
+STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 
 class NoiseSettings(NamedTuple):
@@ -105,6 +106,11 @@ class StreakStatistics(NamedTuple):
         Standard deviation of the streaks.
     break_std : float
         Standard deviation of streaks as long as the pieces of broken lines.
+    disc_threshold : (COVERAGE_STEPS,) float64 ndarray
+        Thresholds of means of noise over discs; see `undirected`. In standard deviations of these
+        means.
+    disc_std : float
+        Standard deviation of means over discs.
     paper_grain_std : float
         Standard deviation of the noise of a paper grain that is anchored to surfaces. 1 if there
         is none.
@@ -113,6 +119,8 @@ class StreakStatistics(NamedTuple):
     threshold: np.ndarray
     std: float
     break_std: float
+    disc_threshold: np.ndarray
+    disc_std: float
     paper_grain_std: float = 1.0
 
 
@@ -168,6 +176,8 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
         _line_means(noise, break_pixels, side, settings.tapered)
     )
     yield Progress(0.4, STEP_LABEL)
+    spots, disc_std = _standardized(disc_means(noise[:, :side], settings.grain))
+    yield Progress(0.5, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
     if settings.paper_grain_amplitude and settings.surface_paper_grain is not None:
         heights = _noise_sample(streaks.shape, *settings.surface_paper_grain, anchored=True)
@@ -187,11 +197,14 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
     samples = [
         streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
     ]
-    threshold_tables = yield from subtask(
-        _threshold_tables_task(samples, softness(settings.crispness)), 0.7, 1.0
+    half_width = softness(settings.crispness)
+    threshold_tables = yield from subtask(_threshold_tables_task(samples, half_width), 0.7, 0.95)
+    (disc_threshold,) = yield from subtask(
+        _threshold_tables_task([spots + paper_relief], half_width), 0.95, 1.0
     )
+    stds = streak_std, break_std, disc_threshold, disc_std, paper_grain_std
     if len(break_levels) == 1:
-        return StreakStatistics(threshold_tables[0], streak_std, break_std, paper_grain_std)
+        return StreakStatistics(threshold_tables[0], *stds)
     level = (
         (break_amounts - break_levels[0])
         / (break_levels[-1] - break_levels[0])
@@ -199,9 +212,7 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
     )
     lower = np.minimum(level.astype(int), BREAK_LEVELS - 2)
     low, high = (threshold_tables[row, np.arange(COVERAGE_STEPS)] for row in (lower, lower + 1))
-    return StreakStatistics(
-        low + (level - lower) * (high - low), streak_std, break_std, paper_grain_std
-    )
+    return StreakStatistics(low + (level - lower) * (high - low), *stds)
 
 
 def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> np.ndarray:

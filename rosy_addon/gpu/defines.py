@@ -29,6 +29,7 @@ from ..compositor.surface_noise import (
     OCTAVES,
     SUBPIXEL_OFFSETS,
 )
+from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
 from ..compositor.wobble import UNIT_VARIANCE_SCALE, WAVE_COUNT, WOBBLE_STD
 from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLERANCE
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
@@ -88,6 +89,7 @@ INT_CONSTANTS = {
     "OCTAVE_OFFSET": OCTAVE_OFFSET,
     "SUBPIXEL_COUNT": len(SUBPIXEL_OFFSETS),
     "WAVE_COUNT": WAVE_COUNT,
+    "DISC_SAMPLE_COUNT": DISC_SAMPLE_COUNT,
     "ALL_NEIGHBORS": ALL_NEIGHBORS,
     "PCF_WIDTH": PCF_WIDTH,
     "REDUCE_BLOCK": REDUCE_BLOCK,

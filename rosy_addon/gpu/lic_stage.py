@@ -44,6 +44,7 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
         "ink_thresholds": lookup_tables.thresholds(resources, frame.pixel_look),
+        "disc_offsets": lookup_tables.undirected_offsets(resources, frame.pixel_look),
         "ink_table": lookup_tables.ink_table(resources, kind, look),
     }
     if "paper_grain" not in textures:

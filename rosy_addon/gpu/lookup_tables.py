@@ -17,6 +17,7 @@ from ..compositor.look import Look, is_hatched
 from ..compositor.look_units import supersampled_look
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
+from ..compositor.undirected import disc_offsets
 from ..compositor.wobble import wave_table
 from .field_kind import FieldKind
 from .resources import GpuResources
@@ -37,15 +38,25 @@ def color_map(resources: GpuResources, look: Look) -> Any:
 
 
 def thresholds(resources: GpuResources, look: Look) -> Any:
-    """Return the thresholds of `streak_statistics`, in the first channel."""
+    """Return the thresholds of `streak_statistics`, in the first channel.
+
+    Row 0 is for streaks, row 1 for undirected texture.
+    """
     if not is_hatched(look):
         return palette(resources)
-    threshold = look_streak_statistics(look).threshold
-    return _color_table(
-        resources,
-        "thresholds",
-        threshold.tobytes(),
-        lambda: np.repeat(threshold[:, None], 3, axis=1),
+    statistics = look_streak_statistics(look)
+    rows = np.stack([statistics.threshold, statistics.disc_threshold])
+    return resources.lookup_texture(
+        "thresholds", rows.tobytes(), lambda: _in_channels(rows[..., None])
+    )
+
+
+def undirected_offsets(resources: GpuResources, look: Look) -> Any:
+    """Return `undirected.disc_offsets` in the first two channels."""
+    if not is_hatched(look):
+        return palette(resources)
+    return resources.lookup_texture(
+        "disc_offsets", look.grain, lambda: _in_channels(disc_offsets(look.grain)[None])
     )
 
 

@@ -110,6 +110,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         else 0,
         "break_samples": full_sample_count(replace(pixel_look, length=break_steps(pixel_look))),
         "break_std": statistics.break_std if statistics else 1.0,
+        "disc_std": statistics.disc_std if statistics else 1.0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
         "paper_grain_depth": _paper_grain_depth(look, statistics),
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,

@@ -93,6 +93,8 @@ void main()
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
     overshoot_count = int(round(float(overshoot_count) * relative_magnitude));
   }
+  bool is_undirected = value.xy == vec2(0.0);
+  vec3 disc_noise = is_hatched != 0 && is_undirected ? disc_mean(pixel) : vec3(0.0);
   // The light that all inks together let through, and the sum of the weights of their lines.
   float target = 1.0, transmittance = 1.0, onset_sum = 1.0;
   vec3 lic_sum = vec3(0.0), hue_sum = vec3(0.0);
@@ -124,6 +126,9 @@ void main()
       }
       float line_delay = onset_darkness(line, line_angle) - first_onset;
       float line_share = onset_weight(line_delay, transmittance) / onset_sum;
+      if (is_undirected) {
+        line_share = line == 0 ? 1.0 : 0.0;
+      }
       float darkness = 1.0 - pow(transmittance, line_share);
       vec3 ink = one_ink;
       if (ink_count > 1) {
@@ -145,10 +150,13 @@ void main()
             min_breaks + (1.0 - min_breaks) * breaks * (1.0 - darkness) * (1.0 - darkness);
         streak = mix(streak, gray(break_mean) / break_std, break_weight);
       }
+      if (is_undirected) {
+        streak = gray(disc_noise) / disc_std;
+      }
       if (paper_grain_depth > 0.0) {
         streak += paper_grain_depth * grain_height(line_member(line), pixel);
       }
-      float excess = streak - coverage_threshold(darkness);
+      float excess = streak - coverage_threshold(darkness, int(is_undirected));
       float coverage = smooth_unit_step(excess / (2.0 * softness) + 0.5);
       paper *= 1.0 - coverage;
       vec3 ink_transmittance = transmittance_of(ink);

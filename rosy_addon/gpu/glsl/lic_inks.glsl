@@ -93,13 +93,31 @@ float grain_height(int member, ivec2 pixel)
   return channel == 0 ? heights.x : channel == 1 ? heights.y : heights.z;
 }
 
-// The threshold of the noise above which ink is drawn, for a coverage.
-float coverage_threshold(float coverage)
+// The threshold of the noise above which ink is drawn, for a coverage: of streaks in row 0, of
+// undirected texture in row 1.
+float coverage_threshold(float coverage, int row)
 {
   int last_texel = textureSize(ink_thresholds, 0).x - 1;
   float position = clamp(coverage, 0.0, 1.0) * float(last_texel);
   int low_index = min(int(position), last_texel - 1);
-  float low = texelFetch(ink_thresholds, ivec2(low_index, 0), 0).x;
-  float high = texelFetch(ink_thresholds, ivec2(low_index + 1, 0), 0).x;
+  float low = texelFetch(ink_thresholds, ivec2(low_index, row), 0).x;
+  float high = texelFetch(ink_thresholds, ivec2(low_index + 1, row), 0).x;
   return mix(low, high, position - float(low_index));
+}
+
+// The mean of the noise over a disc around a pixel, around 0, as `undirected_texture_task`.
+vec3 disc_mean(ivec2 pixel)
+{
+  ivec2 last = textureSize(cells, 0) - 1;
+  vec3 sum = vec3(0.0);
+  float count = 0.0;
+  for (int index = 0; index < DISC_SAMPLE_COUNT; ++index) {
+    ivec2 neighbor = pixel + ivec2(texelFetch(disc_offsets, ivec2(index, 0), 0).xy);
+    vec4 cell = texelFetch(cells, clamp(neighbor, ivec2(0), last), 0);
+    if (all(equal(neighbor, clamp(neighbor, ivec2(0), last))) && cell.x != 0.0) {
+      sum += cell.yzw - NOISE_MEAN;
+      count += 1.0;
+    }
+  }
+  return sum / count;
 }

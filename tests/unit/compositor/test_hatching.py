@@ -37,6 +37,7 @@ from rosy_addon.compositor.streak_statistics import (
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
 from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field_task, wobble_angle
 from rosy_addon.field.generate import axis_field
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.presets.store import load_preset, preset_keys
 from rosy_addon.progress import run_to_completion
@@ -350,9 +351,11 @@ def test_wobble_rotates_all_directions(degree):
 # --- inks --------------------------------------------------------------------------------------------
 
 
-def ramp_error(look):
+def ramp_error(look, field=None):
     """Mean error of the blurred luminance transmittance of a ball, relative to the target."""
     instance, camera = make_instance(ball(), degree=6), make_camera()
+    if field is not None:
+        instance = replace(instance, field=field)
     rgba = render(instance, camera, look)
     gbuffer = project([instance], camera)
     target_tone = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
@@ -366,6 +369,20 @@ def ramp_error(look):
     rendered = np.where(visible > 0, inks.luminance_transmittance(rgba[..., :3]), 0)
     error = gaussian_filter(rendered, 16)[inner] - gaussian_filter(expected, 16)[inner]
     return np.abs(error / fraction[inner]).mean()
+
+
+@pytest.mark.parametrize("name", mainly(["cross-hatch", "pencil"], HATCHED))
+def test_undefined_faces_keep_the_tone(name):
+    """Without a direction, hatching draws an undirected texture of the tone of the light."""
+    undefined = RosyField(4, np.zeros((ball().face_count, 3)))
+    assert ramp_error(PRESETS[name], undefined) <= 0.03
+
+
+@pytest.mark.parametrize("kind", ["families", "ramp"])
+def test_undefined_faces_keep_the_tone_in_color(kind):
+    undefined = RosyField(4, np.zeros((ball().face_count, 3)))
+    look = replace(INK, shading=0.9, **COLORED_INKS[kind])
+    assert ramp_error(look, undefined) <= 0.03
 
 
 COLORED_INKS = {

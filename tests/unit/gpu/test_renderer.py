@@ -1025,14 +1025,30 @@ def test_meshes_without_a_field_occlude(card):
     assert (pair.card[..., 3] > 0).sum() < 0.8 * (unoccluded.card[..., 3] > 0).sum()
 
 
-@pytest.mark.parametrize("look", [{}, {"hue": "families"}, {"magnitude": "both"}])
+UNDEFINED_LOOKS = {
+    "soft": {},
+    "families": {"hue": "families"},
+    "magnitude": {"magnitude": "both"},
+    "hatched": {"ink": "hatch", "shading": 1.0},
+    "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "colour"},
+    "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
+}
+
+
+@pytest.mark.parametrize(
+    "name", mainly(["soft", "hatched", "hatched, all effects"], UNDEFINED_LOOKS)
+)
 @pytest.mark.parametrize("degree", [3, 4])
-def test_where_the_field_is_undefined(card, degree, look):
+def test_where_the_field_is_undefined(card, degree, name):
+    look = replace(
+        LOOK, **{key: value for key, value in UNDEFINED_LOOKS[name].items() if key != "degree"}
+    )
     field = smooth_field(BALL, degree)
     center = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
     vectors = np.where((center[:, :1] > 0.2) | (center[:, 2:] > 0.6), 0.0, field.vectors)
     field = RosyField(degree, vectors, family_count=2 if degree == 4 else 3)
-    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], view(), replace(LOOK, **look))
+    camera = view(supersampling=look.supersampling)
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], camera, look)
 
 
 def test_a_field_that_is_undefined_everywhere(card):

@@ -1,0 +1,125 @@
+"""Undirected texture: what hatching draws where the field has no direction.
+
+A streak is a mean of noise along a line. Where there is no line, the mean over a disc takes its
+place. It is thresholded like a streak, with statistics of its own, so the picture keeps its tone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Progress, Task
+from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from .image_noise import NOISE_MEAN
+from .pixel_field import PixelField
+
+#: Radius of the disc in grains: spots are then about as wide as lines.
+DISC_GRAINS = 1.0
+
+#: Samples of the noise in a disc.
+SAMPLE_COUNT = 32
+
+#: Angle between two samples of a sunflower spiral, radians.
+GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+
+#: Label of all steps.
+STEP_LABEL = "drawing undirected texture"
+
+
+def _unit_disc() -> np.ndarray:
+    """(SAMPLE_COUNT, 2) float32 points that are spread evenly over the unit disc."""
+    index = np.arange(SAMPLE_COUNT)
+    radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
+
+
+#: The samples of a disc of radius 1.
+UNIT_DISC = _unit_disc()
+
+
+def disc_offsets(grain: float) -> np.ndarray:
+    """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc."""
+    return np.floor(np.float32(DISC_GRAINS * grain) * UNIT_DISC + np.float32(0.5)).astype(np.int32)
+
+
+def undirected_texture_task(
+    field: PixelField, noise: np.ndarray, grain: float
+) -> Task[np.ndarray | None]:
+    """Average the noise over a disc around each pixel where the field is undefined.
+
+    Samples of the disc beyond the pixels of the field are left out.
+
+    Parameters
+    ----------
+    field : PixelField
+    noise : (P, K) float32 ndarray
+    grain : float
+        Width of a cell of the noise in pixels.
+
+    Returns
+    -------
+    (P,) float32 ndarray or None
+        The means, relative to `NOISE_MEAN`; NaN where the field is defined. None if it is defined
+        everywhere.
+    """
+    undefined = np.flatnonzero(field.representation == 0)
+    if not len(undefined):
+        return None
+    offsets = disc_offsets(grain)
+    margin = int(np.abs(offsets).max())
+    stride = field.width + 2 * margin
+    texture = np.full(len(noise), np.nan, dtype=np.float32)
+    # Rows are padded with the pixels that a disc can reach.
+    band_rows = max(BLOCK_PIXELS // field.width, 2 * margin, 1)
+    for first_row in range(0, field.height, band_rows):
+        rows = first_row, first_row + band_rows
+        band = undefined[slice(*_entries(field, field.pixel[undefined], *rows))]
+        if not len(band):
+            continue
+        yield Progress(first_row / field.height, STEP_LABEL)
+        around = slice(*_entries(field, field.pixel, rows[0] - margin, rows[1] + margin))
+        # Sums of noise and of samples, as complex numbers.
+        samples = np.zeros((band_rows + 2 * margin) * stride, dtype=np.complex64)
+        first_cell = (first_row - margin) * stride - margin
+        mean = noise[around].mean(axis=1) - np.float32(NOISE_MEAN)
+        samples[_padded(field, field.pixel[around], stride) - first_cell] = mean + 1j
+        for block in pixel_blocks(len(band)):
+            yield Progress(first_row / field.height, STEP_LABEL)
+            cell = _padded(field, field.pixel[band[block]], stride) - first_cell
+            total = np.zeros(len(cell), dtype=np.complex64)
+            for dx, dy in offsets.tolist():
+                total += samples.take(cell + (dy * stride + dx))
+            texture[band[block]] = total.real / total.imag
+    return texture
+
+
+def _entries(field: PixelField, pixel: np.ndarray, first_row: int, stop_row: int) -> list[int]:
+    """Range of the entries of ascending flat pixels that are in some rows."""
+    borders = np.clip([first_row, stop_row], 0, field.height) * field.width
+    return np.searchsorted(pixel, borders.astype(pixel.dtype)).tolist()
+
+
+def _padded(field: PixelField, pixel: np.ndarray, stride: int) -> np.ndarray:
+    """Flat indices of pixels into a frame with longer rows."""
+    row, column = np.divmod(pixel, np.int32(field.width))
+    return row.astype(np.intp) * stride + column
+
+
+def disc_means(noise: np.ndarray, grain: float) -> np.ndarray:
+    """Average an image of noise over a disc around each pixel.
+
+    Parameters
+    ----------
+    noise : (H, W) ndarray
+        Taken as periodic.
+    grain : float
+        Width of a cell of the noise in pixels.
+
+    Returns
+    -------
+    (H, W) float32 ndarray
+    """
+    total = np.zeros(noise.shape, dtype=np.float32)
+    for dx, dy in disc_offsets(grain).tolist():
+        total += np.roll(noise, (-dy, -dx), axis=(0, 1))
+    return total / np.float32(SAMPLE_COUNT)

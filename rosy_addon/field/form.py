@@ -12,17 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from ..progress import Progress, Task, subtask
-from .connection import Connection, connection_task, laplacian_task
-from .curvature import face_curvature_task
+from .connection import connection_task, laplacian_task
 from .frames import dot, normalize
 from .guided import guided_or_smoothest_task
 from .guides import guides_from_edges
-from .representation import complex_bincount, face_frames, from_representation
+from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .salient_edges import filtered_normals_task, salient_edges_task, weighted_median
-from .smoothest import corner_frame_angles, node_sum_per_face, smoothest_task
-from .sparse_multigrid import CSRMatrix
-from .surface import Surface, edges_task, face_area_vectors, smooth_fans_task, surface_task
+from .smoothest import smoothest_task
+from .surface import Surface, edges_task, smooth_fans_task
+from .surface_averages import SurfaceAverages, bounded_curvature_task, of_unit_extent
 from .vertex_noise import noise_sample_task
 
 #: Lengths over which curvature is averaged, relative to `Surface.extent`.
@@ -44,12 +43,9 @@ FLAT_CURVATURE = 0.05
 #: Distance over which directions of full confidence spread, relative to `Surface.extent`.
 REACH = 0.04
 
-#: Relative residual norms at which conjugate gradients stop: for averages, and for the field. The
-#: directions that they follow are not more exact.
-AVERAGE_TOLERANCE, FIELD_TOLERANCE = 1e-2, 1e-4
-
-#: Largest number of steps of conjugate gradients for averages.
-MAX_STEPS = 500
+#: Relative residual norm at which conjugate gradients stop. The directions that the field follows are
+#: not more exact.
+FIELD_TOLERANCE = 1e-4
 
 
 def follows_curvature(degree: int) -> bool:
@@ -92,7 +88,7 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
     degree = check_degree(degree)
     if not follows_curvature(degree) or not surface.face_normal.any():
         return (yield from smoothest_task(surface, degree))
-    original, surface = surface, _of_unit_extent(surface)
+    original, surface = surface, of_unit_extent(surface)
     edges = yield from subtask(
         edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.04, "finding edges"
     )
@@ -115,15 +111,6 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
         surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
     )
     return (yield from subtask(task, 0.5, 1.0))
-
-
-def _of_unit_extent(surface: Surface) -> Surface:
-    """Return a surface of extent 1 around the origin, so that no number is very large or small."""
-    used = surface.used_vertices
-    vertices = np.zeros_like(surface.vertices)
-    low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
-    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / surface.extent
-    return replace(surface, vertices=vertices, rest_vertices=None)
 
 
 def _curvature_guides_task(
@@ -153,16 +140,16 @@ def _curvature_guides_task(
         surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
     )
     fans = yield from subtask(task, 0.02, 0.1)
-    mean, deviator = yield from subtask(_bounded_curvature_task(surface, fans, x, y), 0.1, 0.2)
+    mean, deviator = yield from subtask(bounded_curvature_task(surface, fans, x, y), 0.1, 0.2)
     with_noise = replace(surface, vertices=surface.vertices + noise)
     yield Progress(0.2, "computing principal directions")
     normal = with_noise.face_normal
     x_noise = normalize(x - dot(x, normal)[:, None] * normal)
-    task = _bounded_curvature_task(with_noise, fans, x_noise, np.cross(normal, x_noise))
+    task = bounded_curvature_task(with_noise, fans, x_noise, np.cross(normal, x_noise))
     _, deviator_noise = yield from subtask(task, 0.2, 0.3)
     connection = yield from subtask(connection_task(surface), 0.3, 0.38)
     yield Progress(0.38, "averaging curvature")
-    averages = _Averages(surface, connection, x, y)
+    averages = SurfaceAverages(surface, connection, x, y)
     yield Progress(0.38, "averaging curvature")
     matrix = yield from subtask(laplacian_task(connection, 2), 0.38, 0.4)
     flat_matrix = yield from subtask(laplacian_task(connection, 0), 0.4, 0.42)
@@ -201,116 +188,3 @@ def _curvature_guides_task(
     confidence = np.abs(face_z)
     phase = np.divide(face_z, confidence, out=np.zeros_like(face_z), where=confidence > 0)
     return from_representation(phase ** (degree // 2), x, y, degree), confidence
-
-
-def _bounded_curvature_task(
-    surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
-    """Curvature of each face, with normals that are smooth within the given fans of corners.
-
-    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
-    """
-    task = surface_task(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        corner_fan=corner_fan,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
-    smooth = yield from subtask(task, 0.0, 0.6, "averaging normals")
-    mean, deviator = yield from subtask(face_curvature_task(smooth, x, y), 0.6, 1.0)
-    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
-    limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
-    modulus = np.abs(deviator)
-    deviator = deviator * np.divide(limit, modulus, out=np.ones_like(limit), where=modulus > limit)
-    return np.clip(mean, -limit, limit), deviator
-
-
-class _Averages:
-    """Averages of face values over a length, by way of the nodes of a connection.
-
-    Parameters
-    ----------
-    surface : Surface
-    connection : Connection
-    x, y : (F, 3) float64 ndarray
-        Frames of the faces.
-    """
-
-    def __init__(
-        self, surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
-    ) -> None:
-        self.surface, self.connection = surface, connection
-        self.frame_angle = corner_frame_angles(surface, connection, x, y)
-        self.corner_face = np.repeat(surface.triangle_face, 3)
-        self.corner_area = np.repeat(connection.area / 3, 3)
-        self.mass = connection.positive_mass
-
-    def node_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(n,) ndarray: integrals of face values around the nodes; complex if the degree is not 0."""
-        terms = self.corner_area * values[self.corner_face]
-        node, count = self.connection.corner_node, self.connection.node_count
-        if not degree:
-            return np.bincount(node, terms, count)
-        return complex_bincount(node, terms * np.exp(-1j * degree * self.frame_angle), count)
-
-    def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(F,) complex128: mean of the node values of a degree on each face."""
-        total = node_sum_per_face(self.surface, self.connection, values, self.frame_angle, degree)
-        area = np.bincount(
-            self.surface.triangle_face, 3 * self.connection.area, self.surface.face_count
-        )
-        return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
-
-    def smooth_task(
-        self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None
-    ) -> Task[np.ndarray]:
-        """Solve (M + area L) z = sums by conjugate gradients, with M the masses and L the Laplacian.
-
-        Parameters
-        ----------
-        matrix : CSRMatrix
-            L, of single precision.
-        area : float
-            The square of the length of the average.
-        sums : (n,) ndarray
-            From `node_sums`.
-        start : (n,) ndarray, optional
-            An estimate of the solution.
-
-        Returns
-        -------
-        (n,) ndarray
-            Of the precision of `sums`.
-        """
-        dtype = matrix.data.dtype
-        # All numbers are of order 1 after this, whatever the size of the mesh.
-        mass = (self.mass / self.mass.mean()).astype(np.float32)
-        area = np.float32(area / self.mass.mean())
-        scale = float(np.abs(sums).max()) or 1.0
-        diagonal = mass + area * matrix.diagonal.astype(np.float32)
-
-        def apply(vector: np.ndarray) -> np.ndarray:
-            return mass * vector + area * (matrix @ vector)
-
-        right = (sums / scale).astype(dtype)
-        unit = scale / self.mass.mean()
-        solution = np.zeros_like(right) if start is None else (start / unit).astype(dtype)
-        residual = right - apply(solution)
-        limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real
-        direction, previous = np.zeros_like(right), np.float32(1.0)
-        for step in range(MAX_STEPS):
-            yield Progress(1 - 0.95**step, "averaging curvature")
-            preconditioned = residual / diagonal
-            current = np.vdot(residual, preconditioned).real
-            if current <= limit:
-                break
-            direction = preconditioned + current / previous * direction
-            image = apply(direction)
-            length = current / np.vdot(direction, image).real
-            solution += length * direction
-            residual -= length * image
-            previous = current
-        return solution.astype(sums.dtype) * unit

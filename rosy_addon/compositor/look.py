@@ -164,6 +164,14 @@ class Look:
         is_pixel_length=True,
         panel="streaks",
     )
+    detail: float = number(
+        0.0,
+        0.0,
+        0.9,
+        "Draw narrower lines on small features, by up to this fraction",
+        panel="streaks",
+        applies=lambda look: look.anchor == "surface",
+    )
     noise: str = choice(
         "grey",
         "Color of the noise, and so of the streaks",

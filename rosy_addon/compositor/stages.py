@@ -8,6 +8,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..progress import Task, subtask
+from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
 from .lic import lic_task, look_noise_task, noise_args
 from .lic_images import LicImages
@@ -93,14 +94,21 @@ class ComposeStages:
         if look.anchor == "picture":
             return None
         args = noise_args(look) | cell_size_args(look)
+        if look.detail:
+            args["detail"] = look.detail
         return (yield from self._surface_noise_task(field, args))
 
     def _surface_noise_task(self, field: PixelField, args: dict[str, Any]) -> Task[np.ndarray]:
         """(P, K) float32 noise at the pixels of a field; see `surface_noise_task`."""
-        noise = yield from self._cache.get_or_create_task(
-            ("surface noise", self._gbuffer, *sorted(args.items())),
-            lambda: surface_noise_task(self._gbuffer, **args),
-        )
+
+        def noise_task() -> Task[np.ndarray]:
+            curvature = None
+            if "detail" in args:
+                curvature = yield from feature_curvatures_task(self._gbuffer, self._cache)
+            return (yield from surface_noise_task(self._gbuffer, **args, curvature=curvature))
+
+        key = "surface noise", self._gbuffer, *sorted(args.items())
+        noise = yield from self._cache.get_or_create_task(key, noise_task)
         return noise[field.gbuffer_index]
 
     def _wobble_angle_task(self, look: Look) -> Task[np.ndarray]:

@@ -50,6 +50,9 @@ OCTAVES = 3
 #: Range of the ratio of the size of cells to `grain` in which the contrast is corrected for it.
 CONTRAST_SCALE_RANGE = (0.25, 4.0)
 
+#: Radius of curvature on screen, in grains, below which a feature is small; see `feature_scale`.
+FEATURE_GRAINS = 32.0
+
 #: Number of bits of the largest index of a cell.
 MAX_CELL_BITS = 28
 
@@ -72,6 +75,8 @@ def surface_noise_task(
     high_pass: float,
     pixel: float = 0.0,
     smallest: float = 0.0,
+    detail: float = 0.0,
+    curvature: np.ndarray | None = None,
 ) -> Task[np.ndarray]:
     """Make noise that is anchored to the surfaces of a G-buffer.
 
@@ -93,6 +98,10 @@ def surface_noise_task(
         size on the surface. 0 gives cells of a fixed size on screen.
     smallest : float
         Minimum side of a cell on screen, in pixels. Only used if `pixel` is not 0.
+    detail : float
+        Cells on small features are smaller by up to this fraction; see `feature_scale`.
+    curvature : (P,) float32 ndarray, optional
+        Of the features; see `field.feature_curvature`. Required if `detail` is not 0.
 
     Returns
     -------
@@ -111,6 +120,8 @@ def surface_noise_task(
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
+        if detail:
+            scale = scale * feature_scale(curvature[block], block_rest.pixel_size, grain, detail)
         size = np.maximum(block_rest.pixel_size * scale, 1e-30)
         level = np.log2(size * np.float32(grain * LATTICE_SCALE))
         lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
@@ -171,6 +182,32 @@ def cell_scale(
     if units is None:
         return np.float32(1)
     return np.maximum(units[instance_id] / np.maximum(size, 1e-30), np.float32(min_scale))
+
+
+def feature_scale(
+    curvature: np.ndarray, pixel_size: np.ndarray, grain: float, detail: float
+) -> np.ndarray:
+    """Compute the factor by which cells are smaller on small features.
+
+    It is proportional to the radius of curvature on screen below `FEATURE_GRAINS` grains.
+
+    Parameters
+    ----------
+    curvature : (n,) float32 ndarray
+        In 1 / Blender unit of object space.
+    pixel_size : (n,) float32 ndarray
+        `RestCoordinates.pixel_size`.
+    grain : float
+        In pixels.
+    detail : float
+        The factor is at least 1 - detail.
+
+    Returns
+    -------
+    (n,) float32 ndarray
+    """
+    bend = curvature * pixel_size * np.float32(FEATURE_GRAINS * grain)
+    return 1 / np.clip(bend, 1, np.float32(1 / (1 - detail)))
 
 
 def _accumulate_octaves(

@@ -11,7 +11,7 @@ from .connection import connection_task, laplacian_task
 from .frames import dot, normalize
 from .representation import face_frames
 from .salient_edges import filtered_normals_task, salient_edges_task
-from .surface import Surface, edges_task, smooth_fans_task
+from .surface import Surface, edges_task, smooth_fans_task, surface_task
 from .surface_averages import SurfaceAverages, bounded_curvature_task, of_unit_extent
 from .vertex_noise import noise_sample_task
 
@@ -43,7 +43,14 @@ def feature_curvature_task(surface: Surface) -> Task[np.ndarray]:
         In 1 / Blender unit of object space. 0 is flat.
     """
     if surface.rest_vertices is not None:
-        surface = replace(surface, vertices=surface.rest_vertices, rest_vertices=None)
+        task = surface_task(
+            surface.rest_vertices,
+            surface.corner_vertex,
+            surface.face_start,
+            triangles=surface.triangles,
+            triangle_face=surface.triangle_face,
+        )
+        surface = yield from subtask(task, 0.0, 0.0, "measuring features")
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
     extent, surface = surface.extent, of_unit_extent(surface)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..cache import content_hash
 from ..errors import RosyError, counted
 from ..progress import Progress, Task, run_to_completion, subtask
 from .frames import dot, normalize
@@ -74,6 +75,12 @@ class Surface:
         if self.rest_vertices is None:
             return self
         return replace(self, vertices=self.rest_vertices, rest_vertices=None)
+
+    @cached_property
+    def rest_shape_key(self) -> bytes:
+        """A hash of the rest shape and its triangles, equal for all deformations of a mesh."""
+        rest = self.in_rest_shape().vertices
+        return content_hash(rest, self.corner_vertex, self.face_start, self.triangles)
 
     @cached_property
     def extent(self) -> float:

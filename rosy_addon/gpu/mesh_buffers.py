@@ -240,6 +240,13 @@ def _write_values(
     records[:, first_texel + 1, 2], records[:, first_texel + 1, 3] = order, layer
 
 
+def to_texture_rows(values: np.ndarray) -> np.ndarray:
+    """Return (T, 3) values as (rows, ROW_TEXELS, 4) float32: one texel per triangle."""
+    rows, texels = _empty_records(len(values), 1)
+    texels[:, 0, :3] = values
+    return rows
+
+
 def mip_atlas(mip_map: MipMap, max_side: int) -> tuple[np.ndarray, tuple[int, int], int]:
     """Return all levels of a mip map in one image: the smaller ones are right of level 0, stacked.
 

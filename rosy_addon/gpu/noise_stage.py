@@ -13,7 +13,7 @@ from ..compositor.look_units import cell_size_args
 from ..compositor.paper_grain import surface_paper_grain_args
 from ..compositor.surface_noise import instance_hashes
 from ..compositor.wobble import has_wobble
-from ..progress import Progress, Task
+from ..progress import Progress, Task, subtask
 from . import lookup_tables, passes
 from .frame import Frame
 from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
@@ -36,6 +36,7 @@ def _noise_task(frame: Frame) -> Task[None]:
     look = frame.look
     if look.anchor == "surface":
         settings = noise_args(frame.pixel_look) | cell_size_args(frame.pixel_look)
+        settings["detail"] = look.detail
         frame.textures["noise"] = yield from _surface_noise_task(frame, settings, "noise")
     else:
         frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, *frame.size, look)
@@ -79,6 +80,11 @@ def _surface_noise_task(frame: Frame, settings: dict[str, Any], name: str) -> Ta
     names = [item.mesh.keep_alive[0].name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item, box in frame.fields_in_view():
+        if settings.get("detail"):
+            task = frame.resources.feature_curvature_task(item.instance.surface)
+            frame.textures["feature_curvature"] = yield from subtask(task, 0.02, 0.05)
+        else:
+            frame.textures["feature_curvature"] = lookup_tables.palette(frame.resources)
         uniforms = {
             **shared_uniforms,
             **surface_cell_uniforms(settings, item, frame.camera),

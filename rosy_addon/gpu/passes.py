@@ -174,7 +174,7 @@ RESOLVE = ComputePass(
 
 SURFACE_NOISE = ComputePass(
     "surface_noise",
-    ("visibility", "triangle_records"),
+    ("visibility", "triangle_records", "feature_curvature"),
     (("raw_noise", "RGBA32F"),),
     (
         *_BOX_ORIGIN,
@@ -186,6 +186,8 @@ SURFACE_NOISE = ComputePass(
         ("pixel_size", "float"),
         ("cell_size", "float"),
         ("min_cell_scale", "float"),
+        ("feature_grains", "float"),
+        ("max_bend", "float"),
         ("amplitude", "float"),
         ("density", "float"),
         ("density_threshold", "int"),

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
+from ..field.feature_curvature import feature_curvature_task
 from ..field.rosy_field import RosyField
+from ..field.surface import Surface
 from ..progress import Task, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
@@ -23,6 +25,7 @@ from .mesh_buffers import (
     mesh_buffers_task,
     mip_atlas,
     split_matrix,
+    to_texture_rows,
     translation_matrix,
 )
 
@@ -156,6 +159,18 @@ class GpuResources:
         for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
             del self._meshes[key]
         return items
+
+    def feature_curvature_task(self, surface: Surface) -> Task[Any]:
+        """Return the curvature of features at the corners of each triangle of a surface, as a texture.
+
+        See `field.feature_curvature`.
+        """
+        key = "feature curvature", surface.rest_shape_key
+        if key not in self._images:
+            curvature = yield from feature_curvature_task(surface)
+            self._images[key] = self._texture_of(to_texture_rows(curvature))
+        self._last_used[key] = self._upload_count
+        return self._images[key]
 
     def image(
         self,

@@ -31,7 +31,12 @@ from ..compositor.streak_statistics import (
     look_streak_statistics,
     softness,
 )
-from ..compositor.surface_noise import LATTICE_SCALE, SUBPIXEL_OFFSETS, lattice_axes
+from ..compositor.surface_noise import (
+    FEATURE_GRAINS,
+    LATTICE_SCALE,
+    SUBPIXEL_OFFSETS,
+    lattice_axes,
+)
 from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, has_wobble
 from ..projection.camera import Camera
@@ -258,6 +263,8 @@ def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
         "noise_channels": settings["channels"],
         "seed": settings["seed"],
         "min_cell_scale": settings["smallest"] / settings["grain"],
+        "feature_grains": FEATURE_GRAINS / LATTICE_SCALE,
+        "max_bend": 1 / (1 - settings.get("detail", 0.0)),
     }
 
 

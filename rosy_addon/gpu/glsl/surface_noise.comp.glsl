@@ -37,6 +37,13 @@ void main()
   float depth = -dot(center_edges / (edge_sum == 0.0 ? 1.0 : edge_sum), corner_z);
   float size = (is_perspective != 0 ? depth : 1.0) * pixel_size;
   float scale = cell_size > 0.0 ? max(cell_size / max(size, 1e-30), min_cell_scale) : 1.0;
+  if (max_bend > 1.0) {
+    ivec2 texel = ivec2(triangle & ((1 << ROW_BITS) - 1), triangle >> ROW_BITS);
+    vec3 corner_curvature = texelFetch(feature_curvature, texel, 0).xyz;
+    vec3 weights = center_edges / (edge_sum == 0.0 ? 1.0 : edge_sum);
+    // As `surface_noise.feature_scale`.
+    scale /= clamp(dot(corner_curvature, weights) * size * feature_grains, 1.0, max_bend);
+  }
   float level = log2(max(size * scale, 1e-30));
   float first_octave = floor(level - (0.5 * float(OCTAVES) - 1.0));
   vec3 total = vec3(0.0);

@@ -217,6 +217,34 @@ def test_lines_run_along_the_field(name):
     assert abs(np.degrees(along)) < 2
 
 
+# --- small features -----------------------------------------------------------------------------------
+
+
+def tone_detail_error(look, radius_pixels):
+    """Mean error of the tone of a ball, blurred by a tenth of its radius."""
+    zoom = radius_pixels / (SIZE / 2) / 0.86
+    instance, camera = make_instance(ball()), make_camera(zoom=zoom)
+    gbuffer = project([instance], camera)
+    assert np.ptp(gbuffer.pixel % SIZE) == pytest.approx(2 * radius_pixels, rel=0.15)
+    visible, expected = np.zeros((2, SIZE * SIZE))
+    visible[gbuffer.pixel] = 1
+    expected[gbuffer.pixel] = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
+    visible, expected = visible.reshape(SIZE, SIZE), expected.reshape(SIZE, SIZE)
+    rgba = render(instance, camera, look)
+    rendered = np.where(visible > 0, inks_of(look).luminance_transmittance(rgba[..., :3]), 0)
+    sigma = 0.1 * radius_pixels
+    inner = gaussian_filter(visible, sigma) > 0.98
+    return np.abs(gaussian_filter(rendered, sigma) - gaussian_filter(expected, sigma))[inner].mean()
+
+
+def test_detail_shows_the_tone_of_small_features():
+    """A ball of 20 pixels is drawn better by a third, and a large one stays the same."""
+    fine = replace(INK, detail=0.6)
+    assert tone_detail_error(fine, 20) <= 0.67 * tone_detail_error(INK, 20)
+    instance, camera = make_instance(ball()), make_camera(zoom=12)
+    np.testing.assert_array_equal(render(instance, camera, fine), render(instance, camera, INK))
+
+
 # --- uneven lines ------------------------------------------------------------------------------------
 
 UNEVEN_LINES = {

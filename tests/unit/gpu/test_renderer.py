@@ -686,6 +686,7 @@ LOOKS = {
         "guiding_angle": 0.5,
         "supersampling": 2,
     },
+    "fine on small features": {"anchor": "surface", "detail": 0.7, "grain": 2.5, "degree": 4},
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
     "the method brute": {"method": "brute"},

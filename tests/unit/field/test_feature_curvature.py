@@ -1,0 +1,74 @@
+"""Curvature of features: closed forms, scales, noise, sharp edges and awkward meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from awkward import AWKWARD
+from shapes import cube, cylinder, icosphere, plane, torus
+
+from rosy_addon.field.feature_curvature import feature_curvature_task
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+
+
+def feature_curvature(surface):
+    return run_to_completion(feature_curvature_task(surface))
+
+
+def with_noise(surface, share):
+    normal = surface.vertices / np.linalg.norm(surface.vertices, axis=1, keepdims=True)
+    noise = np.random.default_rng(5).standard_normal((len(normal), 1))
+    points = surface.vertices + share * surface.extent * noise * normal
+    return build_surface(points, surface.corner_vertex, surface.face_start)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_spheres(scale):
+    ball = icosphere(4)
+    ball = build_surface(scale * ball.vertices, ball.corner_vertex, ball.face_start)
+    curvature = feature_curvature(ball)
+    assert curvature.shape == (len(ball.triangles), 3) and curvature.dtype == np.float32
+    np.testing.assert_allclose(curvature, 1 / scale, rtol=0.02)
+
+
+def test_the_larger_curvature_of_a_torus():
+    ring = torus(96, 48)
+    small_radius = np.ptp(ring.vertices[:, 2]) / 2
+    np.testing.assert_allclose(feature_curvature(ring), 1 / small_radius, rtol=0.05)
+
+
+@pytest.mark.parametrize("make", [cube, plane, lambda: cylinder(64)])
+def test_sharp_edges_have_none(make):
+    surface = make()
+    round_curvature = 1 / np.linalg.norm(surface.vertices[:, :2], axis=1).max()
+    assert feature_curvature(surface).max() <= 1.05 * round_curvature
+
+
+def test_noise_is_no_feature():
+    """The curvature of a noisy sphere is about that of the sphere, or less."""
+    for share in (0.0005, 0.002):
+        noisy = feature_curvature(with_noise(icosphere(5), share))
+        assert np.median(noisy) <= 1.1
+        assert np.percentile(noisy, 95) <= 2.0
+
+
+def test_a_deformation_changes_nothing():
+    ball = icosphere(3)
+    bent = build_surface(
+        ball.vertices * (1, 1, 3),
+        ball.corner_vertex,
+        ball.face_start,
+        rest_vertices=ball.vertices,
+    )
+    np.testing.assert_array_equal(feature_curvature(bent), feature_curvature(ball))
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+def test_awkward_meshes(name):
+    points, faces = AWKWARD[name]()
+    starts = np.cumsum([0, *map(len, faces)])
+    surface = build_surface(points, np.concatenate(faces), starts)
+    curvature = feature_curvature(surface)
+    assert curvature.shape == (len(surface.triangles), 3)
+    assert np.isfinite(curvature).all() and (curvature >= 0).all()

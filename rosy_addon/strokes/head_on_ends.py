@@ -49,7 +49,7 @@ def head_on_ends_task(strokes: Strokes) -> Task[np.ndarray]:
     if not len(ends):
         return result.reshape(-1, 2)
     grid = PointGrid(MAX_FORWARD * float(np.median(spacing)), len(ends))
-    grid.add(position)
+    grid.add(position, MAX_FORWARD * spacing)
     radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
     for start in range(0, len(ends), BLOCK_ENDS):
         yield Progress(start / len(ends), "shaping ends")

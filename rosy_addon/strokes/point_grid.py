@@ -1,4 +1,8 @@
-"""A hashed uniform grid for radius queries, to which points can be added and removed."""
+"""Hashed uniform grids for radius queries, to which points can be added and removed.
+
+Points of very different spacing are in grids of different levels, so that no cell holds many points
+and no query visits many cells.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: Factors of the three cell coordinates in the hash.
+#: Factors of the three cell coordinates, and of the level, in the hash.
 _PRIMES = np.array([73856093, 19349663, 83492791], dtype=np.int64)
+_LEVEL_PRIME = np.int64(49979687)
+
+#: Ratio of the cells of two levels. Level 0 holds radii from 1 / 4 to 4 cells.
+LEVEL_RATIO = 16.0
 
 #: Largest radius of a query, in cells.
 MAX_RINGS = 4
@@ -38,20 +46,26 @@ class QueryBand(NamedTuple):
     band_ratio: float = 0.25
 
 
+def grid_levels(radius: np.ndarray, cell: float) -> np.ndarray:
+    """Return the (n,) int64 levels of points with these radii, given the side of a cell of level 0."""
+    ratio = np.clip(radius / cell, 1e-300, 1e300)
+    return np.floor(np.log(ratio) / np.log(LEVEL_RATIO) + 0.5).astype(np.int64)
+
+
 class PointGrid:
-    """A hashed uniform grid of points.
+    """Hashed uniform grids of points.
 
     Parameters
     ----------
     cell : float
-        Side of a cell; best about the radius of most queries.
+        Side of a cell of level 0; best about the radius of most queries.
     expected_count : int
         Expected number of points. It sets the size of the hash table.
 
     Examples
     --------
     >>> grid = PointGrid(1.0, 2)
-    >>> index = grid.add(np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]))
+    >>> index = grid.add(np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]), np.array([0.5, 0.5]))
     >>> query, point = grid.pairs_within(np.zeros((1, 3)), np.array([0.5]))
     >>> point.tolist()
     [0]
@@ -59,6 +73,8 @@ class PointGrid:
 
     def __init__(self, cell: float, expected_count: int) -> None:
         self.cell = cell
+        #: The levels that have points.
+        self.levels: set[int] = set()
         bits = int(np.clip(np.ceil(np.log2(max(expected_count, 2))), 10, 22))
         self.mask = np.int64((1 << bits) - 1)
         # The last block of each cell, and the number of its slots in use.
@@ -72,13 +88,27 @@ class PointGrid:
         self.point_count = 0
         self.point_slot = np.empty(1024, dtype=np.int32)
 
-    def add(self, points: np.ndarray) -> np.ndarray:
-        """Add (n, 3) points and return their (n,) int32 numbers, which continue those before."""
+    def add(self, points: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """Add points.
+
+        Parameters
+        ----------
+        points : (n, 3) ndarray
+        radius : (n,) ndarray
+            Radii of queries at these points. They set the levels.
+
+        Returns
+        -------
+        (n,) int32 ndarray
+            Their numbers, which continue those before.
+        """
+        level = grid_levels(radius, self.cell)
+        self.levels.update(np.unique(level).tolist())
         first = self.point_count
         self.point_count += len(points)
         self.point_slot = _grow_to(self.point_slot, self.point_count, 0)
         index = np.arange(first, self.point_count, dtype=np.int32)
-        key = self._hash_cells(self._cells(points))
+        key = self._hash_cells(self._cells(points, level), level)
         order = np.argsort(key, kind="stable")
         key = key[order]
         starts_group = np.ones(len(key), dtype=bool)
@@ -142,7 +172,7 @@ class PointGrid:
         points : (n, 3) ndarray
             Centers of the queries.
         radius : (n,) ndarray
-            Radii. Points farther than `MAX_RINGS` cells may be missed.
+            Radii. Points farther than `MAX_RINGS` cells of their level may be missed.
         band : QueryBand, optional
             Restricts the queries.
 
@@ -153,14 +183,16 @@ class PointGrid:
         point : (m,) int32 ndarray
             Number of the point. A pair may occur twice, because of hash collisions.
         """
-        rings = np.clip(np.ceil(radius / self.cell), 1, MAX_RINGS).astype(np.int64)
         pairs = []
-        for ring_count in range(1, int(rings.max(initial=0)) + 1):
-            queries = np.flatnonzero(rings == ring_count)
-            offset = _ring_offsets(ring_count)
-            for start in range(0, len(queries), QUERY_BATCH_SIZE):
-                batch = queries[start : start + QUERY_BATCH_SIZE]
-                pairs += self._batch_pairs(points, radius * radius, batch, offset, band)
+        for level in sorted(self.levels):
+            cell = self.cell * LEVEL_RATIO**level
+            rings = np.clip(np.ceil(radius / cell), 1, MAX_RINGS).astype(np.int64)
+            for ring_count in range(1, int(rings.max(initial=0)) + 1):
+                queries = np.flatnonzero(rings == ring_count)
+                offset = _ring_offsets(ring_count)
+                for start in range(0, len(queries), QUERY_BATCH_SIZE):
+                    batch = queries[start : start + QUERY_BATCH_SIZE]
+                    pairs += self._batch_pairs(points, radius * radius, batch, level, offset, band)
         if not pairs:
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
         return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -170,17 +202,20 @@ class PointGrid:
         points: np.ndarray,
         radius_squared: np.ndarray,
         queries: np.ndarray,
+        level: int,
         offset: np.ndarray,
         band: QueryBand | None,
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the pairs of some queries: two arrays for each step along the lists of blocks.
+        """Return the pairs of some queries at a level: two arrays for each step along the lists.
 
         `offset` holds the cell offsets of `_ring_offsets`, `queries` the numbers of the queries.
         """
-        hash_parts = self._cells(points[queries]) * _PRIMES
+        levels = np.full(len(queries), level, dtype=np.int64)
+        hash_parts = self._cells(points[queries], levels) * _PRIMES
         key = hash_parts[:, 0, None] + offset[:, 0]
         key ^= hash_parts[:, 1, None] + offset[:, 1]
         key ^= hash_parts[:, 2, None] + offset[:, 2]
+        key ^= np.int64(level) * _LEVEL_PRIME
         key &= self.mask
         block = self.last_block.take(key).ravel()
         occupied = np.flatnonzero(block >= 0)
@@ -211,12 +246,14 @@ class PointGrid:
             block, query = block.take(has_next), query.take(has_next)
         return pairs
 
-    def _cells(self, points: np.ndarray) -> np.ndarray:
-        return np.floor(points / self.cell).astype(np.int64)
+    def _cells(self, points: np.ndarray, level: np.ndarray) -> np.ndarray:
+        cell = self.cell * LEVEL_RATIO ** level.astype(np.float64)
+        return np.floor(points / cell[:, None]).astype(np.int64)
 
-    def _hash_cells(self, cells: np.ndarray) -> np.ndarray:
+    def _hash_cells(self, cells: np.ndarray, level: np.ndarray) -> np.ndarray:
         hash_parts = cells * _PRIMES
-        return (hash_parts[:, 0] ^ hash_parts[:, 1] ^ hash_parts[:, 2]) & self.mask
+        key = hash_parts[:, 0] ^ hash_parts[:, 1] ^ hash_parts[:, 2] ^ level * _LEVEL_PRIME
+        return key & self.mask
 
 
 def _ring_offsets(rings: int) -> np.ndarray:

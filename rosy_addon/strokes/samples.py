@@ -181,7 +181,7 @@ class StrokeSamples(ColumnTable):
             Their numbers.
         """
         sample = self._append_at(particles, stroke, arc)
-        self.grid.add(self.position[sample])
+        self.grid.add(self.position[sample], SEARCH_RADIUS * self.spacing[sample])
         return sample
 
     @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from ..field.frames import dot
 from ..progress import Progress, Task
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
+from .point_grid import LEVEL_RATIO, grid_levels
 from .samples import SAMPLE_STEP, StrokeSamples
 from .surface_particles import SurfaceParticles, trace_geodesics
 from .tangent_mesh import TangentMesh, nearest_member
@@ -83,14 +84,35 @@ def uncovered_seeds_task(samples: StrokeSamples, seeds: SurfaceParticles) -> Tas
     return seeds.take(np.flatnonzero(is_uncovered))
 
 
-def thinned_seeds(mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float) -> SurfaceParticles:
+def thinned_seeds(
+    mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float, spacing_ratio: np.ndarray
+) -> SurfaceParticles:
     """Return the seeds at points that are about `cell_size` apart in world space.
 
     All seeds at a chosen point are returned, one for each line.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    seeds : SurfaceParticles
+    cell_size : float
+        For the spacing that `spacing_ratio` is relative to.
+    spacing_ratio : (n,) ndarray
+        Relative spacing at the seeds. Where it is very different from 1, the points are farther
+        apart or nearer accordingly; see `point_grid.grid_levels`.
     """
-    if not len(seeds):
-        return seeds
     position = mesh.points_at(seeds.triangle, seeds.weights)
+    level = grid_levels(spacing_ratio, 1.0)
+    chosen = np.zeros(len(seeds), dtype=bool)
+    for number in np.unique(level).tolist():
+        members = np.flatnonzero(level == number)
+        size = cell_size * LEVEL_RATIO**number
+        chosen[members[_is_nearest_to_cell_center(position[members], size)]] = True
+    return seeds.take(np.flatnonzero(chosen))
+
+
+def _is_nearest_to_cell_center(position: np.ndarray, cell_size: float) -> np.ndarray:
+    """(n,) bool: whether a point is the one that is nearest to the center of its cell, or equal."""
     low, extent = position.min(axis=0), np.ptp(position, axis=0)
     # Divide the bounding box into cells, and choose the point nearest to the center of each cell.
     cell_counts = np.maximum(np.ceil(extent / cell_size), 1)
@@ -102,7 +124,7 @@ def thinned_seeds(mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float) 
     first = order[np.unique(cell_index[order], return_index=True)[1]]
     cell_rank = np.searchsorted(cell_index[first], cell_index)
     to_chosen = position - position[first[cell_rank]]
-    return seeds.take(np.flatnonzero(dot(to_chosen, to_chosen) == 0))
+    return dot(to_chosen, to_chosen) == 0
 
 
 # --- beside strokes -------------------------------------------------------------------------------

@@ -232,7 +232,7 @@ def _too_close_task(
     """
     arc, stroke, spacing = refined.arc, refined.stroke, refined.spacing
     grid = PointGrid(1.01 * MIN_SEPARATION * float(np.median(spacing)), len(stroke))
-    grid.add(refined.points)
+    grid.add(refined.points, MIN_SEPARATION * spacing)
     end_distance = np.minimum(arc, length[stroke] - arc)
     queries = np.flatnonzero(suspect)
     rejected = np.zeros(len(stroke), dtype=bool)

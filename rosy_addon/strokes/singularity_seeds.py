@@ -111,7 +111,7 @@ def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
     if not len(points):
         return np.zeros(0, dtype=bool)
     grid = PointGrid(float(np.median(radius)), len(points))
-    grid.add(points)
+    grid.add(points, radius)
     query, other = grid.pairs_within(points, radius)
     isolated = np.ones(len(points), dtype=bool)
     isolated[query[query != other]] = False

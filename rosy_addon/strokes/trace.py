@@ -143,7 +143,12 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     while len(seeds):
         yield Progress(placer.samples.coverage, label)
-        thinned = thinned_seeds(placer.mesh, seeds, seed_spacing * median_spacing)
+        thinned = thinned_seeds(
+            placer.mesh,
+            seeds,
+            seed_spacing * median_spacing,
+            placer.samples.spacing_at(seeds) / median_spacing,
+        )
         yield Progress(placer.samples.coverage, label)
         placer.add_seeds(thinned)
         yield from _grow_until(placer, label, STRAGGLER_RATIO)

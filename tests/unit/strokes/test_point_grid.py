@@ -1,0 +1,56 @@
+"""`PointGrid`: all pairs within radii that differ by orders of magnitude, in bounded time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from rosy_addon.strokes.point_grid import PointGrid
+
+
+def spread_points(count, octaves):
+    """Points whose distances to their neighbors grow away from the origin, and these distances."""
+    rng = np.random.default_rng(2)
+    distance = 2.0 ** (octaves * rng.random(count))
+    direction = rng.standard_normal((count, 3)) * (1, 1, 0.02)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    return distance[:, None] * direction, 0.05 * distance
+
+
+@pytest.mark.parametrize("octaves", [0, 4, 16])
+def test_all_pairs_are_found(octaves):
+    points, radius = spread_points(3000, octaves)
+    grid = PointGrid(float(np.median(radius)), len(points))
+    grid.add(points[:1000], radius[:1000])
+    grid.add(points[1000:], radius[1000:])
+    grid.remove(np.arange(0, 3000, 7))
+    query, other = grid.pairs_within(points, radius)
+    actual = np.unique(np.stack([query, other], axis=1), axis=0)
+    neighbors = cKDTree(points).query_ball_point(points, radius)
+    expected = np.stack(
+        [np.repeat(np.arange(len(points)), list(map(len, neighbors))), np.concatenate(neighbors)],
+        axis=1,
+    )
+    expected = expected[expected[:, 1] % 7 != 0]
+    np.testing.assert_array_equal(actual, np.unique(expected, axis=0))
+
+
+def longest_list(grid):
+    """The largest number of blocks that a query of one cell visits."""
+    block, length = grid.last_block[grid.last_block >= 0], 0
+    while len(block):
+        block, length = grid.next_block[block], length + 1
+        block = block[block >= 0]
+    return length
+
+
+def test_no_cell_holds_many_points():
+    """The work for a cell does not grow with the ratio of the radii."""
+    lengths = []
+    for octaves in (1, 18):
+        points, radius = spread_points(20000, octaves)
+        grid = PointGrid(float(np.median(radius)), len(points))
+        grid.add(points, radius)
+        lengths.append(longest_list(grid))
+    assert lengths[1] <= 2 * lengths[0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..progress import Progress, Task, subtask
 from .connection import Connection
-from .curvature import face_curvature_task
+from .curvature import TINY, face_curvature_task
 from .frames import dot
 from .representation import complex_bincount
 from .smoothest import corner_frame_angles, node_sum_per_face
@@ -114,10 +114,12 @@ class SurfaceAverages:
             Of the precision of `sums`.
         """
         dtype = matrix.data.dtype
+        scale = float(np.abs(sums).max())
+        if scale < TINY:
+            return np.zeros_like(sums)
         # All numbers are of order 1 after this, whatever the size of the mesh.
         mass = (self.mass / self.mass.mean()).astype(np.float32)
         area = np.float32(area / self.mass.mean())
-        scale = float(np.abs(sums).max()) or 1.0
         diagonal = mass + area * matrix.diagonal.astype(np.float32)
 
         def apply(vector: np.ndarray) -> np.ndarray:

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
+from rosy_addon.field.connection import connection_task, laplacian_task
 from rosy_addon.field.form import form_task
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
+from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.salient_edges import filtered_normals_task, salient_edges_task
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_edges, build_surface
+from rosy_addon.field.surface_averages import SurfaceAverages
 from rosy_addon.field.vertex_noise import noise_sample_task
 from rosy_addon.progress import run_to_completion
 
@@ -168,3 +171,15 @@ def test_long_work_is_done_in_steps():
     steps = [progress.fraction for progress in form_task(torus(64, 32), 4)]
     assert len(steps) > 60
     assert steps == sorted(steps)
+
+
+def test_averages_of_numbers_below_all_normal_ones():
+    """They are 0, without an overflow of their inverse."""
+    surface = icosphere(1)
+    connection = run_to_completion(connection_task(surface))
+    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    matrix = run_to_completion(laplacian_task(connection, 0))
+    matrix = matrix.with_values(matrix.data.real.astype(np.float32))
+    sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
+    assert sums.any()
+    assert not run_to_completion(averages.smooth_task(matrix, 0.1, sums)).any()

@@ -14,6 +14,7 @@ from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
+from .even_lines import EvenLines, even_line_images_task, has_even_lines
 from .family_hues import family_hues
 from .hatching import (
     LineModulation,
@@ -46,6 +47,7 @@ def compose_task(
     lights: Sequence[Light] = (),
     reference: ReferenceRender | None = None,
     cache: Cache | None = None,
+    mesh_cache: Cache | None = None,
 ) -> Task[Picture]:
     """Draw the fields of a G-buffer.
 
@@ -62,6 +64,8 @@ def compose_task(
     cache : Cache, optional
         Stores intermediate results. For the same G-buffer and another look, those that do not
         depend on the changed settings are reused.
+    mesh_cache : Cache, optional
+        Stores what does not depend on the camera, by default `cache`.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def compose_task(
     color = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
-    stages = ComposeStages(gbuffer, cache)
+    stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
     tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
     tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
     layers = []
@@ -92,7 +96,13 @@ def compose_task(
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
         yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
-        images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
+        even_lines = None
+        if has_even_lines(pixel_look):
+            task = stages.even_lines_task(field, pixel_look)
+            even_lines = yield from subtask(task, start, stop)
+            images = yield from subtask(even_line_images_task(even_lines), stop, stop)
+        else:
+            images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
         layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
         part_look = (
             with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
@@ -101,7 +111,7 @@ def compose_task(
         if is_hatched(look):
             tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
             modulation = yield from subtask(
-                _line_modulation_task(stages, field, pixel_look, tone), stop, stop
+                _line_modulation_task(stages, field, pixel_look, tone, even_lines), stop, stop
             )
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
@@ -185,10 +195,17 @@ def _mean_tone_task(tone_rgb: np.ndarray) -> Task[np.ndarray]:
 
 
 def _line_modulation_task(
-    stages: ComposeStages, field: PixelField, look: Look, tone: np.ndarray
+    stages: ComposeStages,
+    field: PixelField,
+    look: Look,
+    tone: np.ndarray,
+    even_lines: EvenLines | None,
 ) -> Task[LineModulation]:
     """Compute the parts of the `LineModulation` that a look uses."""
-    yield from look_streak_statistics_task(look)  # `line_coverage` finds them in their cache
+    undirected = yield from stages.undirected_texture_task(field, look)
+    uses_streaks = even_lines is None or has_breaks(look) or has_paper_grain(look)
+    if uses_streaks or undirected is not None:
+        yield from look_streak_statistics_task(look)  # `line_coverage` finds them in their cache
     break_images = paper_grain = line_tones = None
     if has_breaks(look):
         break_images = yield from stages.lic_task(field, replace(look, length=break_steps(look)))
@@ -197,8 +214,7 @@ def _line_modulation_task(
     if has_overshoot(look):
         line_tones = yield from _tone_along_lines_task(field, look, tone)
     outline = (yield from stages.outline_task(field, look)) if has_outline(look) else None
-    undirected = yield from stages.undirected_texture_task(field, look)
-    return LineModulation(break_images, paper_grain, line_tones, outline, undirected)
+    return LineModulation(break_images, paper_grain, line_tones, outline, undirected, even_lines)
 
 
 def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> Task[np.ndarray]:

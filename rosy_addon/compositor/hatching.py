@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..color import map_colors, to_linear
+from .even_lines import EvenLines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
@@ -67,6 +68,8 @@ class LineModulation(NamedTuple):
     undirected : (P,) float32 ndarray or None
         Undirected texture where the field is undefined, and NaN elsewhere; see
         `undirected_texture_task`.
+    even_lines : EvenLines or None
+        Evenly spaced lines, if they are drawn instead of the streaks of LIC images.
     """
 
     break_images: LicImages | None = None
@@ -74,16 +77,18 @@ class LineModulation(NamedTuple):
     line_tones: np.ndarray | None = None
     outline: np.ndarray | None = None
     undirected: np.ndarray | None = None
+    even_lines: EvenLines | None = None
 
     def part(self, extent: slice) -> LineModulation:
         """Return the modulation at some of the pixels."""
-        breaks, grain, tones, outline, undirected = self
+        breaks, grain, tones, outline, undirected, even_lines = self
         return LineModulation(
             None if breaks is None else breaks.part(extent),
             None if grain is None else grain[:, extent],
             None if tones is None else tones[:, extent],
             None if outline is None else outline[extent],
             None if undirected is None else undirected[extent],
+            None if even_lines is None else even_lines.part(extent),
         )
 
 
@@ -208,6 +213,26 @@ def line_coverage(
     (P,) float32 ndarray
         0 to 1.
     """
+    if modulation.even_lines is None:
+        coverage = _streak_coverage(line, target_coverage, images, look, modulation)
+    else:
+        coverage = _even_line_coverage(line, target_coverage, look, modulation)
+    if modulation.undirected is not None:
+        undefined = np.flatnonzero(~np.isnan(modulation.undirected))
+        coverage[undefined] = _undirected_coverage(
+            line, target_coverage[undefined], look, modulation, undefined
+        )
+    return coverage
+
+
+def _streak_coverage(
+    line: int,
+    target_coverage: np.ndarray,
+    images: LicImages,
+    look: Look,
+    modulation: LineModulation,
+) -> np.ndarray:
+    """`line_coverage` of the streaks of LIC images."""
     statistics = look_streak_statistics(look)
     streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / statistics.std
     if modulation.break_images is not None:
@@ -216,19 +241,48 @@ def line_coverage(
         ) / statistics.break_std
         streak += break_amount(target_coverage, look.breaks, look.wobble) * (break_streak - streak)
     if modulation.paper_grain is not None:
-        relief = np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
-        streak += relief
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
-    threshold = np.interp(target_coverage, coverages, statistics.threshold)
-    if modulation.undirected is not None:
-        undefined = ~np.isnan(modulation.undirected)
-        streak[undefined] = modulation.undirected[undefined] / np.float32(statistics.disc_std)
-        if modulation.paper_grain is not None:
-            streak[undefined] += relief[undefined]
-        threshold[undefined] = np.interp(
-            target_coverage[undefined], coverages, statistics.disc_threshold
-        )
+        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
+    return _above_threshold(streak, target_coverage, statistics.threshold, look)
+
+
+def _undirected_coverage(
+    line: int,
+    target_coverage: np.ndarray,
+    look: Look,
+    modulation: LineModulation,
+    undefined: np.ndarray,
+) -> np.ndarray:
+    """`line_coverage` of the texture at the pixels where the field is undefined."""
+    statistics = look_streak_statistics(look)
+    streak = modulation.undirected[undefined] / np.float32(statistics.disc_std)
+    if modulation.paper_grain is not None:
+        relief = modulation.paper_grain[line][undefined]
+        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * relief
+    return _above_threshold(streak, target_coverage, statistics.disc_threshold, look)
+
+
+def _above_threshold(
+    streak: np.ndarray, target_coverage: np.ndarray, thresholds: np.ndarray, look: Look
+) -> np.ndarray:
+    """Coverage where streaks exceed the threshold of the target coverage, with soft edges."""
+    threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
     return smoothstep((streak - threshold) / (2 * softness(look.crispness)) + 0.5)
+
+
+def _even_line_coverage(
+    line: int, target_coverage: np.ndarray, look: Look, modulation: LineModulation
+) -> np.ndarray:
+    """`line_coverage` of evenly spaced lines."""
+    break_streak = paper_grain = None
+    if modulation.break_images is not None:
+        break_std = look_streak_statistics(look).break_std
+        break_streak = modulation.break_images.members[line].mean(axis=1) - NOISE_MEAN
+        break_streak /= break_std
+    if modulation.paper_grain is not None:
+        paper_grain = modulation.paper_grain[line]
+    amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
+    width = uneven_width(target_coverage, look, break_streak, paper_grain, amplitude)
+    return modulation.even_lines.coverage(line, width, look)
 
 
 def has_breaks(look: Look) -> bool:

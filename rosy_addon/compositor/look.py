@@ -141,7 +141,8 @@ class Look:
         1.5,
         0.5,
         256.0,
-        "Width of the lines in pixels: the size of a cell of the noise",
+        "Width of the lines in pixels: the size of a cell of the noise, or half the distance "
+        "between even lines",
         label="Line Width",
         is_pixel_length=True,
         preview_low=0.75,
@@ -362,6 +363,18 @@ class Look:
         panel="ink",
         panel_label="Style",
         stage=Stage.SHADING,
+    )
+    lines: str = choice(
+        "streaks",
+        "What the lines of ink are",
+        {
+            "streaks": "Streaks of noise: as broken and uneven as by hand",
+            "even": "Long lines at even distances on the surface, which swell and thin with the "
+            "tone, as in engravings. The distance is twice the line width",
+        },
+        option_labels={"even": "Evenly Spaced"},
+        panel="ink",
+        applies=is_hatched,
     )
     ink_colour: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
     ink_ramp: bool = switch(

@@ -18,6 +18,10 @@ from .look import Look
 #: look can be reused while the camera moves.
 STEPS_PER_OCTAVE = 32
 
+#: Distances between even lines in pixels are converted to steps of 1 / 8 octave on the surface, so
+#: that lines stay as they are while the camera moves a little.
+SPACING_STEPS_PER_OCTAVE = 8
+
 #: Minimum distance from the camera to the center of the meshes, as a fraction of their size. It
 #: applies when the camera is among them.
 MIN_DISTANCE_FACTOR = 0.25
@@ -106,6 +110,29 @@ def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     depth = -(camera.view[2, :3] @ (low + high) / 2 + camera.view[2, 3])
     min_depth = max(MIN_DISTANCE_FACTOR * float(np.linalg.norm(high - low)), 1e-6)
     return max(float(depth), min_depth) / camera.pixels_per_unit
+
+
+def instance_line_spacing(
+    look: Look, grains: float, camera: Camera, instance: MeshInstance
+) -> float:
+    """Return the distance between even lines on a mesh instance, in Blender units.
+
+    Parameters
+    ----------
+    look : Look
+        In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
+    grains : float
+        The distance in widths of a line.
+    camera : Camera
+        Of the frame.
+    instance : MeshInstance
+        With the unit "pixels", the distance is that of pixels at its center.
+    """
+    if look.unit != "pixels":
+        return grains * look.grain * look.unit_size
+    exact = grains * look.grain * pixel_world_size(world_bounds(instance), camera)
+    step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
+    return float(2 ** (step / SPACING_STEPS_PER_OCTAVE))
 
 
 def cell_size_args(look: Look) -> dict[str, Any]:

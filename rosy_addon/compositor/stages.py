@@ -10,6 +10,7 @@ from ..cache import Cache
 from ..progress import Task, subtask
 from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
+from .even_lines import EvenLines, even_lines_task
 from .lic import lic_task, look_noise_task, noise_args
 from .lic_images import LicImages
 from .look import Look, lic_key
@@ -36,11 +37,14 @@ class ComposeStages:
     gbuffer : GBuffer
     cache : Cache
         May be shared with other G-buffers.
+    mesh_cache : Cache
+        Stores what does not depend on the camera.
     """
 
-    def __init__(self, gbuffer: GBuffer, cache: Cache) -> None:
+    def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
         self._gbuffer = gbuffer
         self._cache = cache
+        self._mesh_cache = mesh_cache
 
     def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
         """Pixel field of one degree, rotated by the wobble of the look."""
@@ -72,6 +76,19 @@ class ComposeStages:
         if noise is None:
             noise = yield from look_noise_task(field, look)
         return (yield from undirected_texture_task(field, noise, look.grain))
+
+    def even_lines_task(self, field: PixelField, look: Look) -> Task[EvenLines]:
+        """Compute the evenly spaced lines of a field, or find them in the cache."""
+
+        def compute_task() -> Task[EvenLines]:
+            wobble_angle = None
+            if has_wobble(look):
+                wobble_angle = (yield from self._wobble_angle_task(look))[field.gbuffer_index]
+            task = even_lines_task(self._gbuffer, field, look, wobble_angle, self._mesh_cache)
+            return (yield from task)
+
+        key = "even lines", self._gbuffer, field.degree, lic_key(look)
+        return (yield from self._cache.get_or_create_task(key, compute_task))
 
     def outline_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""

@@ -426,7 +426,7 @@ def _fill_pixels(
     if not front_facing.all():
         np.negative(normal, out=normal, where=~front_facing)
         np.negative(geometric_normal, out=geometric_normal, where=~front_facing)
-    rotation = _view_plane_rotation(tangent, normal, view_direction)
+    rotation = view_plane_rotation(tangent, normal, view_direction)
     for out, corner_values, order in [
         (gbuffer.representation, corner_field.representation, degree),
         *extra_outputs,
@@ -536,7 +536,7 @@ def _squared_phase(half: np.ndarray) -> np.ndarray:
     return half
 
 
-def _view_plane_rotation(
+def view_plane_rotation(
     tangent: Sequence[np.ndarray], normal: np.ndarray, view_direction: np.ndarray
 ) -> np.ndarray:
     """Return the directions of tangents after transport to the view plane.

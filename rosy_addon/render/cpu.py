@@ -42,7 +42,9 @@ class CpuRenderer:
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
         self._check_memory(view)
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
-        compose = compose_task(gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache)
+        compose = compose_task(
+            gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache, self._cache
+        )
         return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
 
     def _check_memory(self, view: ViewInput) -> None:

@@ -1,0 +1,377 @@
+"""Evenly spaced lines, as in engravings: a phase on the surface instead of streaks of noise.
+
+The phase of each family of lines (`projection.surface_lines`) is evaluated at the pixels. Its
+distance from the nearest integer is the distance from the middle of a line, and is evenly
+distributed. So a line that covers a fraction of the paper is that fraction of the distance between
+lines wide, and the tone is exact. Lines swell and thin with the tone.
+
+Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
+they fade into their mean. Where they are too far apart, as in near parts of a perspective picture,
+further lines grow between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from ..cache import Cache
+from ..deterministic_trig import vector_angle
+from ..field.frames import transform_components
+from ..progress import Progress, Task, subtask
+from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.project import view_plane_rotation
+from ..projection.surface_lines import SurfaceLines, cached_surface_lines_task
+from .lic_images import LicImages, lic_images_task
+from .look import Look, is_hatched
+from .look_units import instance_line_spacing
+from .pixel_field import PixelField, all_members
+from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
+from .wobble import WOBBLE_STD
+
+#: Distance between lines, in widths of a line (`Look.grain`). At half coverage, lines are that wide.
+SPACING_GRAINS = 2.0
+
+#: Distances between lines on screen, in pixels of the picture, over which lines fade in.
+FADE_PIXELS = (1.5, 3.0)
+
+#: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
+#: which further lines grow between them.
+GROWTH_OCTAVES = (0.5, 1.0)
+
+#: Width of the edges of lines at crispness 0, as a fraction of the distance between lines.
+MAX_EDGE_WIDTH = 0.5
+
+#: Standard deviation of the displacement of lines at wobble 1, in distances between lines.
+WOBBLE_SHIFT = 0.2
+
+#: Largest weight of the short streaks that break lines.
+MAX_BREAK_AMOUNT = 0.85
+
+#: Label of all steps.
+STEP_LABEL = "spacing lines"
+
+
+def has_even_lines(look: Look) -> bool:
+    """Whether lines are evenly spaced instead of streaks of noise."""
+    return is_hatched(look) and look.lines == "even"
+
+
+@dataclass(frozen=True, eq=False)
+class EvenLines:
+    """Evenly spaced lines at the pixels of a field.
+
+    Attributes
+    ----------
+    streaks : (M, P) float32 ndarray
+        1 in the middle of a line, 0 halfway between two lines, linear between. Members are in the
+        order of `all_members(field, look.guiding_angle)`.
+    period : (M, P) float32 ndarray
+        Distance between lines on screen, in pixels of the frame. 0 where there are none.
+    growth : (P,) float32 ndarray or None
+        Width of the lines that grow between them, from 0 to 1: as wide as the others. None if
+        there are none.
+    """
+
+    streaks: np.ndarray
+    period: np.ndarray
+    growth: np.ndarray | None
+
+    def part(self, extent: slice) -> EvenLines:
+        """Return the lines at some of the pixels."""
+        growth = None if self.growth is None else self.growth[extent]
+        return EvenLines(self.streaks[:, extent], self.period[:, extent], growth)
+
+    def coverage(self, line: int, target_coverage: np.ndarray, look: Look) -> np.ndarray:
+        """Compute the coverage of each pixel by one line.
+
+        Parameters
+        ----------
+        line : int
+        target_coverage : (P,) ndarray
+            Width of the line as a fraction of the distance between lines, 0 to 1.
+        look : Look
+            In pixels of the frame. Its `crispness` and `supersampling` are used.
+
+        Returns
+        -------
+        (P,) float32 ndarray
+        """
+        width = np.asarray(target_coverage, dtype=np.float32)
+        period = self.period[line]
+        position = np.float32(0.5) - np.float32(0.5) * self.streaks[line]
+        min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
+        edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
+        if self.growth is None:
+            covered = _box_filtered(position, width, edge)
+        else:
+            between = np.float32(0.5) * self.growth * width
+            covered = _box_filtered(position, width - between, edge)
+            covered += _box_filtered(np.float32(0.5) - position, between, edge)
+        low, high = (np.float32(pixels * look.supersampling) for pixels in FADE_PIXELS)
+        contrast = smoothstep((period - low) / (high - low))
+        return width + contrast * (covered - width)
+
+
+def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """Coverage of an interval of the length `edge` by lines with the distance 1.
+
+    Parameters
+    ----------
+    position : (P,) float32 ndarray
+        Distance of the center of the interval from the nearest line, 0 to 0.5.
+    width : (P,) float32 ndarray
+        Of the lines, 0 to 1.
+    edge : (P,) float32 ndarray
+        Above 0, at most 1.
+    """
+    half, low, high = 0.5 * width, position - 0.5 * edge, position + 0.5 * edge
+    covered = np.minimum(high, half) - np.maximum(low, -half)
+    np.maximum(covered, 0, out=covered)
+    covered += np.maximum(high - (1 - half), 0)  # the next line
+    covered += np.maximum(half - 1 - low, 0)  # the previous line
+    covered /= edge
+    return covered
+
+
+def even_line_images_task(lines: EvenLines) -> Task[LicImages]:
+    """Return even lines as the images of members, as if they were streaks."""
+    count = lines.streaks.shape[1]
+    effective_samples = np.ones(count, dtype=np.float32)
+    return (yield from lic_images_task(lines.streaks[..., None], effective_samples))
+
+
+def uneven_width(
+    target_coverage: np.ndarray,
+    look: Look,
+    break_streak: np.ndarray | None,
+    paper_grain: np.ndarray | None,
+    paper_grain_amplitude: float,
+) -> np.ndarray:
+    """Compute widths of lines that are broken, or uneven by the paper grain, at equal mean widths.
+
+    Parameters
+    ----------
+    target_coverage : (P,) ndarray
+        Mean width, as a fraction of the distance between lines.
+    look : Look
+    break_streak, paper_grain : (P,) ndarray or None
+        With mean 0 and standard deviation 1; see `hatching.line_coverage`.
+    paper_grain_amplitude : float
+
+    Returns
+    -------
+    (P,) ndarray
+        0 to 1.
+    """
+    if break_streak is None and paper_grain is None:
+        return target_coverage
+    has_breaks = break_streak is not None
+    amplitude = paper_grain_amplitude if paper_grain is not None else 0.0
+    breaks, wobble = (look.breaks, look.wobble) if has_breaks else (0.0, 0.0)
+    table = _width_table(breaks, wobble, amplitude)
+    amount = np.minimum(break_amount(target_coverage, breaks, wobble), MAX_BREAK_AMOUNT)
+    # The streaks of even lines have a uniform distribution with the standard deviation 1.
+    scale = 1 / ((1 - amount) * math.sqrt(12))
+    width = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), table)
+    if has_breaks:
+        width = width + scale * amount * break_streak
+    if paper_grain is not None:
+        width = width + scale * amplitude * paper_grain
+    return np.clip(width, 0, 1)
+
+
+@lru_cache(maxsize=16)
+def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
+    """(COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
+
+    The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
+    s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
+    """
+    coverage = np.linspace(0, 1, COVERAGE_STEPS)
+    amount = np.minimum(break_amount(coverage, breaks, wobble), MAX_BREAK_AMOUNT)
+    spread = np.sqrt(amount**2 + paper_grain_amplitude**2) / ((1 - amount) * math.sqrt(12))
+    spread = np.maximum(spread, 1e-6)
+    erf = np.vectorize(math.erf, otypes=[float])
+
+    def ramp(x: np.ndarray) -> np.ndarray:
+        scaled = x / spread
+        density = np.exp(-0.5 * scaled**2) / math.sqrt(2 * math.pi)
+        return x * 0.5 * (1 + erf(scaled / math.sqrt(2))) + spread * density
+
+    low, high = -6 * spread, 1 + 6 * spread
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        is_low = ramp(middle) - ramp(middle - 1) < coverage
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    return 0.5 * (low + high)
+
+
+def even_lines_task(
+    gbuffer: GBuffer,
+    field: PixelField,
+    look: Look,
+    wobble_angle: np.ndarray | None = None,
+    cache: Cache | None = None,
+) -> Task[EvenLines]:
+    """Evaluate evenly spaced lines at the pixels of a field.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With its mesh instances.
+    field : PixelField
+        Of one degree, from `gbuffer`.
+    look : Look
+        In pixels of the frame.
+    wobble_angle : (P,) float32 ndarray, optional
+        Of the pixels of the field, from `wobble.wobble_angle`.
+    cache : Cache, optional
+        Stores what does not depend on the camera.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    EvenLines
+    """
+    count = len(field.pixel)
+    streaks, period = np.zeros((2, field.line_count, count), dtype=np.float32)
+    growth = np.zeros(count, dtype=np.float32)
+    instance_id = gbuffer.instance_id[field.gbuffer_index]
+    all_entries = np.arange(len(gbuffer.pixel), dtype=np.intp)[field.gbuffer_index]
+    present = np.flatnonzero(np.bincount(instance_id)).tolist()
+    asked_pixels = SPACING_GRAINS * look.grain
+    for number, index in enumerate(present):
+        instance = gbuffer.instances[index]
+        spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
+        task = cached_surface_lines_task(
+            instance.surface, instance.matrix, instance.field, look.display, spacing, cache
+        )
+        start, stop = number / len(present), (number + 1) / len(present)
+        lines = yield from subtask(task, start, stop)
+        sides = _camera_space_sides(gbuffer, instance)
+        pixels = np.flatnonzero(instance_id == index)
+        for block in pixel_blocks(len(pixels)):
+            yield Progress(stop, STEP_LABEL)
+            part = pixels[block]
+            is_all = len(pixels) == count
+            block_field = field.part(block) if is_all else _taken(field, part)
+            phases, line_period, octaves = _evaluate(
+                gbuffer, all_entries[part], block_field, look, lines, sides, spacing / asked_pixels
+            )
+            if wobble_angle is not None:
+                phases += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[part]
+            if octaves is not None:
+                doublings = np.floor(octaves)
+                first, last = GROWTH_OCTAVES
+                growth[part] = smoothstep((octaves - doublings - first) / (last - first))
+                scale = np.exp2(doublings).astype(np.float32)
+                phases *= scale
+                line_period /= scale
+            streaks[:, part] = 1 - 2 * np.abs(phases - np.rint(phases))
+            period[:, part] = line_period
+    return EvenLines(streaks, period, growth if growth.any() else None)
+
+
+def _taken(field: PixelField, pixels: np.ndarray) -> PixelField:
+    """Return the field at some pixels, for what depends on single pixels."""
+    return replace(
+        field,
+        pixel=field.pixel[pixels],
+        representation=field.representation[pixels],
+        screen_jacobian=field.screen_jacobian[pixels],
+        channels={channel: values[pixels] for channel, values in field.channels.items()},
+    )
+
+
+def _camera_space_sides(gbuffer: GBuffer, instance: MeshInstance) -> np.ndarray:
+    """(2, 3, T) float32: the sides of triangles from corner 0 to corners 1 and 2, in camera space."""
+    matrix = gbuffer.camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+    surface = instance.surface
+    points = transform_components(np.ascontiguousarray(surface.vertices.T), matrix[:3, :3])
+    first, *others = (points.take(corner, axis=1) for corner in surface.triangle_vertex.T)
+    return np.stack([(corner - first).astype(np.float32) for corner in others])
+
+
+def _evaluate(
+    gbuffer: GBuffer,
+    entries: np.ndarray,
+    field: PixelField,
+    look: Look,
+    lines: SurfaceLines,
+    sides: np.ndarray,
+    unit: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Evaluate the lines of one mesh instance at some pixels.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    entries : (n,) int ndarray
+        Of the pixels in the G-buffer.
+    field : PixelField
+        At these pixels.
+    look : Look
+    lines : SurfaceLines
+    sides : (2, 3, T) float32 ndarray
+        From `_camera_space_sides`.
+    unit : float
+        Distance between lines on the surface divided by the one asked for in pixels.
+
+    Returns
+    -------
+    phases : (M, n) float32 ndarray
+    period : (M, n) float32 ndarray
+        In pixels.
+    octaves : (n,) float32 ndarray or None
+        Base-2 logarithm of the distance between lines, without foreshortening, relative to the one
+        asked for, at least 0. None if lines may be farther apart.
+    """
+    camera = gbuffer.camera
+    triangle = gbuffer.triangle[entries]
+    leaf, weights = lines.tree.locate(triangle, gbuffer.barycentric[entries])
+    members = all_members(field, look.guiding_angle)
+    # Directions of the surface are counted counter-clockwise about the normal of the triangle.
+    step = np.where(gbuffer.front_facing[entries], 1, -1)
+    heading = _heading_in_view(gbuffer, entries, lines.heading.take(leaf, axis=1), sides)
+    relative = members[0] * heading.conj()
+    turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
+    first_direction = step * np.rint(turn).astype(np.int32)
+    scale = np.full(len(entries), unit * camera.pixels_per_unit, dtype=np.float32)
+    if camera.is_perspective:
+        scale /= -gbuffer.position[entries, 2]
+    octaves = None
+    if look.unit == "pixels":
+        octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
+    asked_pixels = np.float32(SPACING_GRAINS * look.grain)
+    across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
+    defined = field.representation != 0
+    phases, period = np.empty((2, field.line_count, len(entries)), dtype=np.float32)
+    for line in range(field.line_count):
+        family = (first_direction + step * line) % field.degree % field.line_count
+        phases[line] = lines.pattern.evaluate(leaf, weights, family)
+        along = np.abs(field.to_screen(field.member_direction(members[line]), foreshorten=True))
+        foreshortening = np.abs(across) / np.maximum(along, np.float32(1e-6))
+        period[line] = asked_pixels * scale * foreshortening * defined
+    return phases, period, octaves
+
+
+def _heading_in_view(
+    gbuffer: GBuffer, entries: np.ndarray, heading: np.ndarray, sides: np.ndarray
+) -> np.ndarray:
+    """(n,) complex64 directions in the view plane, from (2, n) `SurfaceLines.heading`."""
+    triangle = gbuffer.triangle[entries]
+    tangent = [
+        heading[0] * first.take(triangle) + heading[1] * second.take(triangle)
+        for first, second in zip(*sides, strict=True)
+    ]
+    return view_plane_rotation(
+        tangent, gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
+    )

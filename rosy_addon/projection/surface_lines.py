@@ -1,0 +1,272 @@
+"""Evenly spaced lines on the surface of a mesh instance, independent of the camera.
+
+The phase of the lines (`field.stripe_pattern`) is computed on the rest shape, so lines move and
+stretch with the surface. It is evaluated at the visible pixels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..cache import Cache, content_hash
+from ..field.bisection import BisectionTree, bisection_task
+from ..field.directional_field import evaluate_harmonics, field_symmetry
+from ..field.frames import dot_components, transform_components
+from ..field.representation import signed_power
+from ..field.rosy_field import RosyField
+from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern_task
+from ..field.surface import Surface, surface_task
+from ..memory import check_memory
+from ..progress import Progress, Task, subtask
+from .corner_field import CornerField, corner_field_task
+from .face_values import SIMILARITY_EPS
+from .fan_values import transport_phase
+from .field_channel import rotation_order
+from .rest_coordinates import matrix_scale
+from .vector_components import tangent_frame_components
+
+#: Longest edge of the triangles on which the phase is computed, in distances between lines.
+MAX_EDGE = 1.0
+
+#: Largest number of triangles on which the phase is computed, unless the mesh has more. Beyond it,
+#: lines end and begin in fewer places.
+MAX_TRIANGLES = 1_500_000
+
+#: Bytes per triangle and direction of the field while a phase is computed, and per triangle.
+DIRECTION_BYTES, TRIANGLE_BYTES = 330, 900
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceLines:
+    """Evenly spaced lines on the T triangles of a surface.
+
+    Attributes
+    ----------
+    tree : BisectionTree
+        The triangles of the surface, and the L smaller ones in them on which the phase is linear.
+    pattern : StripePattern
+        Phases on these L triangles.
+    heading : (2, L) float32 ndarray
+        Direction 0 of the field in each of them, as multiples of the sides of the triangle of the
+        surface from corner 0 to corners 1 and 2.
+    """
+
+    tree: BisectionTree
+    pattern: StripePattern
+    heading: np.ndarray
+
+
+def rest_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Return the (3, 3) part of a matrix that changes the shape: a scale along some axes.
+
+    It is a uniform scale if the matrix is a similarity. Rotations have no effect, so an object that
+    turns keeps its lines.
+    """
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    gram = linear.T @ linear
+    squared_scale = np.trace(gram) / 3
+    if np.abs(gram - squared_scale * np.eye(3)).max() <= 4 * SIMILARITY_EPS * squared_scale:
+        return np.eye(3) * matrix_scale(matrix)
+    values, axes = np.linalg.eigh(gram)
+    return (axes * np.sqrt(np.maximum(values, 0))) @ axes.T
+
+
+def cached_surface_lines_task(
+    surface: Surface,
+    matrix: np.ndarray,
+    field: RosyField,
+    display: str,
+    spacing: float,
+    cache: Cache | None = None,
+) -> Task[SurfaceLines]:
+    """Do the same as `surface_lines_task`, with results stored in a cache if one is given.
+
+    Lines are shared by all cameras, and by instances of equal size.
+    """
+    stretch = rest_matrix(matrix)
+    scale = matrix_scale(matrix)
+    # Rounded, as rotated matrices have rounding errors.
+    spacing = float(f"{spacing / scale:.5g}")
+    stretch = np.round(stretch / scale, 5)
+    if cache is None:
+        return (yield from surface_lines_task(surface, stretch, field, display, spacing))
+    return (
+        yield from cache.get_or_create_task(
+            ("surface lines", _content(surface, field), stretch.tobytes(), display, spacing),
+            lambda: surface_lines_task(surface, stretch, field, display, spacing),
+        )
+    )
+
+
+def _content(surface: Surface, field: RosyField) -> bytes:
+    """Return a hash of what the lines of a surface depend on. Deformations do not change it."""
+    shape = (surface.vertices, surface.corner_normal)
+    if surface.rest_vertices is not None:
+        shape = (surface.rest_vertices,)
+    return content_hash(
+        *shape,
+        surface.corner_vertex,
+        surface.face_start,
+        surface.triangles,
+        surface.corner_fan,
+        field.degree,
+        field.vectors,
+        field.direction_ratios,
+    )
+
+
+def surface_lines_task(
+    surface: Surface, stretch: np.ndarray, field: RosyField, display: str, spacing: float
+) -> Task[SurfaceLines]:
+    """Compute evenly spaced lines along all directions of a field.
+
+    Parameters
+    ----------
+    surface : Surface
+    stretch : (3, 3) ndarray
+        A map of the rest shape to the shape on which distances are measured.
+    field : RosyField
+    display : {"smooth", "flat"}
+        As for `corner_field_task`.
+    spacing : float
+        Distance between neighboring lines after `stretch`.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    SurfaceLines
+
+    Raises
+    ------
+    RosyError
+        If that needs more memory than there is.
+    """
+    label = "spacing lines"
+    yield Progress(0.0, label)
+    rest = surface
+    if surface.rest_vertices is not None:
+        rest = yield from subtask(
+            surface_task(
+                surface.rest_vertices,
+                surface.corner_vertex,
+                surface.face_start,
+                name=surface.name,
+                corner_fan=surface.corner_fan,
+                triangles=surface.triangles,
+                triangle_face=surface.triangle_face,
+            ),
+            0.0,
+            0.05,
+            label,
+        )
+    matrix = np.eye(4)
+    matrix[:3, :3] = stretch
+    corner_field = yield from subtask(
+        corner_field_task(rest, matrix, field, display), 0.05, 0.1, label
+    )
+    points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
+    max_triangles = max(MAX_TRIANGLES, len(rest.triangles))
+    task = bisection_task(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
+    tree = yield from subtask(task, 0.1, 0.2, label)
+    count = len(tree.leaf_root)
+    check_memory(
+        count * (TRIANGLE_BYTES + DIRECTION_BYTES * field.degree),
+        f"{surface.name}: the spacing of lines on {count} triangles",
+        "choose wider lines or streaks instead of even lines",
+    )
+    yield Progress(0.2, label)
+    directions, heading = _leaf_directions(tree, points, rest, corner_field, field)
+    task = stripe_pattern_task(tree.leaf_vertex, directions, spacing)
+    pattern = yield from subtask(task, 0.25, 1.0, label)
+    return SurfaceLines(tree, pattern, heading)
+
+
+def _leaf_directions(
+    tree: BisectionTree,
+    points: np.ndarray,
+    surface: Surface,
+    corner_field: CornerField,
+    field: RosyField,
+) -> tuple[CornerDirections, np.ndarray]:
+    """Interpolate a field to the corners of the leaves of a tree.
+
+    Returns
+    -------
+    directions : CornerDirections
+        On the leaves, in the planes of the triangles of the surface.
+    heading : (2, L) float32 ndarray
+        As `SurfaceLines.heading`.
+    """
+    geometric_normal = corner_field.geometric_normal
+    x, y = tangent_frame_components(geometric_normal)
+    corners = points.take(surface.triangle_vertex, axis=0)
+    sides = corners - corners[:, :1]
+    offset = np.stack(
+        [
+            dot_components(sides[:, corner].T, x) + 1j * dot_components(sides[:, corner].T, y)
+            for corner in range(3)
+        ],
+        axis=1,
+    )
+    reference_x, reference_y = tangent_frame_components(corner_field.corner_normals[0])
+    to_plane = []
+    for corner, normal in enumerate(corner_field.corner_normals):
+        phase = transport_phase(normal, geometric_normal, x, y).astype(np.complex128)
+        if corner:
+            to_reference = transport_phase(
+                normal, corner_field.corner_normals[0], reference_x, reference_y
+            )
+            phase *= to_reference.conj()
+        to_plane.append(phase)
+    weights = tree.leaf_weights.astype(np.float64)
+
+    def at_leaves(values: np.ndarray, order: int) -> np.ndarray:
+        """(L, 3) values of (3, T) corner values that rotate with the frame."""
+        in_plane = np.stack(
+            [z * signed_power(phase, order) for z, phase in zip(values, to_plane, strict=True)],
+            axis=1,
+        )
+        return np.einsum("lcr,lr->lc", weights, in_plane.take(tree.leaf_root, axis=0))
+
+    degree = field.degree
+    z = at_leaves(corner_field.representation, degree)
+    symmetry = field_symmetry(field)
+    mean = z.sum(axis=1)
+    mean_angle = np.angle(mean) / degree
+    angle = mean_angle[:, None] + np.angle(z * mean.conj()[:, None]) / degree
+    deviation = None
+    if symmetry.harmonic_orders:
+        harmonics = [
+            (number, at_leaves(values, rotation_order((kind, number), degree)))
+            for (kind, number), values in corner_field.channels.items()
+            if kind == "deviation"
+        ]
+        deviation = np.empty((*angle.shape, degree), dtype=np.complex128)
+        for direction in range(degree):
+            member = np.exp(1j * (angle + 2 * np.pi * direction / degree))
+            ratio = evaluate_harmonics(harmonics, member)
+            modulus = np.abs(ratio)
+            deviation[..., direction] = np.divide(
+                ratio, modulus, out=np.ones_like(ratio), where=modulus > 0
+            )
+    leaf_offset = np.einsum("lcr,lr->lc", weights, offset.take(tree.leaf_root, axis=0))
+    root_area = (offset[:, 1].conj() * offset[:, 2]).imag
+    defined = (corner_field.representation != 0).all(axis=0) & (root_area > 0)
+    directions = CornerDirections(
+        degree,
+        symmetry.has_opposites,
+        leaf_offset,
+        angle,
+        deviation,
+        defined[tree.leaf_root],
+    )
+    unit = np.exp(1j * mean_angle)
+    first, second = (offset[:, corner].take(tree.leaf_root) for corner in (1, 2))
+    area = np.where(root_area > 0, root_area, np.inf)[tree.leaf_root]
+    heading = np.stack([(unit.conj() * second).imag, (first.conj() * unit).imag]) / area
+    return directions, heading.astype(np.float32)

@@ -37,7 +37,7 @@ from .wobble import WOBBLE_STD
 SPACING_GRAINS = 2.0
 
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
-FADE_PIXELS = (1.5, 3.0)
+FADE_PIXELS = (1.3, 2.6)
 
 #: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
 #: which further lines grow between them.

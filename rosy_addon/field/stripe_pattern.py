@@ -20,11 +20,14 @@ match. A family that comes back with the opposite direction has the conjugate un
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ..progress import Progress, Task, run_to_completion, subtask
-from .surface import connected_components_task, edges_task
+from .blocks import row_blocks
+from .surface import edges_task, next_corners, sorted_with_order
 
 #: Label of all steps.
 STEP_LABEL = "spacing lines"
@@ -33,13 +36,16 @@ STEP_LABEL = "spacing lines"
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
 
 #: Smoothing steps on each level.
-SMOOTHING_STEPS = 12
+SMOOTHING_STEPS = 8
 
 #: Share of the old value in a smoothing step. It damps oscillations.
 INERTIA = 0.3
 
 #: Levels have at least this many nodes, and are coarsened by at least this factor.
 MIN_LEVEL_NODES, MIN_COARSENING = 12, 1.1
+
+#: Odd factor of the hash of two nodes.
+HASH_FACTOR = 0x9E3779B97F4A7C15
 
 #: Rounds in which pairs of nodes are matched on a level.
 MATCHING_ROUNDS = 6
@@ -188,120 +194,155 @@ def stripe_pattern_task(
     yield Progress(0.0, STEP_LABEL)
     change = directions.phase_changes(spacing)
     gluing = yield from subtask(_gluing_task(triangle_vertex, directions), 0.0, 0.1)
-    yield Progress(0.1, STEP_LABEL)
-    change = _mean_of_neighbors(change, gluing, directions)
-    node, conjugated, node_count = yield from subtask(
-        _covering_nodes_task(triangle_vertex, directions, gluing), 0.1, 0.4
-    )
-    yield Progress(0.4, STEP_LABEL)
-    graph = _covering_graph(node, conjugated, node_count, change, _edge_weights(directions))
-    z = yield from subtask(_smoothest_task(graph), 0.4, 0.95, STEP_LABEL)
-    yield Progress(0.95, STEP_LABEL)
-    corner = z[node]
-    corner[conjugated] = corner[conjugated].conj()
-    corner_phase = np.angle(corner) / (2 * np.pi)
-    # From corner to corner, the phase changes by nearly as much as it should.
-    step = np.roll(corner_phase, -1, axis=1) - corner_phase
-    step += np.rint(change - step)
-    index = np.rint(step.sum(axis=1))
-    step -= (index / 3)[:, None]
-    phase = np.empty((len(node), directions.family_count, 3), dtype=np.float32)
-    phase[..., 0] = corner_phase[:, 0]
-    phase[..., 1] = corner_phase[:, 0] + step[:, 0]
-    phase[..., 2] = corner_phase[:, 0] + step[:, 0] + step[:, 1]
-    return StripePattern(phase, index.astype(np.float32))
+    change = yield from subtask(_shared_changes_task(change, gluing, directions), 0.1, 0.2)
+    covering_task = _covering_task(triangle_vertex, gluing, directions)
+    covering = yield from subtask(covering_task, 0.2, 0.3)
+    graph = yield from subtask(_graph_task(covering, gluing, change, directions), 0.3, 0.4)
+    z = yield from subtask(_smoothest_task(graph), 0.4, 0.9)
+    phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
+    index = np.empty(phase.shape[:2], dtype=np.float32)
+    for block in row_blocks(len(phase)):
+        yield Progress(0.95, STEP_LABEL)
+        corner = z[covering.node[block]]
+        np.conjugate(corner, out=corner, where=covering.conjugated[block])
+        corner_phase = np.angle(corner) / (2 * np.pi)
+        # From corner to corner, the phase changes by nearly as much as it should.
+        step = np.roll(corner_phase, -1, axis=1) - corner_phase
+        step += np.rint(change[block] - step)
+        index[block] = np.rint(step.sum(axis=1))
+        step -= (index[block] / 3)[:, None]
+        phase[block, :, 0] = corner_phase[:, 0]
+        phase[block, :, 1] = corner_phase[:, 0] + step[:, 0]
+        phase[block, :, 2] = corner_phase[:, 0] + step[:, 0] + step[:, 1]
+    return StripePattern(phase, index)
 
 
 @dataclass(frozen=True, eq=False)
 class _Gluing:
-    """How the directions of triangles continue across I interior edges.
+    """How the directions of T triangles continue across their edges.
 
-    `a` and `b` are the corners (3 t + k) at which the edge starts in its two triangles. Direction d
-    of the first continues as direction d + `shift` of the second.
+    Attributes
+    ----------
+    twin : (3 T,) int32 ndarray
+        For the edge from each corner (3 t + k) to the next, the corner at which it starts in the
+        neighboring triangle, where it runs backward. -1 if the field does not continue there.
+    shift : (3 T,) int32 ndarray
+        Direction d continues as direction d + shift of the neighbor, modulo N.
+    next_corner : (3 T,) int32 ndarray
     """
 
-    a: np.ndarray
-    b: np.ndarray
+    twin: np.ndarray
     shift: np.ndarray
+    next_corner: np.ndarray
 
 
 def _gluing_task(triangle_vertex: np.ndarray, directions: CornerDirections) -> Task[_Gluing]:
+    """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    edges = yield from subtask(edges_task(corner_vertex, start), 0.0, 0.8, STEP_LABEL)
-    yield Progress(0.8, STEP_LABEL)
-    a, b = edges.halfedges.T.astype(np.intp)
+    edges = yield from subtask(edges_task(corner_vertex, start), 0.0, 0.6, STEP_LABEL)
+    yield Progress(0.6, STEP_LABEL)
+    a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    # The neighbor unfolds into the plane of the first triangle: the edge runs backward in it.
+    yield Progress(0.8, STEP_LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
-    return _Gluing(a, b, np.rint(turn).astype(np.int64) % directions.degree)
+    shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
+    twin, shift = np.full(len(corner_vertex), -1, dtype=np.int32), np.zeros_like(corner_vertex)
+    twin[a], twin[b] = b, a
+    shift[a], shift[b] = shift_from_a, (-shift_from_a) % directions.degree
+    return _Gluing(twin, shift, next_corners(start))
 
 
-def _mean_of_neighbors(
+def _shared_changes_task(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
-) -> np.ndarray:
+) -> Task[np.ndarray]:
     """(T, 3, M) changes of phases that are exactly opposite in the two triangles of an edge."""
     families = directions.family_count
     flat = change.reshape(-1, families)
     result = flat.copy()
+    glued = np.flatnonzero(gluing.twin >= 0)
+    twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        direction = (family + gluing.shift) % directions.degree
-        sign = np.where(direction < families, 1.0, -1.0)
-        neighbor = direction % families
-        mean = 0.5 * (flat[gluing.a, family] - sign * flat[gluing.b, neighbor])
-        result[gluing.a, family] = mean
-        result[gluing.b, neighbor] = -sign * mean
+        yield Progress(family / families, STEP_LABEL)
+        direction = (family + shift) % directions.degree
+        neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
+        np.negative(neighbor, out=neighbor, where=direction < families)
+        result[glued, family] = 0.5 * (flat[glued, family] + neighbor)
     return result.reshape(change.shape)
 
 
-def _covering_nodes_task(
-    triangle_vertex: np.ndarray, directions: CornerDirections, gluing: _Gluing
-) -> Task[tuple[np.ndarray, np.ndarray, int]]:
-    """Find the nodes of the covering.
+@dataclass(frozen=True, eq=False)
+class _Covering:
+    """The nodes of the covering.
 
-    Returns
-    -------
+    Attributes
+    ----------
     node : (T, 3, M) int32 ndarray
         Node of each corner and family.
     conjugated : (T, 3, M) bool ndarray
         Whether the family has the conjugate of the value of the node.
     node_count : int
+    is_singular : (T, 3) bool ndarray
+        Whether the vertex is singular. Its corners are separate nodes, because around it, a family
+        comes back as another one.
     """
+
+    node: np.ndarray
+    conjugated: np.ndarray
+    node_count: int
+    is_singular: np.ndarray
+
+
+def _covering_task(
+    triangle_vertex: np.ndarray, gluing: _Gluing, directions: CornerDirections
+) -> Task[_Covering]:
+    """Count the directions of all corners around a vertex from the same one."""
     degree, families = directions.degree, directions.family_count
-    corner_count = triangle_vertex.size
-    next_of = np.arange(corner_count) + 1
-    next_of[2::3] -= 3
-    ends = [(gluing.a, next_of[gluing.b]), (next_of[gluing.a], gluing.b)]
-    pairs = np.empty((degree, 2, len(gluing.a), 2), dtype=np.int32)
-    for direction in range(degree):
-        neighbor = (direction + gluing.shift) % degree
-        for end, (first, second) in enumerate(ends):
-            pairs[direction, end, :, 0] = first * degree + direction
-            pairs[direction, end, :, 1] = second * degree + neighbor
-    task = connected_components_task(corner_count * degree, pairs.reshape(-1, 2))
-    component = yield from subtask(task, 0.0, 0.9, STEP_LABEL)
-    component = component.reshape(corner_count, degree)
-    yield Progress(0.9, STEP_LABEL)
-    # Around a singular vertex two families of a corner become the same: its corners are cut apart.
-    ordered = np.sort(component, axis=1)
-    singular = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
-    opposite = component
-    if directions.has_opposites:
-        opposite = np.roll(component, -families, axis=1)
-    component, opposite = component[:, :families], opposite[:, :families]
-    conjugated = component > opposite
-    node = np.minimum(component, opposite)
-    node[singular] = corner_count * degree + np.arange(len(singular) * families).reshape(
-        -1, families
+    corner = np.arange(len(gluing.twin), dtype=np.int32)
+    # Around a vertex, the previous corner lies across the edge that leaves from a corner.
+    has_previous = gluing.twin >= 0
+    previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
+    first, pointer = corner, previous
+    for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
+        yield Progress(0.2, STEP_LABEL)
+        first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
+    # A closed fan begins at its first corner, an open one at the corner without a previous one.
+    is_closed = has_previous[pointer]
+    start = np.where(is_closed & (first == corner), corner, previous)
+    shift = np.where(start != corner, gluing.shift, 0)
+    while True:
+        yield Progress(0.6, STEP_LABEL)
+        following = start[start]
+        if np.array_equal(following, start):
+            break
+        shift, start = (shift + shift[start]) % degree, following
+    yield Progress(0.8, STEP_LABEL)
+    closes = has_previous & (start == corner)
+    turn = (gluing.shift + shift[previous]) % degree
+    is_singular = (closes & (turn != 0))[start]
+    fan = np.where(is_singular, corner, start)
+    shift = np.where(is_singular, 0, shift)
+    is_used = np.zeros(len(corner), dtype=bool)
+    is_used[fan] = True
+    number = (np.cumsum(is_used) - 1)[fan]
+    node = np.empty((len(corner), families), dtype=np.int32)
+    conjugated = np.empty(node.shape, dtype=bool)
+    for family in range(families):
+        yield Progress(0.9, STEP_LABEL)
+        direction = (family + shift) % degree
+        node[:, family] = number * families + direction % families
+        conjugated[:, family] = direction >= families
+    shape = (-1, 3, families)
+    return _Covering(
+        node.reshape(shape),
+        conjugated.reshape(shape),
+        int(np.count_nonzero(is_used)) * families,
+        is_singular.reshape(-1, 3),
     )
-    conjugated[singular] = False
-    used, node = np.unique(node, return_inverse=True)
-    shape = (*triangle_vertex.shape, families)
-    return node.reshape(shape).astype(np.int32), conjugated.reshape(shape), len(used)
 
 
 def _edge_weights(directions: CornerDirections) -> np.ndarray:
@@ -330,159 +371,216 @@ class _Graph:
     a: np.ndarray
     b: np.ndarray
 
+    @cached_property
+    def row_start(self) -> np.ndarray:
+        """The first entry of each row that has any."""
+        return _run_starts(self.row)
 
-def _covering_graph(
-    node: np.ndarray,
-    conjugated: np.ndarray,
-    node_count: int,
-    change: np.ndarray,
-    weight: np.ndarray,
-) -> _Graph:
+    @cached_property
+    def strength(self) -> np.ndarray:
+        """(m,) float64 weights of the entries."""
+        return np.abs(self.a) + np.abs(self.b)
+
+    @cached_property
+    def conjugating(self) -> np.ndarray:
+        """The entries with b."""
+        return np.flatnonzero(self.b)
+
+
+def _run_starts(values: np.ndarray) -> np.ndarray:
+    """The first index of each run of equal values."""
+    is_first = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)
+
+
+def _graph_task(
+    covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
+) -> Task[_Graph]:
     """The graph of the edges of all triangles on the covering."""
-    tail, head = node, np.roll(node, -1, axis=1)
-    tail_flipped, head_flipped = conjugated, np.roll(conjugated, -1, axis=1)
-    value = weight[:, :, None] * np.exp(2j * np.pi * np.where(head_flipped, -change, change))
+    yield Progress(0.0, STEP_LABEL)
+    weight = _edge_weights(directions).reshape(-1)
+    corner = np.arange(len(weight))
+    has_twin = gluing.twin >= 0
+    weight = weight + np.where(has_twin, weight[gluing.twin], 0)
+    # Each edge once. At singular vertices, both triangles have nodes of their own.
+    singular = covering.is_singular.reshape(-1)
+    cut = singular | singular[gluing.next_corner]
+    tail = np.flatnonzero(~has_twin | (corner < gluing.twin) | cut)
+    head = gluing.next_corner[tail]
+    families = directions.family_count
+    node, conjugated = (
+        covering.node.reshape(-1, families),
+        covering.conjugated.reshape(-1, families),
+    )
+    yield Progress(0.2, STEP_LABEL)
+    tail_flipped, head_flipped = conjugated[tail], conjugated[head]
+    turn = change.reshape(-1, families)[tail]
+    np.negative(turn, out=turn, where=head_flipped)
+    value = np.exp((2j * np.pi) * turn)
+    value *= weight[tail, None]
     flips = tail_flipped != head_flipped
-    tail, head, value, flips = (x.reshape(-1) for x in (tail, head, value, flips))
-    a, b = np.where(flips, 0, value), np.where(flips, value, 0)
-    return _sum_entries(
-        node_count,
-        np.concatenate([head, tail]),
-        np.concatenate([tail, head]),
+    yield Progress(0.5, STEP_LABEL)
+    a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
+    tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
+    task = _graph_of_entries_task(
+        covering.node_count,
+        np.concatenate([head_node, tail_node]),
+        np.concatenate([tail_node, head_node]),
         np.concatenate([a, a.conj()]),
         np.concatenate([b, b]),
     )
+    return (yield from subtask(task, 0.5, 1.0))
 
 
-def _sum_entries(
+def _graph_of_entries_task(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> _Graph:
+) -> Task[_Graph]:
     """A graph of entries in any order; those between the same nodes add up."""
-    off_diagonal = row != column
-    row, column, a, b = (x[off_diagonal] for x in (row, column, a, b))
-    key = row.astype(np.int64) * node_count + column
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    if not len(key):
-        return _Graph(node_count, row, column, a, b)
-    first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
-    group = np.repeat(np.arange(len(first)), np.diff(first, append=len(key)))
-    a, b = (_complex_sums(group, x[order], len(first)) for x in (a, b))
-    key = key[first]
-    return _Graph(node_count, key // node_count, key % node_count, a, b)
-
-
-def _complex_sums(index: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    result = np.empty(count, dtype=np.complex128)
-    result.real = np.bincount(index, values.real, count)
-    result.imag = np.bincount(index, values.imag, count)
-    return result
+    yield Progress(0.0, STEP_LABEL)
+    entry = np.flatnonzero(row != column)
+    key = row[entry].astype(np.int64) * node_count + column[entry]
+    key, order = sorted_with_order(key, max(node_count, 1) ** 2)
+    yield Progress(0.4, STEP_LABEL)
+    entry = entry[order]
+    first = _run_starts(key)
+    if len(first):
+        a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
+    row, column = np.divmod(key[first], max(node_count, 1))
+    yield Progress(1.0, STEP_LABEL)
+    return _Graph(node_count, row, column, a[: len(row)], b[: len(row)])
 
 
 def _smoothest_task(graph: _Graph) -> Task[np.ndarray]:
     """(n,) complex128 values of modulus 1 that agree with their neighbors, from coarse to fine."""
     levels = [graph]
-    clusterings = []
+    clusterings: list[_Clustering] = []
     while graph.node_count > MIN_LEVEL_NODES and len(graph.row):
-        yield Progress(0.3, STEP_LABEL)
-        clustering = _clusters(graph)
-        yield Progress(0.3, STEP_LABEL)
-        coarse = _coarse_graph(graph, *clustering)
-        if coarse.node_count * MIN_COARSENING > graph.node_count:
+        clustering = yield from subtask(_clustering_task(graph), 0.2, 0.2)
+        if clustering.count * MIN_COARSENING > graph.node_count:
             break
+        graph = yield from subtask(_coarse_graph_task(graph, clustering), 0.2, 0.2)
         clusterings.append(clustering)
-        levels.append(coarse)
-        graph = coarse
+        levels.append(graph)
     z = np.ones(graph.node_count, dtype=np.complex128)
     while True:
+        graph = levels[len(clusterings)]
+        inertia = np.zeros(graph.node_count)
+        if len(graph.row):
+            rows = graph.row[graph.row_start]
+            inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
         for _ in range(SMOOTHING_STEPS):
             yield Progress(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
-            z = _smoothed(levels[len(clusterings)], z)
+            z = _smoothed(graph, z, inertia)
         if not clusterings:
             return z
-        cluster, p, q = clusterings.pop()[:3]
-        z = p * z[cluster] + q * z[cluster].conj()
+        clustering = clusterings.pop()
+        z = z[clustering.cluster]
+        z = clustering.p * z + clustering.q * z.conj()
 
 
-def _smoothed(graph: _Graph, z: np.ndarray) -> np.ndarray:
+def _smoothed(graph: _Graph, z: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """Replace each value by the one that its neighbors agree on."""
-    neighbor = z[graph.column]
+    if not len(graph.row):
+        return z
+    neighbor = z.take(graph.column)
     terms = graph.a * neighbor
-    terms += graph.b * neighbor.conj()
-    total = _complex_sums(graph.row, terms, graph.node_count)
-    weight = np.bincount(graph.row, np.abs(graph.a) + np.abs(graph.b), graph.node_count)
-    total += INERTIA * weight * z
-    modulus = np.abs(total)
+    conjugating = graph.conjugating
+    terms[conjugating] += graph.b[conjugating] * neighbor[conjugating].conj()
+    total = inertia * z
+    total[graph.row[graph.row_start]] += np.add.reduceat(terms, graph.row_start)
+    modulus = np.sqrt(total.real**2 + total.imag**2)
     return np.divide(total, modulus, out=z.copy(), where=modulus > 0)
 
 
-def _clusters(graph: _Graph) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Group nodes into pairs and triples along their strongest edges.
+class _Clustering(NamedTuple):
+    """Groups of nodes.
 
-    Returns
-    -------
+    Attributes
+    ----------
     cluster : (n,) int ndarray
+        Cluster of each node.
     p, q : (n,) complex128 ndarray
-        The value of a node is p z + q conj(z), with the value z of its cluster.
-    cluster_count : int
+        The value of a node is p z + q conj(z), with the value z of its cluster. One of them is 0,
+        the other has the modulus 1.
+    count : int
+        Number of clusters.
     """
-    count, row, column = graph.node_count, graph.row, graph.column
+
+    cluster: np.ndarray
+    p: np.ndarray
+    q: np.ndarray
+    count: int
+
+
+def _clustering_task(graph: _Graph) -> Task[_Clustering]:
+    """Group nodes into pairs and triples along their strongest edges."""
+    yield Progress(0.0, STEP_LABEL)
+    count = graph.node_count
     # A hash makes the strengths distinct, so that many nodes find a partner at once.
-    low, high = np.minimum(row, column), np.maximum(row, column)
-    mixed = (low.astype(np.uint64) * np.uint64(count) + high.astype(np.uint64)) * np.uint64(
-        0x9E3779B97F4A7C15
-    )
-    strength = np.abs(graph.a) + np.abs(graph.b)
-    strength *= 1 + 0.5 * (mixed >> np.uint64(40)).astype(np.float64) / 2**24
-    order = np.lexsort((-strength, row))
-    row, column = row[order], column[order]
-    partner = np.full(count, -1, dtype=np.int64)
-    entry_row, entry_column, entry = row, column, order
-    entry_of = np.full(count, -1, dtype=np.int64)
+    low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
+    hashed = (low * count + high).astype(np.uint64) * np.uint64(HASH_FACTOR)
+    strength = graph.strength * (1 + 0.5 * (hashed >> np.uint64(40)).astype(np.float64) / 2**24)
+    partner, link = np.full((2, count), -1, dtype=np.int64)
+    nodes = np.arange(count)
+    entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
-        free = (partner[entry_row] < 0) & (partner[entry_column] < 0)
-        entry_row, entry_column, entry = entry_row[free], entry_column[free], entry[free]
-        if not len(entry_row):
+        yield Progress(0.2, STEP_LABEL)
+        free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
+        entry = entry[free]
+        if not len(entry):
             break
-        first = np.flatnonzero(np.concatenate([[True], entry_row[1:] != entry_row[:-1]]))
+        chosen = _strongest_of_row(graph.row, strength, entry)
         choice = np.full(count, -1, dtype=np.int64)
-        choice[entry_row[first]] = entry_column[first]
-        chooser = entry_row[first]
+        choice[graph.row[chosen]] = graph.column[chosen]
+        chooser = graph.row[chosen]
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
-        entry_of[chooser[mutual]] = entry[first[mutual]]
-    # Each pair has a root; the others take their value from it. Single nodes join a root.
-    nodes = np.arange(count)
-    root = np.where((partner >= 0) & (partner < nodes), partner, nodes)
-    is_pair_root = (partner >= 0) & (partner > nodes)
-    joins = (partner[row] < 0) & is_pair_root[column]
-    joining_row, joining_column, joining_entry = row[joins], column[joins], order[joins]
-    if len(joining_row):
-        first = np.flatnonzero(np.concatenate([[True], joining_row[1:] != joining_row[:-1]]))
-        root[joining_row[first]] = joining_column[first]
-        entry_of[joining_row[first]] = joining_entry[first]
+        link[chooser[mutual]] = chosen[mutual]
+    yield Progress(0.8, STEP_LABEL)
+    # The first node of a pair is the root; the other and single neighbors of the root follow it.
+    is_root = (partner < 0) | (partner > nodes)
+    root = np.where(is_root, nodes, partner)
+    joins = np.flatnonzero((partner[graph.row] < 0) & (partner[graph.column] > graph.column))
+    if len(joins):
+        chosen = _strongest_of_row(graph.row, strength, joins)
+        root[graph.row[chosen]] = graph.column[chosen]
+        link[graph.row[chosen]] = chosen
+        is_root[graph.row[chosen]] = False
     p, q = np.ones(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
-    follower = np.flatnonzero(root != nodes)
-    a, b = graph.a[entry_of[follower]], graph.b[entry_of[follower]]
+    follower = np.flatnonzero(~is_root)
+    a, b = graph.a[link[follower]], graph.b[link[follower]]
     keeps = np.abs(a) >= np.abs(b)
-    chosen = np.where(keeps, a, b)
-    modulus = np.abs(chosen)
-    chosen = np.divide(chosen, modulus, out=np.ones_like(chosen), where=modulus > 0)
-    p[follower], q[follower] = np.where(keeps, chosen, 0), np.where(keeps, 0, chosen)
-    is_root = root == nodes
+    value = np.where(keeps, a, b)
+    modulus = np.abs(value)
+    value = np.divide(value, modulus, out=np.ones_like(value), where=modulus > 0)
+    p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
     number = np.cumsum(is_root) - 1
-    return number[root], p, q, int(number[-1]) + 1
+    return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))
 
 
-def _coarse_graph(
-    graph: _Graph, cluster: np.ndarray, p: np.ndarray, q: np.ndarray, count: int
-) -> _Graph:
+def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
+    """The strongest of some entries in each row. Entries are in ascending order."""
+    first = _run_starts(row[entry])
+    largest = np.maximum.reduceat(strength[entry], first)
+    is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))
+    candidate = entry[is_largest]
+    return candidate[_run_starts(row[candidate])]
+
+
+def _coarse_graph_task(graph: _Graph, clustering: _Clustering) -> Task[_Graph]:
     """The graph of clusters: the entries in terms of their values."""
-    p_column, q_column = p[graph.column], q[graph.column]
-    # (a, b) after the map of the column.
-    a = graph.a * p_column + graph.b * q_column.conj()
-    b = graph.a * q_column + graph.b * p_column.conj()
-    # The inverse map of the row: p is a rotation, or q a rotation of the conjugate.
-    p_row, q_row = p[graph.row], q[graph.row]
-    a, b = p_row.conj() * a + q_row * b.conj(), p_row.conj() * b + q_row * a.conj()
-    return _sum_entries(count, cluster[graph.row], cluster[graph.column], a, b)
+    yield Progress(0.0, STEP_LABEL)
+    cluster, p, q, count = clustering
+    row, column = cluster[graph.row], cluster[graph.column]
+    entry = np.flatnonzero(row != column)
+    tail, head = graph.column[entry], graph.row[entry]
+    a, b = graph.a[entry], graph.b[entry]
+    # After the map of the column.
+    a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
+    yield Progress(0.3, STEP_LABEL)
+    # Before the inverse map of the row: that of p is its conjugate, that of q is the map itself.
+    a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
+    return (
+        yield from subtask(_graph_of_entries_task(count, row[entry], column[entry], a, b), 0.5, 1.0)
+    )

@@ -372,7 +372,7 @@ def edges_task(corner_vertex: np.ndarray, face_start: np.ndarray) -> Task[Edges]
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
     yield Progress(0.2, label)
-    key, corner_by_edge = _sorted_with_order(
+    key, corner_by_edge = sorted_with_order(
         np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
     )
     yield Progress(0.6, label)
@@ -395,7 +395,7 @@ def edges_task(corner_vertex: np.ndarray, face_start: np.ndarray) -> Task[Edges]
     )
 
 
-def _sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
+def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
     """Return keys from 0 to `limit` - 1 in ascending order, and the stable order that sorts them.
 
     Keys and indices are sorted as one number if they fit into it, which is faster than `argsort`.

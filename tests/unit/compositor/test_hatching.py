@@ -117,7 +117,7 @@ def ball(rows=70):
 
 
 def make_instance(surface: Surface, degree=4, matrix=None):
-    field = axis_field(surface, degree, (0.3, 0.2, 1.0))
+    field = axis_field(surface.in_rest_shape(), degree, (0.3, 0.2, 1.0))
     return MeshInstance(surface, np.eye(4) if matrix is None else matrix, field)
 
 
@@ -656,6 +656,9 @@ def test_streaks_stay_on_the_surface(motion, ink):
 @pytest.mark.parametrize("name", mainly(HATCHED[:1], HATCHED))
 def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
+    if look.lines == "even" and motion == "zoomed":
+        # At distances in pixels, a zoom needs other lines.
+        look = replace(look, unit="world", unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 

@@ -29,6 +29,7 @@ from ..projection.surface_lines import SurfaceLines, cached_surface_lines_task
 from .lic_images import LicImages, lic_images_task
 from .look import Look, is_hatched
 from .look_units import instance_line_spacing
+from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
 from .wobble import WOBBLE_STD
@@ -150,7 +151,6 @@ def uneven_width(
     look: Look,
     break_streak: np.ndarray | None,
     paper_grain: np.ndarray | None,
-    paper_grain_amplitude: float,
 ) -> np.ndarray:
     """Compute widths of lines that are broken, or uneven by the paper grain, at equal mean widths.
 
@@ -161,7 +161,6 @@ def uneven_width(
     look : Look
     break_streak, paper_grain : (P,) ndarray or None
         With mean 0 and standard deviation 1; see `hatching.line_coverage`.
-    paper_grain_amplitude : float
 
     Returns
     -------
@@ -170,19 +169,20 @@ def uneven_width(
     """
     if break_streak is None and paper_grain is None:
         return target_coverage
-    has_breaks = break_streak is not None
-    amplitude = paper_grain_amplitude if paper_grain is not None else 0.0
-    breaks, wobble = (look.breaks, look.wobble) if has_breaks else (0.0, 0.0)
-    table = _width_table(breaks, wobble, amplitude)
-    amount = np.minimum(break_amount(target_coverage, breaks, wobble), MAX_BREAK_AMOUNT)
+    amount = np.minimum(break_amount(target_coverage, look.breaks, look.wobble), MAX_BREAK_AMOUNT)
     # The streaks of even lines have a uniform distribution with the standard deviation 1.
     scale = 1 / ((1 - amount) * math.sqrt(12))
-    width = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), table)
-    if has_breaks:
+    width = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), look_width_table(look))
+    if break_streak is not None:
         width = width + scale * amount * break_streak
     if paper_grain is not None:
-        width = width + scale * amplitude * paper_grain
+        width = width + scale * PAPER_GRAIN_STRENGTH * look.paper_grain * paper_grain
     return np.clip(width, 0, 1)
+
+
+def look_width_table(look: Look) -> np.ndarray:
+    """(COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
+    return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
 @lru_cache(maxsize=16)

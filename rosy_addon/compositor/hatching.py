@@ -280,8 +280,7 @@ def _even_line_coverage(
         break_streak /= break_std
     if modulation.paper_grain is not None:
         paper_grain = modulation.paper_grain[line]
-    amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
-    width = uneven_width(target_coverage, look, break_streak, paper_grain, amplitude)
+    width = uneven_width(target_coverage, look, break_streak, paper_grain)
     return modulation.even_lines.coverage(line, width, look)
 
 

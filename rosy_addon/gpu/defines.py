@@ -13,6 +13,7 @@ import numpy as np
 from ..color import REC709_LUMINANCE
 from ..compositor.compose import COLOR_CONTRAST
 from ..compositor.covering import ALL_NEIGHBORS
+from ..compositor.even_lines import GROWTH_OCTAVES, MAX_BREAK_AMOUNT
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
@@ -35,6 +36,7 @@ from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLER
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.shadow_maps import PCF_WIDTH
 from ..projection.tone_sampling import MIN_FACING_COSINE
+from .line_records import MAX_TREE_DEPTH
 from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
 
 #: What the magnitude of the field drives: bit 0 is the color, bit 1 the length of streamlines.
@@ -71,6 +73,9 @@ FLOAT_CONSTANTS = {
     "WOBBLE_AMPLITUDE": UNIT_VARIANCE_SCALE * WOBBLE_STD,
     "WOBBLE_BREAKS": WOBBLE_BREAKS,
     "RANK_BLEND": RANK_BLEND,
+    "MAX_BREAK_AMOUNT": MAX_BREAK_AMOUNT,
+    "GROWTH_START": GROWTH_OCTAVES[0],
+    "GROWTH_STOP": GROWTH_OCTAVES[1],
     "MIN_COVERAGE": MIN_COVERAGE,
     "DEPTH_JUMP": DEPTH_JUMP,
     "MAX_SLOPE": MAX_SLOPE,
@@ -90,6 +95,7 @@ INT_CONSTANTS = {
     "SUBPIXEL_COUNT": len(SUBPIXEL_OFFSETS),
     "WAVE_COUNT": WAVE_COUNT,
     "DISC_SAMPLE_COUNT": DISC_SAMPLE_COUNT,
+    "MAX_TREE_DEPTH": MAX_TREE_DEPTH,
     "ALL_NEIGHBORS": ALL_NEIGHBORS,
     "PCF_WIDTH": PCF_WIDTH,
     "REDUCE_BLOCK": REDUCE_BLOCK,

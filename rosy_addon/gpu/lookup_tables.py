@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..color import color_stops
+from ..compositor.even_lines import has_even_lines, look_width_table
 from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
@@ -40,12 +41,14 @@ def color_map(resources: GpuResources, look: Look) -> Any:
 def thresholds(resources: GpuResources, look: Look) -> Any:
     """Return the thresholds of `streak_statistics`, in the first channel.
 
-    Row 0 is for streaks, row 1 for undirected texture.
+    Row 0 is for streaks, or for even lines the widths of `even_lines.look_width_table`. Row 1 is for
+    undirected texture.
     """
     if not is_hatched(look):
         return palette(resources)
     statistics = look_streak_statistics(look)
-    rows = np.stack([statistics.threshold, statistics.disc_threshold])
+    table = look_width_table(look) if has_even_lines(look) else statistics.threshold
+    rows = np.stack([table, statistics.disc_threshold])
     return resources.lookup_texture(
         "thresholds", rows.tobytes(), lambda: _in_channels(rows[..., None])
     )

@@ -228,6 +228,41 @@ CENTER_NOISE = ComputePass(
     (("high_passed", "int"),),
 )
 
+#: What `screen_direction.glsl` uses.
+_DIRECTIONS: Uniforms = (
+    ("camera_to_pixels", "vec4"),
+    ("harmonic_count", "int"),
+    ("first_harmonic", "int"),
+)
+
+EVEN_LINES = ComputePass(
+    "even_lines",
+    (
+        "visibility",
+        "triangle_records",
+        "line_records",
+        "normals",
+        "field_values",
+        "field_channels[]",
+        "wobble_angles",
+    ),
+    (("line_image[]", "RGBA16F"),),
+    (
+        *_BOX_ORIGIN,
+        *_CAMERA,
+        *_INSTANCE,
+        *_COVERING,
+        *_GUIDING,
+        *_DIRECTIONS,
+        ("wobble_strength", "float"),
+        ("wobble_shift", "float"),
+        ("spacing_pixels", "float"),
+        ("asked_pixels", "float"),
+        ("node_count", "int"),
+    ),
+    includes=("triangle_record", "screen_direction", "line_member"),
+)
+
 DIRECTIONS = ComputePass(
     "directions",
     ("normals", "field_values", "depth_slopes", "field_channels[]", "noise", "wobble_angles"),
@@ -237,13 +272,12 @@ DIRECTIONS = ComputePass(
         *_CAMERA,
         *_COVERING,
         *_GUIDING,
-        ("camera_to_pixels", "vec4"),
+        *_DIRECTIONS,
         ("min_normal_cosine", "float"),
         ("foreshorten", "int"),
-        ("harmonic_count", "int"),
-        ("first_harmonic", "int"),
         ("wobble_strength", "float"),
     ),
+    includes=("screen_direction",),
 )
 
 ANGLE_GRADIENT = ComputePass(
@@ -336,6 +370,7 @@ LIC = ComputePass(
         "ink_table",
         "wobble_angles",
         "paper_grain",
+        "line_image[]",
     ),
     (("picture", "RGBA32F"),),
     (
@@ -374,8 +409,11 @@ LIC = ComputePass(
         ("supersampling", "int"),
         ("onset_range", "float"),
         ("onset_lead", "float"),
+        ("even_lines", "int"),
+        ("min_edge_width", "float"),
+        ("fade_pixels", "vec2"),
     ),
-    includes=("lic_trace", "lic_inks", "lic_outline"),
+    includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
 )
 
 MAX_REDUCE = ComputePass(
@@ -420,6 +458,7 @@ ALL_PASSES = (
     WOBBLE,
     BOX_BLUR,
     CENTER_NOISE,
+    EVEN_LINES,
     DIRECTIONS,
     ANGLE_GRADIENT,
     SHADOW_MAP,

@@ -24,6 +24,7 @@ from ..render.view_input import Background, ViewInput
 from . import lookup_tables, passes
 from .background import draw_background
 from .device import Device
+from .even_lines_stage import even_lines_task
 from .frame import Frame
 from .gbuffer_stage import render_gbuffer
 from .lic_stage import lic_task
@@ -121,6 +122,7 @@ class GpuRenderer:
         render_gbuffer(frame)
         self.device.clear(fine_picture)
         yield from noise_task(frame)
+        yield from even_lines_task(frame)
         yield Progress(0.15, "finding tones")
         render_target_tones(frame)
         kinds = frame.kinds

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import Any
 
 import numpy as np
 
+from ..cache import Cache
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
 from ..field.feature_curvature import feature_curvature_task
@@ -18,8 +20,10 @@ from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
 from ..projection.rest_coordinates import matrix_scale
+from ..projection.surface_lines import cached_surface_lines_task, rest_matrix
 from .device import Device
 from .field_kind import FieldKind, field_kinds
+from .line_records import line_records
 from .mesh_buffers import (
     MeshBuffers,
     mesh_buffers_task,
@@ -32,6 +36,9 @@ from .mesh_buffers import (
 #: Uploads, of all views together, after which images and meshes that were not used are freed. Each
 #: frame of an animation has new meshes.
 IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
+
+#: Textures of even lines that are kept for each mesh, and bytes of the lines in memory.
+MAX_LINE_TEXTURES, MAX_LINE_BYTES = 3, 1 << 28
 
 #: Maximum side, in texels, of an image that tones are sampled from.
 MAX_TONE_IMAGE_SIDE = 2048
@@ -78,6 +85,8 @@ class GpuMesh:
     tone_atlas : MipAtlas or None
     last_used : int
         Number of the upload that used it last.
+    line_textures : dict
+        The latest textures of `GpuResources.line_records_task`, by their settings.
     """
 
     buffers: MeshBuffers
@@ -86,6 +95,7 @@ class GpuMesh:
     keep_alive: tuple[Any, ...]
     tone_atlas: MipAtlas | None = None
     last_used: int = 0
+    line_textures: dict[tuple, tuple[Any, int]] = dataclass_field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +133,7 @@ class GpuResources:
         self._last_used: dict[tuple, int] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
+        self._line_cache = Cache(MAX_LINE_BYTES)
 
     @property
     def meshes(self) -> list[GpuMesh]:
@@ -134,12 +145,14 @@ class GpuResources:
         """The number of textures on the device."""
         records = sum(mesh.records_texture is not None for mesh in self.meshes)
         atlases = sum(mesh.tone_atlas is not None for mesh in self.meshes)
-        return records + atlases + len(self._images) + len(self._lookup_textures)
+        lines = sum(len(mesh.line_textures) for mesh in self.meshes)
+        return records + atlases + lines + len(self._images) + len(self._lookup_textures)
 
     def release(self) -> None:
         """Free all resources."""
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
             cache.clear()
+        self._line_cache.clear()
 
     def upload_task(self, instances: Sequence[MeshInstance], display: str) -> Task[list[DrawItem]]:
         """Return draw items of mesh instances. Meshes on the device are not sent again.
@@ -219,6 +232,43 @@ class GpuResources:
         texture = self._texture_of(create(*size))
         self._lookup_textures[name] = key, (texture, size)
         return texture
+
+    def line_records_task(
+        self, item: DrawItem, display: str, spacing: float
+    ) -> Task[tuple[Any, int]]:
+        """Return the texture of `line_records.line_records` for an instance, and its node count.
+
+        Parameters
+        ----------
+        item : DrawItem
+            With a field.
+        display : {"smooth", "flat"}
+        spacing : float
+            Distance between lines, in Blender units.
+
+        Raises
+        ------
+        RosyError
+            If the lines do not fit into a texture.
+        """
+        instance, textures = item.instance, item.mesh.line_textures
+        key = rest_matrix(instance.matrix).tobytes(), display, spacing
+        if key not in textures:
+            surface = instance.surface
+            lines = yield from cached_surface_lines_task(
+                surface, instance.matrix, instance.field, display, spacing, self._line_cache
+            )
+            self._line_cache.evict_over_limit()
+            rows, node_count = line_records(lines)
+            if len(rows) > self.device.max_texture_size:
+                raise RosyError(
+                    f"{surface.name}: even lines on {len(lines.tree.leaf_root)} triangles are too many "
+                    "for this graphics card: choose wider lines, or the processor"
+                )
+            while len(textures) >= MAX_LINE_TEXTURES:
+                del textures[next(iter(textures))]
+            textures[key] = self._texture_of(rows), node_count
+        return textures[key]
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
         """Return the image that the tone "picture" is sampled from."""

@@ -9,6 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..compositor.contrast import expected_std, streak_args, supersampling_gain
+from ..compositor.even_lines import (
+    FADE_PIXELS,
+    MAX_EDGE_WIDTH,
+    SPACING_GRAINS,
+    WOBBLE_SHIFT,
+    has_even_lines,
+)
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count
 from ..compositor.hatching import (
@@ -22,7 +29,11 @@ from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
 from ..compositor.look import Look, is_hatched
-from ..compositor.look_units import cell_size_args, supersampled_look
+from ..compositor.look_units import (
+    cell_size_args,
+    instance_line_spacing,
+    supersampled_look,
+)
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
 from ..compositor.streak_statistics import (
@@ -38,7 +49,7 @@ from ..compositor.surface_noise import (
     lattice_axes,
 )
 from ..compositor.target_tone import ReferenceRender, tone_curve
-from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, has_wobble
+from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
 from .defines import HEADLIGHT, MAGNITUDE_MODES, POINT_LIGHT, SUN_LIGHT
@@ -90,7 +101,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     statistics = look_streak_statistics(pixel_look) if is_hatched(look) else None
     return {
         **setting_values(pixel_look, LIC_SETTINGS),
-        "half_length": pixel_look.length,
+        "half_length": 0 if has_even_lines(look) else pixel_look.length,
         "full_samples": full_sample_count(pixel_look),
         "step_length": pixel_look.step,
         "crossing_correlation": crossing,
@@ -124,6 +135,9 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
+        "even_lines": int(has_even_lines(look)),
+        "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
+        "fade_pixels": tuple(pixels * look.supersampling for pixels in FADE_PIXELS),
     }
 
 
@@ -234,14 +248,37 @@ def covering_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
 
 def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that unfolds the covering."""
+    return {
+        **screen_direction_uniforms(kind, look, camera),
+        "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
+        "foreshorten": int(look.foreshorten),
+    }
+
+
+def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
+    """Return the uniforms that map members to directions on screen."""
     orders = kind.harmonic_orders
     return {
         "camera_to_pixels": camera_to_pixels(camera),
-        "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
-        "foreshorten": int(look.foreshorten),
         "harmonic_count": len(orders),
         "first_harmonic": orders[0] if orders else 0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
+    }
+
+
+def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
+    """Return the uniforms of the pass that evaluates the even lines of one instance.
+
+    `look` is in pixels of the supersampled frame, whose camera is `camera`.
+    """
+    spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
+    asked_pixels = SPACING_GRAINS * look.grain if look.unit == "pixels" else 0.0
+    return {
+        **covering_uniforms(item.kind, look),
+        **screen_direction_uniforms(item.kind, look, camera),
+        "wobble_shift": WOBBLE_SHIFT / WOBBLE_STD,
+        "spacing_pixels": spacing * camera.pixels_per_unit,
+        "asked_pixels": asked_pixels,
     }
 
 

@@ -23,13 +23,6 @@ int line_family(int line, float first_angle, float family_angle, int known_famil
   return modulo(int(round(forward)), known_families);
 }
 
-// The member on a line. For odd N, every other line is the opposite half of a member.
-int line_member(int line)
-{
-  bool halves = sheet_count > degree && (degree & 1) == 1;
-  return halves ? ((line & 1) == 0 ? line / 2 : (line + degree) / 2) : line;
-}
-
 float gray(vec3 mean)
 {
   return noise_channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
@@ -88,6 +81,8 @@ void main()
       first_onset = min(first_onset, onset_darkness(line, line_angle));
     }
   }
+  // Even lines have no streaks, but breaks.
+  step_count = even_lines != 0 ? break_steps : step_count;
   int break_step_count = break_steps, overshoot_count = overshoot_steps;
   if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
@@ -140,24 +135,37 @@ void main()
         ink = ink_of_tone(ink_index, pixel_tone);
         darkness = ink_coverage(pow(target, line_share), ink);
       }
-      float streak = gray(mean) / streak_std;
+      float streak = gray(mean) / streak_std, break_streak = 0.0, break_weight = 0.0;
       if (break_steps > 0) {
         Sums near_sums = both_halves(cell.yzw, forward.near, backward.near);
-        vec3 break_mean = normalized_mean(near_sums, break_samples);
+        break_streak = gray(normalized_mean(near_sums, break_samples)) / break_std;
         // As `hatching`: breaks are fewer where the ink is dense.
         float min_breaks = WOBBLE_BREAKS * wobble_strength;
-        float break_weight =
+        break_weight =
             min_breaks + (1.0 - min_breaks) * breaks * (1.0 - darkness) * (1.0 - darkness);
-        streak = mix(streak, gray(break_mean) / break_std, break_weight);
       }
-      if (is_undirected) {
-        streak = gray(disc_noise) / disc_std;
+      float grain_offset =
+          paper_grain_depth > 0.0 ? paper_grain_depth * grain_height(line_member(line), pixel) : 0.0;
+      float coverage;
+      if (even_lines != 0 && !is_undirected) {
+        break_weight = min(break_weight, MAX_BREAK_AMOUNT);
+        float width = darkness;
+        if (break_steps > 0 || paper_grain_depth > 0.0) {
+          float variation = break_weight * break_streak + grain_offset;
+          width = uneven_line_width(darkness, variation, break_weight);
+        }
+        coverage = even_line_coverage(texelFetch(line_image, ivec3(pixel, line), 0), width);
       }
-      if (paper_grain_depth > 0.0) {
-        streak += paper_grain_depth * grain_height(line_member(line), pixel);
+      else {
+        if (break_steps > 0) {
+          streak = mix(streak, break_streak, break_weight);
+        }
+        if (is_undirected) {
+          streak = gray(disc_noise) / disc_std;
+        }
+        float excess = streak + grain_offset - coverage_threshold(darkness, int(is_undirected));
+        coverage = smooth_unit_step(excess / (2.0 * softness) + 0.5);
       }
-      float excess = streak - coverage_threshold(darkness, int(is_undirected));
-      float coverage = smooth_unit_step(excess / (2.0 * softness) + 0.5);
       paper *= 1.0 - coverage;
       vec3 ink_transmittance = transmittance_of(ink);
       ink_light *= 1.0 - coverage * (1.0 - ink_transmittance);

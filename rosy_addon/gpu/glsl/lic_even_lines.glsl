@@ -1,0 +1,33 @@
+// Evenly spaced lines in place of streaks, as `even_lines`. Included by lic.comp.glsl.
+
+// The coverage of an interval of the length `edge` by lines with the distance 1, as
+// `even_lines._box_filtered`.
+float box_filtered(float position, float width, float edge)
+{
+  float half_width = 0.5 * width, low = position - 0.5 * edge, high = position + 0.5 * edge;
+  float covered = max(min(high, half_width) - max(low, -half_width), 0.0);
+  covered += max(high - (1.0 - half_width), 0.0) + max(half_width - 1.0 - low, 0.0);
+  return covered / edge;
+}
+
+// As `even_lines.EvenLines.coverage`, from a texel of the image of lines.
+float even_line_coverage(vec4 line_sample, float width)
+{
+  float position = 0.5 - 0.5 * line_sample.x, period = line_sample.y;
+  float edge = clamp(1.0 / max(period, 1e-6), min_edge_width, 1.0);
+  float between = 0.5 * line_sample.z * width;
+  float covered = box_filtered(position, width - between, edge);
+  if (between > 0.0) {
+    covered += box_filtered(0.5 - position, between, edge);
+  }
+  float contrast = smooth_unit_step((period - fade_pixels.x) / (fade_pixels.y - fade_pixels.x));
+  return mix(width, covered, contrast);
+}
+
+// The width of a line at a mean width, as `even_lines.uneven_width`. `variation` is the sum of the
+// weighted breaks and the paper grain.
+float uneven_line_width(float mean_width, float variation, float break_weight)
+{
+  float width = coverage_threshold(mean_width, 0) + variation / ((1.0 - break_weight) * sqrt(12.0));
+  return clamp(width, 0.0, 1.0);
+}

@@ -352,7 +352,7 @@ def _evaluate(
         octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
     asked_pixels = np.float32(SPACING_GRAINS * look.grain)
     across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
-    defined = field.representation != 0
+    defined = (field.representation != 0) & (heading != 0)
     phases, period = np.empty((2, field.line_count, len(entries)), dtype=np.float32)
     for line in range(field.line_count):
         family = (first_direction + step * line) % field.degree % field.line_count

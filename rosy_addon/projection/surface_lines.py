@@ -50,7 +50,7 @@ class SurfaceLines:
         Phases on these L triangles.
     heading : (2, L) float32 ndarray
         Direction 0 of the field in each of them, as multiples of the sides of the triangle of the
-        surface from corner 0 to corners 1 and 2.
+        surface from corner 0 to corners 1 and 2. 0 where the field is undefined.
     """
 
     tree: BisectionTree
@@ -256,7 +256,7 @@ def _leaf_directions(
             )
     leaf_offset = np.einsum("lcr,lr->lc", weights, offset.take(tree.leaf_root, axis=0))
     root_area = (offset[:, 1].conj() * offset[:, 2]).imag
-    defined = (corner_field.representation != 0).all(axis=0) & (root_area > 0)
+    defined = corner_field.representation.any(axis=0) & (root_area > 0)
     directions = CornerDirections(
         degree,
         symmetry.has_opposites,
@@ -269,4 +269,5 @@ def _leaf_directions(
     first, second = (offset[:, corner].take(tree.leaf_root) for corner in (1, 2))
     area = np.where(root_area > 0, root_area, np.inf)[tree.leaf_root]
     heading = np.stack([(unit.conj() * second).imag, (first.conj() * unit).imag]) / area
+    heading *= directions.defined
     return directions, heading.astype(np.float32)

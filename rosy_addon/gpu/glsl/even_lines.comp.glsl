@@ -100,7 +100,7 @@ void main()
     float member_angle = angle + TAU * float(member) / float(degree);
     vec2 along = member_direction(vec2(cos(member_angle), sin(member_angle)), wobble, pixel);
     float along_length = length(screen_x * along.x + screen_y * along.y);
-    float period = value.xy == vec2(0.0) ?
+    float period = value.xy == vec2(0.0) || view_heading == vec2(0.0) ?
                        0.0 :
                        spacing * exp2(-doublings) * across / max(along_length, 1e-6);
     float streak = 1.0 - 2.0 * abs(phase - round(phase));

@@ -1,0 +1,240 @@
+"""Evenly spaced lines: tone, distances in pictures, and where they are too close or too far apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import mainly
+from scipy.ndimage import gaussian_filter
+from shapes import icosphere, plane
+
+from rosy_addon.cache import Cache
+from rosy_addon.color import from_hex, to_linear
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.even_lines import (
+    EvenLines,
+    even_lines_task,
+    look_width_table,
+    uneven_width,
+)
+from rosy_addon.compositor.hatching import LineModulation
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import instance_line_spacing, supersampled_look
+from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.presets.store import load_preset
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+
+SIZE = 256
+LOOK = Look(
+    ink="hatch",
+    lines="even",
+    anchor="surface",
+    light="scene",
+    shading=0.5,
+    grain=3.0,
+    crispness=1.0,
+    ink_colour="#000000",
+    layers=1,
+)
+
+
+def wall_instance(degree=2, angle=0.0, size=20.0):
+    surface = plane(2, 2, size)
+    return MeshInstance(
+        surface, np.eye(4), axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
+    )
+
+
+def camera_above(scale=8.0, size=SIZE, eye=(0, 0, 5)):
+    view = look_at(eye, (0, 0, 0), (0, 1, 0))
+    return orthographic_camera(view, size, size, scale=scale)
+
+
+def picture(instance, camera, look=LOOK):
+    if look.supersampling > 1:
+        camera = camera.scaled(look.supersampling)
+    return compose(project([instance], camera), look).rgba
+
+
+def lines_at_pixels(instance, camera, look=LOOK, cache=None):
+    gbuffer = project([instance], camera)
+    field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle, False)
+    return run_to_completion(even_lines_task(gbuffer, field, look, cache=cache)), gbuffer
+
+
+# --- lines in pictures -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("grain", [2.0, 3.5, 8.0])
+@pytest.mark.parametrize("supersampling", [1, 2])
+def test_the_distance_between_lines_is_twice_the_line_width(grain, supersampling):
+    """Distances in pixels are rounded to steps of 1 / 8 octave."""
+    look = replace(LOOK, grain=grain, supersampling=supersampling)
+    rgba = picture(wall_instance(), camera_above(), look)
+    columns = rgba[..., 0] - rgba[..., 0].mean()
+    spectrum = (np.abs(np.fft.rfft(columns * np.hanning(SIZE)[:, None], 2**16, axis=0)) ** 2).sum(1)
+    distance = 2**16 / np.argmax(spectrum)
+    assert abs(np.log2(distance / (2 * grain))) <= 0.5 / 8 + 0.01
+    # Lines are along the rows.
+    assert rgba[..., 0].std(axis=1).max() < 0.05
+
+
+def test_distances_in_blender_units_are_exact():
+    look = replace(LOOK, unit="world", unit_size=0.037, grain=2.5)
+    lines, _ = lines_at_pixels(wall_instance(), camera_above(8.0), look)
+    pixels_per_unit = SIZE / 8
+    np.testing.assert_allclose(lines.period, 2 * 2.5 * 0.037 * pixels_per_unit, rtol=1e-4)
+    assert lines.growth is None
+
+
+def test_spacings_in_pixels_come_in_steps():
+    instance, look = wall_instance(), supersampled_look(LOOK)
+    spacings = {
+        instance_line_spacing(look, 2.0, camera_above(scale), instance)
+        for scale in np.linspace(8, 16, 200)
+    }
+    steps = np.diff(np.log2(sorted(spacings)))
+    np.testing.assert_allclose(steps, 1 / 8, atol=1e-9)
+    assert len(spacings) == 9
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("side", [1, -1])
+def test_members_get_the_lines_along_them(degree, side):
+    """The gradient of the streaks is across the member, on both sides of the surface."""
+    instance = wall_instance(degree, 0.4)
+    camera = camera_above(eye=(0, 0, 5 * side))
+    gbuffer = project([instance], camera)
+    field = surface_pixel_field(gbuffer, degree, 0.7, False)
+    look = replace(LOOK, grain=8.0, guiding_angle=0.3)
+    lines = run_to_completion(even_lines_task(gbuffer, field, look))
+    members = all_members(field, look.guiding_angle)
+    for member, streak in zip(members, lines.streaks, strict=False):
+        image = streak.reshape(SIZE, SIZE)
+        up, right = np.gradient(image)
+        gradient = (right + 1j * up).reshape(-1) * np.conj(member)
+        steep = np.abs(gradient) > 0.5 * np.abs(gradient).max()
+        assert np.median(np.abs(gradient.real[steep] / gradient.imag[steep])) < 0.02
+
+
+def test_undefined_pixels_have_the_mean_tone():
+    surface = plane(8, 8, 20.0)
+    vectors = axis_field(surface, 2, (1, 0, 0)).vectors.copy()
+    vectors[24:40] = 0
+    instance = MeshInstance(surface, np.eye(4), RosyField(2, vectors))
+    lines, gbuffer = lines_at_pixels(instance, camera_above(20.0))
+    undefined = gbuffer.representation == 0
+    assert undefined.any() and not lines.period[:, undefined].any()
+    width = np.full(len(gbuffer.pixel), 0.3, dtype=np.float32)
+    np.testing.assert_allclose(lines.coverage(0, width, LOOK)[undefined], 0.3, atol=1e-6)
+
+
+def test_lines_of_the_same_input_are_the_same():
+    instance = MeshInstance(icosphere(2), np.eye(4), generate(icosphere(2), "smoothest", 4))
+    camera = camera_above(2.5)
+    assert picture(instance, camera).tobytes() == picture(instance, camera).tobytes()
+
+
+def test_cameras_share_the_phase():
+    instance, cache = wall_instance(), Cache()
+    lines_at_pixels(instance, camera_above(), cache=cache)
+    lines_at_pixels(instance, camera_above(eye=(1, 0, 5)), cache=cache)
+    assert len(cache) == 1
+
+
+# --- tone ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("crispness", [0.0, 0.6, 1.0])
+@pytest.mark.parametrize("period", [1.5, 2.2, 5.0, 40.0])
+@pytest.mark.parametrize("growth", [None, 0.0, 0.4, 1.0])
+def test_the_mean_coverage_is_exact(crispness, period, growth):
+    count = 20_000
+    position = (np.arange(count, dtype=np.float32) + 0.5) / count
+    streaks = (1 - 2 * np.abs(position - np.rint(position)))[None]
+    periods = np.full((1, count), period, dtype=np.float32)
+    growths = None if growth is None else np.full(count, growth, dtype=np.float32)
+    lines = EvenLines(streaks, periods, growths)
+    look = replace(LOOK, crispness=crispness)
+    for width in (0.0, 0.03, 0.3, 0.5, 0.8, 0.97, 1.0):
+        coverage = lines.coverage(0, np.full(count, width, dtype=np.float32), look)
+        assert coverage.min() >= -1e-5 and coverage.max() <= 1 + 1e-5
+        assert coverage.mean() == pytest.approx(width, abs=1e-3)
+
+
+def test_lines_too_close_for_the_pixels_are_gray():
+    lines = EvenLines(np.zeros((1, 1), np.float32), np.full((1, 1), 1.2, np.float32), None)
+    assert lines.coverage(0, np.array([0.4], np.float32), LOOK)[0] == pytest.approx(0.4)
+    assert lines.coverage(0, np.array([0.4], np.float32), replace(LOOK, supersampling=2))[0] == (
+        pytest.approx(0.4)
+    )
+
+
+@pytest.mark.parametrize("breaks", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("paper_grain", [0.0, 0.8])
+def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
+    look = replace(LOOK, breaks=breaks, paper_grain=paper_grain, wobble=0.3)
+    rng = np.random.default_rng(0)
+    streak, grain = rng.standard_normal((2, 200_000))
+    for width in (0.05, 0.3, 0.7, 0.95):
+        widths = uneven_width(np.full(streak.shape, width), look, streak, grain)
+        assert widths.mean() == pytest.approx(width, abs=6e-3)
+    table = look_width_table(look)
+    assert (np.diff(table) > 0).all()
+
+
+@pytest.mark.parametrize("shading", [0.1, 0.3, 0.5, 0.8, 0.95])
+@pytest.mark.parametrize("degree", [4, 6])
+def test_flat_tones(shading, degree):
+    look = replace(
+        load_preset("engraving").look, light="scene", shading=shading, paper_colour="#ffffff"
+    )
+    rgba = picture(wall_instance(degree, 0.4), camera_above(), look)
+    ink = to_linear(from_hex(look.ink_colour))[0]
+    tone = (rgba[..., 0] - ink) / (1 - ink)
+    blurred = gaussian_filter(tone, 16)[40:-40, 40:-40]
+    assert np.abs(blurred - (1 - shading)).max() <= 0.04
+
+
+# --- perspective -------------------------------------------------------------------------------------
+
+
+def test_lines_grow_between_lines_that_are_too_far_apart():
+    """A floor that runs from near the eye to far away."""
+    surface = plane(2, 2, 40.0)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (1, 0, 0)))
+    view = look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1))
+    camera = perspective_camera(view, SIZE, SIZE, fov=1.0)
+    lines, gbuffer = lines_at_pixels(instance, camera, replace(LOOK, grain=2.0))
+    assert lines.growth is not None and lines.growth.max() > 0.99
+    near = -gbuffer.position[:, 2] < 2
+    assert near.sum() > 1000
+    # Without doubling they would be about 9 times as far apart as asked for.
+    foreshortening = np.abs(gbuffer.geometric_normal[near] @ (0, 0, 1))
+    assert (lines.period[0, near] / np.maximum(foreshortening, 0.05)).max() < 4 * 2.9
+    coverage = lines.coverage(0, np.full(lines.streaks.shape[1], 0.4, np.float32), LOOK)
+    assert coverage[near].mean() == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", mainly(["breaks"], ["breaks", "wobble", "paper_grain"]))
+def test_uneven_lines_keep_the_tone(effect):
+    look = replace(LOOK, shading=0.5, **{effect: 1.0})
+    rgba = picture(wall_instance(2, 0.4), camera_above(), look)
+    assert abs(rgba[..., 0].mean() - 0.5) <= 0.04
+    even = picture(wall_instance(2, 0.4), camera_above())
+    assert np.abs(rgba - even).mean() > 0.02
+
+
+def test_parts_have_the_lines_of_their_pixels():
+    lines = EvenLines(np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.arange(3.0))
+    modulation = LineModulation(even_lines=lines).part(slice(1, 3))
+    assert modulation.even_lines.streaks.tolist() == [[1, 2], [4, 5]]
+    assert modulation.even_lines.growth.tolist() == [1, 2]

@@ -1,0 +1,270 @@
+"""Evenly spaced lines on surfaces: distances, directions, and meshes that are not simple."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from awkward import AWKWARD
+from conftest import long
+from harness.line_spacing import share_within, spacing_ratios
+from shapes import cylinder, from_triangles, icosphere, plane, torus
+
+from rosy_addon.cache import Cache
+from rosy_addon.field.directional_field import field_from_directions
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection import surface_lines
+from rosy_addon.projection.surface_lines import (
+    cached_surface_lines_task,
+    rest_matrix,
+    surface_lines_task,
+)
+
+#: Part of the surface on which distances between lines differ by at most `TOLERANCE`, where no line
+#: ends within `AWAY` distances.
+SHARE, TOLERANCE, AWAY = 0.95, 0.1, 1.0
+
+
+def lines_of(surface, field, spacing, stretch=None, display="smooth"):
+    stretch = np.eye(3) if stretch is None else stretch
+    return run_to_completion(surface_lines_task(surface, stretch, field, display, spacing))
+
+
+def gradients(lines):
+    """(L, M, 3) gradients of the phases, in lines per unit of length."""
+    points = lines.tree.vertices[lines.tree.leaf_vertex]
+    sides = points[:, 1:] - points[:, :1]
+    change = lines.pattern.phase[..., 1:].astype(float) - lines.pattern.phase[..., :1]
+    return np.einsum("lia,lma->lmi", np.linalg.pinv(sides), change)
+
+
+# --- closed forms --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("display", ["smooth", "flat"])
+def test_lines_on_a_plane_are_straight_and_exactly_spaced(degree, display):
+    angle, spacing = 0.35, 0.083
+    surface = plane()
+    field = axis_field(surface, degree, (np.cos(angle), np.sin(angle), 0))
+    lines = lines_of(surface, field, spacing, display=display)
+    assert not lines.pattern.index.any()
+    gradient = gradients(lines)
+    directions = angle + 2 * np.pi * np.arange(degree) / degree
+    across = np.stack([-np.sin(directions), np.cos(directions), 0 * directions], axis=1) / spacing
+    # The families can begin with any direction, but are in counter-clockwise order.
+    families = lines.pattern.index.shape[1]
+    assert families == (degree // 2 if degree % 2 == 0 else degree)
+    for triangle in gradient:
+        errors = [
+            np.abs(triangle - np.roll(across, shift, axis=0)[:families]).max()
+            for shift in range(degree)
+        ]
+        assert min(errors) < 1e-3 / spacing
+
+
+@pytest.mark.parametrize("rounds", [7, 7.4, 30.5])
+def test_lines_along_a_cylinder(rounds):
+    """Lines parallel to the axis can only be evenly spaced if a whole number of them fits around."""
+    surface = cylinder()
+    spacing = 2 * np.pi / rounds
+    lines = lines_of(surface, axis_field(surface, 2), spacing)
+    ratio, _ = spacing_ratios(lines, spacing)
+    circumference = 2 * 96 * np.sin(np.pi / 96)
+    count = circumference / spacing / ratio.mean()
+    assert abs(count - np.rint(count)) < 0.02 and abs(count - rounds) < 1
+    np.testing.assert_allclose(ratio, ratio.mean(), atol=0.02)
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_rings_on_a_torus(degree):
+    surface = torus()
+    field = generate(surface, "curvature", degree)
+    lines = lines_of(surface, field, 0.06)
+    assert share_within(lines, 0.06, TOLERANCE, AWAY) >= SHARE
+
+
+def test_distances_are_measured_after_the_stretch():
+    surface = plane()
+    stretch = np.diag([1.0, 3.0, 1.0])
+    lines = lines_of(surface, axis_field(surface, 4, (1, 0, 0)), 0.1, stretch)
+    ratio, _ = spacing_ratios(lines, 0.1)  # `vertices` of the tree are stretched
+    np.testing.assert_allclose(ratio, 1, atol=1e-3)
+
+
+# --- curved surfaces -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
+def test_distances_on_a_sphere(degree):
+    """There are singularities, and lines end because they converge."""
+    surface = icosphere(3)
+    lines = lines_of(surface, generate(surface, "smoothest", degree), 0.07)
+    assert lines.pattern.index.any()
+    assert share_within(lines, 0.07, TOLERANCE, AWAY) >= SHARE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "spacing"), [("spot.obj", 0.015), *long(("stanford-bunny.obj", 0.0012))]
+)
+def test_distances_on_scanned_meshes(shared_data, name, spacing):
+    surface = read_mesh(shared_data / "meshes" / name)
+    lines = lines_of(surface, generate(surface, "form", 4), spacing)
+    assert share_within(lines, spacing, TOLERANCE, AWAY) >= SHARE
+
+
+def test_lines_continue_over_a_coarse_cube():
+    """Eight vertices. Form follows the edges, and lines of faces meet there."""
+    points, faces = AWKWARD["cube"]()
+    surface = build_surface(points, np.concatenate(faces), range(0, 25, 4), sharp_angle=0.5)
+    lines = lines_of(surface, generate(surface, "form", 4), 0.04)
+    assert len(lines.tree.leaf_root) > 1000
+    assert share_within(lines, 0.04, 0.02, AWAY) >= SHARE
+    assert not lines.pattern.index.any()
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_size_of_a_mesh_does_not_matter(factor):
+    surface = torus()
+    scaled = build_surface(surface.vertices * factor, surface.corner_vertex, surface.face_start)
+    lines = lines_of(scaled, generate(scaled, "curvature", 4), 0.06 * factor)
+    assert share_within(lines, 0.06 * factor, TOLERANCE, AWAY) >= SHARE
+
+
+def test_directions_that_are_not_evenly_distributed():
+    """The lines of two directions at 60 degrees have the distance that was asked for."""
+    surface = plane()
+    angles = np.array([0.2, 0.2 + np.pi / 3])
+    half = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    directions = np.broadcast_to(np.concatenate([half, -half]), (surface.face_count, 4, 3))
+    lines = lines_of(surface, field_from_directions(surface, directions), 0.05)
+    ratio, _ = spacing_ratios(lines, 0.05)
+    np.testing.assert_allclose(ratio, 1, atol=5e-3)
+    gradient = gradients(lines)
+    cosine = np.abs(np.einsum("li,li->l", gradient[:, 0], gradient[:, 1])) * 0.05**2
+    np.testing.assert_allclose(cosine, 0.5, atol=0.01)
+
+
+# --- awkward meshes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, *long(5, 6)])
+def test_awkward_meshes(name, degree):
+    points, faces = AWKWARD[name]()
+    starts = np.cumsum([0, *map(len, faces)])
+    surface = build_surface(points, np.concatenate(faces), starts, name=name)
+    field = generate(surface, "smoothest", degree)
+    lines = lines_of(surface, field, 0.11)
+    assert np.isfinite(lines.pattern.phase).all() and np.isfinite(lines.heading).all()
+    again = lines_of(surface, field, 0.11)
+    assert lines.pattern.phase.tobytes() == again.pattern.phase.tobytes()
+    assert lines.pattern.index.tobytes() == again.pattern.index.tobytes()
+
+
+def test_two_triangles():
+    surface = from_triangles([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+    lines = lines_of(surface, axis_field(surface, 2, (1, 0.3, 0)), 0.05)
+    ratio, _ = spacing_ratios(lines, 0.05)
+    np.testing.assert_allclose(ratio, 1, atol=1e-3)
+
+
+def test_a_hole_unused_vertices_and_two_parts():
+    """A plane without one face, and another that is not connected to it."""
+    surface = plane(8, 8)
+    keep = np.arange(64) != 27
+    quads = surface.corner_vertex.reshape(-1, 4)
+    quads = np.concatenate([quads[keep], quads + 200])
+    points = np.full((281, 3), 1e3)
+    points[:81] = surface.vertices
+    points[200:] = surface.vertices + (5, 0, 1)
+    both = build_surface(points, quads.ravel(), np.arange(0, quads.size + 1, 4))
+    lines = lines_of(both, axis_field(both, 4, (1, 0.5, 0)), 0.07)
+    ratio, _ = spacing_ratios(lines, 0.07)
+    np.testing.assert_allclose(ratio, 1, atol=1e-3)
+
+
+def test_undefined_faces_have_no_lines():
+    surface = icosphere(2)
+    field = axis_field(surface, 4)
+    vectors = field.vectors.copy()
+    vectors[::7] = 0
+    lines = lines_of(surface, type(field)(4, vectors), 0.1)
+    undefined = np.isin(lines.tree.leaf_root, np.arange(0, surface.face_count, 7))
+    assert np.isfinite(lines.pattern.phase).all()
+    assert not lines.heading[:, undefined].any() and lines.heading[:, ~undefined].any(axis=0).all()
+    ratio, _ = spacing_ratios(lines, 0.1)
+    assert np.median(np.abs(ratio[~undefined] - 1)) < 0.05
+
+
+def test_the_number_of_triangles_is_bounded(monkeypatch):
+    monkeypatch.setattr(surface_lines, "MAX_TRIANGLES", 2000)
+    surface = icosphere(2)
+    lines = lines_of(surface, generate(surface, "smoothest", 4), 0.004)
+    assert 500 < len(lines.tree.leaf_root) <= 2000
+    assert np.isfinite(lines.pattern.phase).all()
+
+
+def test_too_little_memory_is_an_error(monkeypatch, error_of):
+    monkeypatch.setattr("rosy_addon.memory.available_memory", lambda: 1 << 20)
+    surface = icosphere(2)
+    message = error_of(lines_of, surface, axis_field(surface, 4), 0.02)
+    assert "sphere: the spacing of lines on" in message and "choose wider lines" in message
+
+
+# --- reuse ---------------------------------------------------------------------------------------
+
+
+def test_deformations_and_rotations_keep_the_lines():
+    surface = icosphere(2)
+    field = axis_field(surface, 4)
+    cache = Cache()
+
+    def cached(surface, matrix):
+        task = cached_surface_lines_task(surface, matrix, field, "smooth", 0.05, cache)
+        return run_to_completion(task)
+
+    def deformed(amount):
+        points = surface.vertices * (1, 1, amount)
+        return build_surface(
+            points, surface.corner_vertex, surface.face_start, rest_vertices=surface.vertices
+        )
+
+    first = cached(deformed(1.2), np.eye(4))
+    assert cached(deformed(1.5), np.eye(4)) is first
+    turned = np.eye(4)
+    turned[:3, :3] = [(0.6, -0.8, 0), (0.8, 0.6, 0), (0, 0, 1)]
+    turned[:3, 3] = 5
+    assert cached(deformed(1.5), turned) is first
+    assert cached(deformed(1.5), turned @ np.diag([2.0, 2, 2, 1])) is not first
+
+
+def test_rest_matrices_measure_lengths():
+    rotation = np.array([(0.6, -0.8, 0), (0.8, 0.6, 0), (0, 0, 1.0)])
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation @ np.diag([1, 2, 3.0])
+    np.testing.assert_allclose(rest_matrix(matrix), np.diag([1, 2, 3.0]), atol=1e-12)
+    matrix[:3, :3] = -2 * rotation
+    np.testing.assert_allclose(rest_matrix(matrix), 2 * np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("degree", [3, 4])
+def test_steps_are_short(degree):
+    """No step does more than a small part of the work."""
+    surface = icosphere(5)
+    field = generate(surface, "smoothest", degree)
+    task = surface_lines_task(surface, np.eye(3), field, "smooth", 0.02)
+    times = [time.process_time()]
+    try:
+        while True:
+            next(task)
+            times.append(time.process_time())
+    except StopIteration:
+        times.append(time.process_time())
+    steps = np.diff(times)
+    assert steps.max() < 0.25 * steps.sum()

@@ -209,18 +209,21 @@ def test_flat_tones(shading, degree):
 def test_lines_grow_between_lines_that_are_too_far_apart():
     """A floor that runs from near the eye to far away."""
     surface = plane(2, 2, 40.0)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (1, 0, 0)))
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
     view = look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1))
     camera = perspective_camera(view, SIZE, SIZE, fov=1.0)
-    lines, gbuffer = lines_at_pixels(instance, camera, replace(LOOK, grain=2.0))
+    look = replace(LOOK, grain=2.0)
+    lines, gbuffer = lines_at_pixels(instance, camera, look)
     assert lines.growth is not None and lines.growth.max() > 0.99
-    near = -gbuffer.position[:, 2] < 2
-    assert near.sum() > 1000
-    # Without doubling they would be about 9 times as far apart as asked for.
-    foreshortening = np.abs(gbuffer.geometric_normal[near] @ (0, 0, 1))
-    assert (lines.period[0, near] / np.maximum(foreshortening, 0.05)).max() < 4 * 2.9
-    coverage = lines.coverage(0, np.full(lines.streaks.shape[1], 0.4, np.float32), LOOK)
+    # Without doubling, the nearest lines would be about 9 times as far apart as asked for.
+    depth = -gbuffer.position[:, 2]
+    near = depth < 0.9 * 18
+    assert near.sum() > 5000
+    assert 3.6 < lines.period[0, near].min() and lines.period[0, near].max() < 8.4
+    coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.02)
+    world = replace(look, unit="world", unit_size=0.02)
+    assert lines_at_pixels(instance, camera, world)[0].growth is None
 
 
 @pytest.mark.slow

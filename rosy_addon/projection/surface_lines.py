@@ -28,14 +28,14 @@ from .rest_coordinates import matrix_scale
 from .vector_components import tangent_frame_components
 
 #: Longest edge of the triangles on which the phase is computed, in distances between lines.
-MAX_EDGE = 1.0
+MAX_EDGE = 1.4
 
 #: Largest number of triangles on which the phase is computed, unless the mesh has more. Beyond it,
 #: lines end and begin in fewer places.
 MAX_TRIANGLES = 1_500_000
 
-#: Bytes per triangle and direction of the field while a phase is computed, and per triangle.
-DIRECTION_BYTES, TRIANGLE_BYTES = 330, 900
+#: Bytes of a triangle while phases are computed, and of each of its families of lines.
+TRIANGLE_BYTES, FAMILY_BYTES = 210, 610
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ def surface_lines_task(
     tree = yield from subtask(task, 0.1, 0.2, label)
     count = len(tree.leaf_root)
     check_memory(
-        count * (TRIANGLE_BYTES + DIRECTION_BYTES * field.degree),
+        count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count),
         f"{surface.name}: the spacing of lines on {count} triangles",
         "choose wider lines or streaks instead of even lines",
     )

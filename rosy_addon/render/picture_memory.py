@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compositor.even_lines import has_even_lines
 from ..compositor.fast_lic import (
     BATCH_SIZE,
     HALF_WINDOW_STEPS,
@@ -59,6 +60,9 @@ SURFACE_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 34
 #: Bytes of a visible sample with the methods "members" and "brute", and of each of its lines or
 #: directions there.
 MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 59, 39, 79, 34
+
+#: Bytes of a visible sample with even lines instead of streaks, and of each of its lines.
+EVEN_LINES_BYTES, EVEN_LINE_BYTES = 26, 8
 
 #: Bytes of a step of the streamlines of a batch.
 STEP_BYTES = 24
@@ -167,7 +171,12 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     base = gbuffer + FIELD_BYTES * visible
     images = base + image_bytes * visible
     colored = images + (4 * noise_channels + 16) * visible
-    lic = base + _lic_bytes(view, look, coverage, lines, noise_channels)
+    lic = base
+    if has_even_lines(look):
+        even_lines = (EVEN_LINES_BYTES + EVEN_LINE_BYTES * lines) * visible
+        lic, images = base + even_lines, images + even_lines
+    if not has_even_lines(look) or has_breaks(look):
+        lic += _lic_bytes(view, look, coverage, lines, noise_channels)
     if has_overshoot(look):
         tones = 4 * (lines + 6) * visible
         lic = max(lic, images + tones + _sheets_bytes(view, look, coverage, lines, 3))

@@ -142,6 +142,7 @@ def traced_peak(work) -> int:
         (4, {"method": "members", "length": 1, "supersampling": 2}),
         (2, {"anchor": "surface", "supersampling": 2}),
         (4, {"ink": "hatch", "supersampling": 2}),
+        (4, {"ink": "hatch", "lines": "even", "grain": 12.0, "supersampling": 2}),
     ],
     ids=str,
 )

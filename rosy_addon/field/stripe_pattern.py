@@ -35,8 +35,8 @@ STEP_LABEL = "spacing lines"
 #: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
 
-#: Smoothing steps on each level.
-SMOOTHING_STEPS = 8
+#: Smoothing steps on the finest level, factor for each coarser level, and their largest number.
+SMOOTHING_STEPS, STEP_GROWTH, MAX_SMOOTHING_STEPS = 8, 1.5, 100
 
 #: Share of the old value in a smoothing step. It damps oscillations.
 INERTIA = 0.3
@@ -469,7 +469,8 @@ def _smoothest_task(graph: _Graph) -> Task[np.ndarray]:
         if len(graph.row):
             rows = graph.row[graph.row_start]
             inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
-        for _ in range(SMOOTHING_STEPS):
+        steps = SMOOTHING_STEPS * STEP_GROWTH ** len(clusterings)
+        for _ in range(int(min(steps, MAX_SMOOTHING_STEPS))):
             yield Progress(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
             z = _smoothed(graph, z, inertia)
         if not clusterings:

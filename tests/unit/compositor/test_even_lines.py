@@ -83,7 +83,7 @@ def test_the_distance_between_lines_is_twice_the_line_width(grain, supersampling
     distance = 2**16 / np.argmax(spectrum)
     assert abs(np.log2(distance / (2 * grain))) <= 0.5 / 8 + 0.01
     # Lines are along the rows.
-    assert rgba[..., 0].std(axis=1).max() < 0.05
+    assert rgba[..., 0].std(axis=1).max() < 0.01
 
 
 def test_distances_in_blender_units_are_exact():

@@ -220,7 +220,7 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     # In the middle of the picture, lines run straight up.
     near = (depth < 0.9 * 18) & (np.abs(gbuffer.position[:, 0]) < 0.02 * depth)
     assert near.sum() > 500
-    assert 3.6 < lines.period[0, near].min() and lines.period[0, near].max() < 8.4
+    assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
     world = replace(look, unit="world", unit_size=0.02)

@@ -137,7 +137,7 @@ def test_phases_are_continuous_where_lines_end():
     pairs = np.array([pair for pair in values.values() if len(pair) == 2])
     assert len(pairs) == 1.5 * len(vertex)
     # Around the singular vertices, triangles have phases of their own.
-    assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) > 1e-3) < 0.01
+    assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) > 1e-3) < 0.005
 
 
 def test_lines_continue_over_a_coarse_cube():

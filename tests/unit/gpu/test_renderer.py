@@ -1130,6 +1130,66 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
+EVEN_LINES = replace(LOOK, ink="hatch", lines="even", shading=0.9, grain=3.0)
+
+
+def partly_undefined():
+    field = smooth_field(BALL, 4)
+    center = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
+    return RosyField(4, np.where(center[:, :1] > 0.2, 0.0, field.vectors))
+
+
+EVEN_LINE_SCENES = {
+    **{
+        name: lambda linear=linear: [ball(4, placed(linear))]
+        for name, linear in LINEAR_PARTS.items()
+        if name not in ("small", "large")
+    },
+    **{
+        f"free directions, {name}": lambda make=make: [MeshInstance(BALL, np.eye(4), make(BALL))]
+        for name, make in FREE.items()
+        if name in ("two", "three", "four", "two lines")
+    },
+    "partly undefined": lambda: [MeshInstance(BALL, np.eye(4), partly_undefined())],
+    "the back of a tube": lambda: [
+        MeshInstance(
+            cylinder(64, 16), placed(MIRROR), axis_field(cylinder(64, 16), 3, (0.2, 0.4, 1.0))
+        )
+    ],
+    "several meshes": lambda: [
+        ball(degree, placed((0.3 + 0.05 * index) * rotation(index, 0, 1), grid_position(index)))
+        for index, degree in enumerate((1, 4, 3, 4))
+    ],
+    "triangles that need no bisection": lambda: [ball(4, surface=icosphere(5))],
+}
+
+
+@pytest.mark.parametrize("name", EVEN_LINE_SCENES)
+def test_even_lines(card, name):
+    instances = EVEN_LINE_SCENES[name]()
+    assert_parity(card, instances, view(), EVEN_LINES)
+
+
+def test_even_lines_grow_in_perspective(card):
+    surface = plane(2, 2, 40.0)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
+    camera = perspective_camera(look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1)), *SIZE, fov=1.0)
+    assert_parity(card, [instance], camera, replace(EVEN_LINES, grain=2.0))
+
+
+def test_even_lines_stay_on_the_card(device):
+    """Only a few distances are kept for each mesh."""
+    card, instance = GpuRenderer(device), ball()
+    for distance in (4.0, 4.0, 4.5, 5.0, 6.0, 7.0):
+        items = card.upload([instance], "smooth")
+        render_texture(card, items, view(distance=distance), EVEN_LINES)
+    (mesh,) = card.resources.meshes
+    assert len(mesh.line_textures) == 3
+    textures = list(mesh.line_textures.values())
+    render_texture(card, items, view(distance=7.0, azimuth=1.0), EVEN_LINES)
+    assert list(mesh.line_textures.values()) == textures
+
+
 def test_far_from_the_origin(card):
     """A mesh far from its own origin, moved back; and one far from the origin of the world."""
     far = np.array([3e5, -2e5, 1e5])

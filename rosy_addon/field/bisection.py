@@ -9,6 +9,9 @@ import numpy as np
 from ..progress import Progress, Task, run_to_completion
 from .frames import dot
 
+#: Factor by which longer edges are allowed while there would be too many triangles.
+LENGTH_STEP = 1.15
+
 #: Label of all steps.
 STEP_LABEL = "refining triangles"
 
@@ -100,7 +103,7 @@ def bisection_task(
     max_length : float
         Longer edges are bisected, in the units of the vertices.
     max_triangles : int
-        Refinement ends before there would be more triangles; their edges are then longer.
+        If there would be more triangles, longer edges are allowed.
 
     Yields
     ------
@@ -122,8 +125,10 @@ def bisection_task(
         yield Progress(0.5, STEP_LABEL)
         lengths = _edge_lengths(vertices, leaf_vertex)
         long = lengths > max_length
-        marked_count = int(np.count_nonzero(long))
-        if not marked_count or len(leaf_vertex) + marked_count > max_triangles:
+        while len(leaf_vertex) + np.count_nonzero(long) > max_triangles and long.any():
+            max_length *= LENGTH_STEP
+            long = lengths > max_length
+        if not long.any():
             break
         # The new vertices, and the one on each marked edge of each triangle.
         tail = leaf_vertex.astype(np.int64)

@@ -32,7 +32,7 @@ MAX_EDGE = 1.4
 
 #: Largest number of triangles on which the phase is computed, unless the mesh has more. Beyond it,
 #: lines end and begin in fewer places.
-MAX_TRIANGLES = 1_500_000
+MAX_TRIANGLES = 600_000
 
 #: Bytes of a triangle while phases are computed, and of each of its families of lines.
 TRIANGLE_BYTES, FAMILY_BYTES = 210, 610

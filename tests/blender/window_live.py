@@ -305,6 +305,21 @@ def paper_is_behind_everything():
     check_nothing_is_left()
 
 
+def even_lines_are_those_of_a_bake():
+    """The preset Engraving, also after a zoom, which needs other lines."""
+    yield from fresh_scene()
+    bpy.ops.rosy.preset_apply(preset="engraving")
+    bpy.context.scene.rosy.look.supersampling = 1
+    switch("ON")
+    yield from wait_for_final_pictures()
+    yield from check_is_bake("live-engraving", 0.97)
+    view()[1].spaces.active.region_3d.view_distance *= 1.5
+    yield from wait_for_final_pictures()
+    yield from check_is_bake("live-engraving-far", 0.97)
+    switch("OFF")
+    check_nothing_is_left()
+
+
 def only_visible_objects_are_drawn():
     """Hidden objects, local view, bounds and wireframe; the frame of a camera; a clipped region."""
     yield from fresh_scene()
@@ -1132,6 +1147,7 @@ STEPS = (
     screenshot_for_the_documentation,
     surfaces_in_front_occlude,
     paper_is_behind_everything,
+    even_lines_are_those_of_a_bake,
     only_visible_objects_are_drawn,
     clipped_region,
     tones_are_those_of_a_bake,

@@ -121,7 +121,7 @@ class ComposeStages:
         def noise_task() -> Task[np.ndarray]:
             curvature = None
             if "detail" in args:
-                curvature = yield from feature_curvatures_task(self._gbuffer, self._cache)
+                curvature = yield from feature_curvatures_task(self._gbuffer, self._mesh_cache)
             return (yield from surface_noise_task(self._gbuffer, **args, curvature=curvature))
 
         key = "surface noise", self._gbuffer, *sorted(args.items())

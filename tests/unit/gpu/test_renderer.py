@@ -1065,6 +1065,7 @@ UNDEFINED_LOOKS = {
     "magnitude": {"magnitude": "both"},
     "hatched": {"ink": "hatch", "shading": 1.0},
     "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "colour"},
+    "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
 }
 

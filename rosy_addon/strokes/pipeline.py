@@ -20,6 +20,7 @@ from .head_on_ends import head_on_ends_task
 from .outline import OUTLINE_KINDS, outline
 from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
+    MAX_SPACING_RATIO,
     LightSource,
     lit_tone,
     pixel_spacing,
@@ -172,8 +173,10 @@ def _trace_instance(
     spacing = _vertex_spacing(instance, camera, style)
     yield Progress(0.005, "computing the spacing")
     tone = lit_tone(instance, camera, lights) if style.tone else None
+    # Without changes of the spacing, all of the tone is in the widths.
+    max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     if tone is not None:
-        spacing = spacing_by_tone(spacing, tone)
+        spacing = spacing_by_tone(spacing, tone, max_ratio)
     if style.curvature:
         task = spacing_by_curvature_task(instance.surface, spacing, style.curvature)
         spacing = yield from subtask(task, 0.01, 0.02)
@@ -193,7 +196,7 @@ def _trace_instance(
     strokes = yield from subtask(task, 0.92, 0.95)
     if tone is not None:
         point_tone = values_at_points(strokes, instance.surface, tone)
-        strokes = weight_by_tone(strokes, point_tone, style.layering)
+        strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
     if style.gaps:
         task = crossing_gaps_task(strokes, style.gaps, weave=True)
         strokes = yield from subtask(task, 0.95, 0.98)

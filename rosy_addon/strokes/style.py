@@ -54,6 +54,15 @@ class StrokeStyle:
         panel="density",
         applies=lambda style: style.tone,
     )
+    swell: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Amount by which the tone changes the width of strokes instead of their distance. 1: evenly "
+        "spaced strokes, as in an engraving",
+        panel="density",
+        applies=lambda style: style.tone,
+    )
     light: str = choice(
         "headlight",
         "Light source of the tone",

@@ -141,6 +141,7 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "spacing": _number(0.5, 512, (4.0, 9.0, 14.0)),
     "distance": _number(1e-6, 1e6, (0.1, 0.3)),
     "layering": _number(0, 1, (0.3,)),
+    "swell": _number(0, 1, (0.5, 1.0)),
     "curvature": _number(0, 1, (0.5,)),
     "gaps": _number(0, 4, (0.3,)),
     "taper": _number(0, 50, (3.0,)),

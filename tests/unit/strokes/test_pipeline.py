@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapes import from_triangles, icosphere, moved, plane
@@ -249,3 +251,21 @@ def test_errors(error_of):
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
     assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
     assert "pen" in error_of(Pen, width=0.0)
+
+
+def test_swelling_strokes_are_evenly_spaced():
+    """They are where strokes without a tone are, and their width is the darkness."""
+    style = StrokeStyle(spacing=9, taper=0.0, hidden=True)
+    even = draw_instances([SPHERE], CAMERA, style).strokes
+    swelling = draw_instances([SPHERE], CAMERA, replace(style, tone=True, swell=1.0)).strokes
+    denser = draw_instances([SPHERE], CAMERA, replace(style, tone=True)).strokes
+    places = set(map(tuple, np.round(even.points, 6).tolist()))
+
+    def share_of_places(strokes):
+        return np.mean([tuple(point) in places for point in np.round(strokes.points, 6).tolist()])
+
+    assert share_of_places(swelling) > 0.9 > 0.5 > share_of_places(denser)
+    first = swelling.family[swelling.stroke] == 0
+    to_eye = normalize(np.linalg.inv(CAMERA.view)[:3, 3] - swelling.points)
+    darkness = 1 - np.clip(dot(normalize(swelling.points), to_eye), 0, 1)
+    np.testing.assert_allclose(swelling.width[first], darkness[first], atol=0.05)

@@ -32,15 +32,24 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def filtered_normals_task(surface: Surface, edges: Edges) -> Task[tuple[np.ndarray, float]]:
+def filtered_normals_task(
+    surface: Surface, edges: Edges, region: np.ndarray | None = None
+) -> Task[tuple[np.ndarray, float]]:
     """Smooth the face normals over edges, but not across large angles.
+
+    Parameters
+    ----------
+    surface : Surface
+    edges : Edges
+    region : (F,) bool ndarray, optional
+        The faces to smooth, without regard to the others. All by default.
 
     Returns
     -------
     normals : (F, 3) float64 ndarray
         Unit, or zero.
     noise_angle : float
-        The median angle, by area, between the normals before and after, in radians.
+        The median angle, by area, between the normals before and after, in radians; of the region.
 
     References
     ----------
@@ -51,7 +60,12 @@ def filtered_normals_task(surface: Surface, edges: Edges) -> Task[tuple[np.ndarr
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     area = np.sqrt(dot(vectors, vectors))
     area /= max(float(area.max(initial=0.0)), 1e-300)
-    normals = surface.face_normal
+    unfiltered = normals = surface.face_normal
+    if region is not None:
+        inside = region[face_a] & region[face_b]
+        rank = np.cumsum(region) - 1
+        face_a, face_b = rank[face_a[inside]], rank[face_b[inside]]
+        area, unfiltered, normals = area[region], unfiltered[region], normals[region]
     for index in range(FILTER_ROUNDS):
         yield Progress(index / FILTER_ROUNDS, label)
         normal_a, normal_b = normals[face_a], normals[face_b]
@@ -64,7 +78,12 @@ def filtered_normals_task(surface: Surface, edges: Edges) -> Task[tuple[np.ndarr
             total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
             total[:, axis] += np.bincount(face_b, weight_b * normal_a[:, axis], len(area))
         normals = normalize(total)
-    return normals, weighted_median(angle_between(surface.face_normal, normals), area)
+    noise_angle = weighted_median(angle_between(unfiltered, normals), area)
+    if region is not None:
+        filtered = normals
+        normals = surface.face_normal.copy()
+        normals[region] = filtered
+    return normals, noise_angle
 
 
 def salient_edges_task(
@@ -94,7 +113,7 @@ def salient_edges_task(
     angle[edges.interior] = angle_between(normals[face_a], normals[face_b])
     yield Progress(0.3, label)
     interior = angle[edges.interior]
-    others = np.maximum(*_largest_of_others(surface, angle[edges.corner_edge], edges.halfedges))
+    others = np.maximum(*largest_of_others(surface, angle[edges.corner_edge], edges.halfedges))
     noise = NOISE_MULTIPLE * noise_angle
     is_sharp = interior >= max(SHARP_ANGLE, noise)
     is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
@@ -110,7 +129,7 @@ def salient_edges_task(
     return ends[length >= MIN_LINE_LENGTH * surface.extent]
 
 
-def _largest_of_others(
+def largest_of_others(
     surface: Surface, corner_angle: np.ndarray, halfedges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest angle of the other edges of the two faces at each interior edge.

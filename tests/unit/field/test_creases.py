@@ -1,0 +1,97 @@
+"""Creases of a mesh, as chains of sharp edges."""
+
+import numpy as np
+import pytest
+from shapes import cube, cylinder, from_triangles, icosphere
+
+from rosy_addon.field.creases import creases_task
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+
+
+def creases(surface, angle=0.7):
+    return run_to_completion(creases_task(surface, angle))
+
+
+def ridge(height, cells=48, noise=0.0):
+    """Return a square of triangles with a ridge along y = 0.
+
+    `noise` is the standard deviation of the heights, relative to the length of an edge.
+    """
+    axis = np.linspace(-1, 1, cells + 1)
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    z = -height * np.abs(y) + noise * (2 / cells) * np.random.default_rng(3).standard_normal(
+        x.shape
+    )
+    corner = np.arange(cells * (cells + 1)).reshape(cells, cells + 1)[:, :-1].ravel()
+    above = corner + cells + 1
+    faces = [[corner, above, above + 1], [corner, above + 1, corner + 1]]
+    triangles = np.concatenate([np.stack(face, axis=1) for face in faces])
+    return from_triangles(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+
+
+def test_all_edges_of_a_cube_are_one_chain():
+    for sharp in (None, 1.0):
+        box = cube()
+        box = build_surface(box.vertices, box.corner_vertex, box.face_start, sharp_angle=sharp)
+        found = creases(box)
+        assert len(found.ends) == 12 and set(found.chain) == {0}
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_smooth_surfaces_have_no_creases(flat):
+    for surface in (icosphere(2), icosphere(1)):
+        faces = np.full(surface.face_count, flat)
+        surface = build_surface(
+            surface.vertices, surface.corner_vertex, surface.face_start, flat_faces=faces
+        )
+        assert not len(creases(surface).ends)
+
+
+def test_the_rims_of_a_cylinder_are_two_chains():
+    tube = cylinder(24, 1)
+    rims = [np.arange(1, 48, 2), np.arange(0, 48, 2)[::-1]]
+    corners = np.concatenate([tube.corner_vertex, *rims])
+    start = np.append(tube.face_start, [tube.face_start[-1] + 24, len(corners)])
+    found = creases(build_surface(tube.vertices, corners, start))
+    assert list(np.bincount(found.chain)) == [24, 24]
+
+
+@pytest.mark.parametrize("noise", [0.25, 0.35])
+@pytest.mark.parametrize("flat", [False, True])
+def test_noise_has_no_creases(noise, flat):
+    surface = ridge(0.0, noise=noise)
+    faces = np.full(surface.face_count, flat)
+    surface = build_surface(
+        surface.vertices, surface.corner_vertex, surface.face_start, flat_faces=faces
+    )
+    assert not len(creases(surface).ends)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
+def test_a_ridge_is_a_crease_in_spite_of_noise(noise):
+    """At least 0.95 of the ridge is found, and nothing else."""
+    surface = ridge(1.0, noise=noise)
+    found = creases(surface)
+    on_ridge = np.abs(surface.vertices[found.ends, 1]).max(axis=1) < 1e-9
+    assert on_ridge.all() and set(found.chain) == {0}
+    assert len(found.ends) >= 0.95 * 48
+
+
+def test_a_chain_continues_where_it_is_weaker():
+    """A ridge that becomes flat counts down to half of the crease angle, if enough of it is strong."""
+    flat = ridge(0.0)
+    x, y, _ = flat.vertices.T
+    angle = 0.05 + 0.45 * (x + 1)
+    fading = build_surface(
+        np.stack([x, y, -np.tan(angle / 2) * np.abs(y)], axis=1),
+        flat.corner_vertex,
+        flat.face_start,
+        sharp_angle=0.1,
+    )
+    found = creases(fading, 0.7)
+    on_ridge = np.abs(fading.vertices[found.ends, 1]).max(axis=1) < 1e-9
+    lowest = angle[found.ends].min()
+    assert on_ridge.all() and set(found.chain) == {0}
+    assert lowest == pytest.approx(0.35, abs=0.03)
+    assert not len(creases(fading, 0.9).ends)

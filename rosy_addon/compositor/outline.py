@@ -1,16 +1,24 @@
 """Outlines: ink lines along silhouettes, borders and sharp creases, found in the G-buffer.
 
-An edge lies between two adjacent pixels if the surface does not continue from one to the other
-(`pixel_neighbors.neighbor_masks`). Where one surface occludes the other, the line is drawn only on
-the nearer one.
+Silhouettes and borders lie between two adjacent pixels if the surface does not continue from one to
+the other (`pixel_neighbors.neighbor_masks`). Where one surface occludes the other, the line is drawn
+only on the nearer one. Creases are chains of edges of the mesh (`field.creases`), drawn where they
+are visible. Marks that are too short are not drawn, unless they are the border of something.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from ..cache import Cache
+from ..field.frames import dot
+from ..field.surface import connected_components_task
 from ..progress import Progress, Task, run_to_completion, subtask
+from ..projection.crease_pixels import mark_crease_pixels
 from ..projection.gbuffer import GBuffer
+from ..projection.outline_mesh import cached_outline_mesh_task
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.pixel_neighbors import affine_depth, neighbor_masks_task
 from .look import Look
@@ -18,6 +26,16 @@ from .look import Look
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.affine_depth`).
 DEPTH_JUMP = 2.0
+
+#: Length in pixels of the finished picture below which a mark is not drawn, and from which on it has
+#: its full width: it grows and shrinks when something moves, but it does not flicker.
+MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
+
+#: Bits of what begins next to a pixel at an edge.
+PART_BORDER, EMPTY_BORDER = 1, 2
+
+#: The settings of a look that an outline depends on.
+OUTLINE_SETTINGS = ("outline", "crease_angle", "cross_creases", "supersampling")
 
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
@@ -31,14 +49,18 @@ def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
     return run_to_completion(outline_task(gbuffer, look))
 
 
-def outline_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
+def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Task[np.ndarray]:
     """Compute the coverage of each pixel by outlines.
 
     Parameters
     ----------
     gbuffer : GBuffer
+        Creases are drawn if its instances are known.
     look : Look
-        In pixels of the frame. Its `outline`, `crease_angle` and `cross_creases` are used.
+        In pixels of the frame. Its `outline`, `crease_angle`, `cross_creases` and `supersampling`
+        are used.
+    cache : Cache, optional
+        Stores what does not depend on the view.
 
     Returns
     -------
@@ -56,14 +78,39 @@ def outline_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
         row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
         cell[block] = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
         entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
+    grid = _CellGrid(entry_of_cell, cell, stride, (radius + 1) * (stride + 1))
     # Larger depths are nearer to the eye.
     depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
     for block in pixel_blocks(len(cell)):
         yield Progress(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
         depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
-    edge_pixels, line_width = yield from subtask(
-        _outline_edges_task(gbuffer, look, entry_of_cell, cell, stride, depth, tolerance), 0.2, 0.9
+    task = neighbor_masks_task(gbuffer, look.crease_angle, True)
+    mask = yield from subtask(task, 0.2, 0.5, STEP_LABEL)
+    line_width = np.zeros(len(cell), dtype=np.float32)
+    border = np.zeros(len(cell), dtype=np.uint8)
+    instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
+    for instance_id in instance_ids:
+        yield from subtask(
+            _creases_and_parts_task(
+                gbuffer, int(instance_id), look, cache, grid, mask, line_width, border
+            ),
+            0.5,
+            0.6,
+            STEP_LABEL,
+        )
+    task = _occlusions_task(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
+    yield from subtask(task, 0.6, 0.8, STEP_LABEL)
+    edge_pixels = np.flatnonzero(line_width)
+    strength = yield from subtask(
+        _mark_strength_task(
+            gbuffer.pixel[edge_pixels], border[edge_pixels], width, look.supersampling
+        ),
+        0.8,
+        0.9,
+        STEP_LABEL,
     )
+    edge_pixels, strength = edge_pixels[strength > 0], strength[strength > 0]
+    line_width = np.minimum(line_width[edge_pixels], np.float32(look.outline) * strength)
     depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
     coverage = np.zeros(len(cell), dtype=np.float32)
     for distance, dx, dy in _disc_offsets(radius):
@@ -81,50 +128,179 @@ def outline_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     return coverage
 
 
-def _outline_edges_task(
+class _CellGrid(NamedTuple):
+    """The pixels of a G-buffer in a frame with an empty margin.
+
+    Attributes
+    ----------
+    entry : (cells,) int32 ndarray
+        Entry of the G-buffer in each cell, or -1.
+    cell : (P,) int32 ndarray
+        Cell of each entry.
+    stride : int
+        Cells in a row.
+    origin : int
+        Cell of the lower left pixel of the frame.
+    """
+
+    entry: np.ndarray
+    cell: np.ndarray
+    stride: int
+    origin: int
+
+
+def _creases_and_parts_task(
+    gbuffer: GBuffer,
+    instance_id: int,
+    look: Look,
+    cache: Cache | None,
+    grid: _CellGrid,
+    mask: np.ndarray,
+    line_width: np.ndarray,
+    border: np.ndarray,
+) -> Task[None]:
+    """Set the width of lines along the creases of an instance, and along borders of its parts.
+
+    There is a line where two parts of a mesh intersect if their normals differ by the crease angle.
+    `mask` is that of `neighbor_masks_task`, without creases.
+    `border` becomes `PART_BORDER` wherever another part begins.
+    """
+    instance = gbuffer.instances[instance_id]
+    crease_angle = None if look.cross_creases else look.crease_angle
+    task = cached_outline_mesh_task(instance.surface, instance.matrix, crease_angle, cache)
+    mesh = yield from subtask(task, 0.0, 0.5)
+    defined = gbuffer.representation != 0
+    if len(mesh.crease_points):
+        marks = np.zeros(len(grid.cell), dtype=bool)
+        points = mesh.crease_points + np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
+        steps = mark_crease_pixels(
+            gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride, marks
+        )
+        for fraction in steps:
+            yield Progress(0.5 + 0.3 * fraction, STEP_LABEL)
+        line_width[marks & defined] = look.outline / 2
+    if mesh.triangle_part is None:
+        return
+    min_cosine = -2.0 if crease_angle is None else np.float32(np.cos(crease_angle))
+    for block in pixel_blocks(len(grid.cell)):
+        yield Progress(0.8 + 0.2 * block.start / len(grid.cell), STEP_LABEL)
+        entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
+        part = mesh.triangle_part.take(gbuffer.triangle[entry])
+        for dx, dy, bit in NEIGHBORS_4:
+            neighbor = grid.entry.take(grid.cell[entry] + (dy * grid.stride + dx))
+            pair = np.flatnonzero(neighbor >= 0)
+            pair = pair[gbuffer.instance_id[neighbor[pair]] == instance_id]
+            other = mesh.triangle_part.take(gbuffer.triangle[neighbor[pair]])
+            pair = pair[other != part[pair]]
+            a, b = entry[pair], neighbor[pair]
+            border[a] |= PART_BORDER
+            meet = (mask[a] >> np.uint16(bit) & 1 == 1) & defined[a] & defined[b]
+            meet &= dot(gbuffer.normal[a], gbuffer.normal[b]) < min_cosine
+            line_width[a[meet]] = look.outline / 2
+
+
+def _occlusions_task(
     gbuffer: GBuffer,
     look: Look,
-    entry_of_cell: np.ndarray,
-    cell: np.ndarray,
-    stride: int,
+    grid: _CellGrid,
+    mask: np.ndarray,
     depth: np.ndarray,
     tolerance: np.ndarray,
-) -> Task[tuple[np.ndarray, np.ndarray]]:
-    """Find the pixels at an edge of their surface, unless the neighbor occludes them.
+    line_width: np.ndarray,
+    border: np.ndarray,
+) -> Task[None]:
+    """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
-    Both sides of a crease are edges, so each gets half the width. There is no edge at the border of
-    the frame, and none where the surface continues but the field ends.
-
-    Returns
-    -------
-    edge_pixels : (n,) intp ndarray
-        Entries of the G-buffer.
-    line_width : (n,) float32 ndarray
-        Width of the line at these pixels, in pixels.
+    `mask` is that of `neighbor_masks_task`, without creases.
+    There is no edge at the border of the frame, and none where the surface continues but the field
+    ends. `border` is set where another instance or no surface follows.
     """
-    masks_task = neighbor_masks_task(gbuffer, look.crease_angle, look.cross_creases)
-    mask = yield from subtask(masks_task, 0.0, 0.6, STEP_LABEL)
     defined = gbuffer.representation != 0
-    line_width = np.zeros(len(cell), dtype=np.float32)
-    for block in pixel_blocks(len(cell)):
-        yield Progress(0.6 + 0.4 * block.start / len(cell), STEP_LABEL)
+    for block in pixel_blocks(len(grid.cell)):
+        yield Progress(block.start / len(grid.cell), STEP_LABEL)
         row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
         for dx, dy, bit in NEIGHBORS_4:
             inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
             inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
-            is_border = inside & defined[block] & (mask[block] >> np.uint16(bit) & 1 == 0)
-            border = np.flatnonzero(is_border) + block.start
-            neighbor = entry_of_cell.take(cell[border] + (dy * stride + dx))
-            jump_limit = np.float32(DEPTH_JUMP) * tolerance[border]
-            jump = (depth.take(neighbor) - depth[border]) / jump_limit
-            same_depth = (np.abs(jump) <= 1) & (neighbor >= 0)
-            width = np.where(same_depth, np.float32(look.outline / 2), np.float32(look.outline))
-            width[(jump > 1) & (neighbor >= 0)] = 0
-            same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[border]
-            width[same_instance & ~defined.take(neighbor) & (neighbor >= 0)] = 0
-            line_width[border] = np.maximum(line_width[border], width)
-    edge_pixels = np.flatnonzero(line_width)
-    return edge_pixels, line_width[edge_pixels]
+            is_edge = inside & defined[block] & (mask[block] >> np.uint16(bit) & 1 == 0)
+            edge = np.flatnonzero(is_edge) + block.start
+            neighbor = grid.entry.take(grid.cell[edge] + (dy * grid.stride + dx))
+            jump_limit = np.float32(DEPTH_JUMP) * tolerance[edge]
+            jump = (depth.take(neighbor) - depth[edge]) / jump_limit
+            is_empty = neighbor < 0
+            same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
+            width = np.where(
+                np.abs(jump) <= 1, np.float32(look.outline / 2), np.float32(look.outline)
+            )
+            width[jump > 1] = 0
+            width[same_instance & ~defined.take(neighbor)] = 0
+            width[is_empty] = look.outline
+            line_width[edge] = np.maximum(line_width[edge], width)
+            border[edge[is_empty]] |= EMPTY_BORDER
+            border[edge[~is_empty & ~same_instance]] |= PART_BORDER
+
+
+def _mark_strength_task(
+    pixel: np.ndarray, border: np.ndarray, width: int, block_side: int
+) -> Task[np.ndarray]:
+    """Return the share of the full width that lines may have, by the lengths of their marks.
+
+    Marks are connected pixels of the finished picture; diagonal neighbors are connected. The length
+    of a mark is the longer side of its bounding box. A short mark has its full width if it is next to
+    the background, or if it surrounds something: then at least as many of its pixels as half of the
+    outline of its bounding box are borders of a part.
+
+    Parameters
+    ----------
+    pixel : (n,) int32 ndarray
+        Pixels at edges, in ascending order.
+    border : (n,) uint8 ndarray
+        Bits `PART_BORDER` and `EMPTY_BORDER`.
+    width : int
+        Of the frame.
+    block_side : int
+        Pixels of the frame in a pixel of the finished picture, along a side.
+
+    Returns
+    -------
+    (n,) float32 ndarray
+        From 0 to 1.
+    """
+    if not len(pixel):
+        return np.zeros(0, dtype=np.float32)
+    yield Progress(0.0, STEP_LABEL)
+    row, column = np.divmod(pixel.astype(np.int64), width)
+    stride = width // block_side + 2
+    block, block_of_pixel = np.unique(
+        row // block_side * stride + column // block_side, return_inverse=True
+    )
+    yield Progress(0.2, STEP_LABEL)
+    pairs = []
+    for offset in (1, stride - 1, stride, stride + 1):
+        target = np.searchsorted(block, block + offset)
+        target[target == len(block)] = 0
+        source = np.flatnonzero(block[target] == block + offset)
+        pairs.append(np.stack([source, target[source]], axis=1))
+    task = connected_components_task(len(block), np.concatenate(pairs))
+    mark = yield from subtask(task, 0.3, 0.8)
+    sides = [_extent_per_label(values, mark) for values in (block // stride, block % stride)]
+    is_part_border = np.zeros(len(block), dtype=bool)
+    is_part_border[block_of_pixel[border & PART_BORDER != 0]] = True
+    borders = np.bincount(mark[is_part_border], minlength=len(sides[0]))
+    has_full_width = (borders >= sides[0] + sides[1]) & (np.minimum(*sides) > 1)
+    has_full_width[mark[block_of_pixel[border & EMPTY_BORDER != 0]]] = True
+    hidden = MIN_MARK_LENGTH - 1
+    strength = (np.maximum(*sides) - hidden) / (FULL_MARK_LENGTH - hidden)
+    strength = np.where(has_full_width, 1, np.clip(strength, 0, 1)).astype(np.float32)
+    return strength[mark][block_of_pixel]
+
+
+def _extent_per_label(values: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return (K,) numbers of integers from the smallest to the largest value of each label."""
+    order = np.argsort(label, kind="stable")
+    start = np.flatnonzero(np.diff(label[order], prepend=-1))
+    ordered = values[order]
+    return np.maximum.reduceat(ordered, start) - np.minimum.reduceat(ordered, start) + 1
 
 
 def _disc_offsets(radius: int) -> list[tuple[float, int, int]]:

@@ -15,7 +15,7 @@ from .lic import lic_task, look_noise_task, noise_args
 from .lic_images import LicImages
 from .look import Look, lic_key
 from .look_units import cell_size_args
-from .outline import outline_task
+from .outline import OUTLINE_SETTINGS, outline_task
 from .paper_grain import surface_paper_grain_args
 from .pixel_field import PixelField, surface_pixel_field_task
 from .surface_noise import surface_noise_task
@@ -93,8 +93,8 @@ class ComposeStages:
     def outline_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""
         coverage = yield from self._cache.get_or_create_task(
-            ("outline", self._gbuffer, look.outline, look.crease_angle, look.cross_creases),
-            lambda: outline_task(self._gbuffer, look),
+            ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
+            lambda: outline_task(self._gbuffer, look, self._cache),
         )
         return coverage[field.gbuffer_index]
 

@@ -74,7 +74,14 @@ class Surface:
         """Return the surface before deformation, to which field vectors refer."""
         if self.rest_vertices is None:
             return self
-        return replace(self, vertices=self.rest_vertices, rest_vertices=None)
+        return self.with_vertices(self.rest_vertices)
+
+    def with_vertices(self, vertices: np.ndarray) -> Surface:
+        """Return the surface with (V, 3) other positions, without a rest shape.
+
+        The normals stay as they are.
+        """
+        return replace(self, vertices=vertices, rest_vertices=None)
 
     @cached_property
     def rest_shape_key(self) -> bytes:

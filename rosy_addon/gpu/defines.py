@@ -22,7 +22,13 @@ from ..compositor.image_noise import (
     NOISE_MEAN,
     SEED_FACTOR,
 )
-from ..compositor.outline import DEPTH_JUMP
+from ..compositor.outline import (
+    DEPTH_JUMP,
+    EMPTY_BORDER,
+    FULL_MARK_LENGTH,
+    MIN_MARK_LENGTH,
+    PART_BORDER,
+)
 from ..compositor.streak_statistics import WOBBLE_BREAKS
 from ..compositor.surface_noise import (
     CONTRAST_SCALE_RANGE,
@@ -32,6 +38,7 @@ from ..compositor.surface_noise import (
 )
 from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
 from ..compositor.wobble import UNIT_VARIANCE_SCALE, WAVE_COUNT, WOBBLE_STD
+from ..projection.crease_pixels import LINE_TOLERANCE, MIN_RELATIVE_DEPTH
 from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLERANCE
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.shadow_maps import PCF_WIDTH
@@ -60,6 +67,12 @@ TONE_SOURCES = {
 #: Kinds of lights in shaders.
 SUN_LIGHT, POINT_LIGHT, HEADLIGHT = range(3)
 
+#: Edges of creases in a row of threads, and threads for each edge.
+CREASES_PER_ROW, CREASE_SLICES = 1024, 16
+
+#: Bit of a pixel that contains an edge, besides those of borders in `outline`.
+EDGE_BIT = 4
+
 #: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
 REDUCE_BLOCK = 16
 
@@ -78,6 +91,8 @@ FLOAT_CONSTANTS = {
     "GROWTH_STOP": GROWTH_OCTAVES[1],
     "MIN_COVERAGE": MIN_COVERAGE,
     "DEPTH_JUMP": DEPTH_JUMP,
+    "LINE_TOLERANCE": LINE_TOLERANCE,
+    "MIN_RELATIVE_DEPTH": MIN_RELATIVE_DEPTH,
     "MAX_SLOPE": MAX_SLOPE,
     "DEPTH_TOLERANCE": DEPTH_TOLERANCE,
     "SLOPE_TOLERANCE": SLOPE_TOLERANCE,
@@ -98,6 +113,13 @@ INT_CONSTANTS = {
     "MAX_TREE_DEPTH": MAX_TREE_DEPTH,
     "ALL_NEIGHBORS": ALL_NEIGHBORS,
     "PCF_WIDTH": PCF_WIDTH,
+    "CREASES_PER_ROW": CREASES_PER_ROW,
+    "CREASE_SLICES": CREASE_SLICES,
+    "EDGE_BIT": EDGE_BIT,
+    "PART_BORDER": PART_BORDER,
+    "EMPTY_BORDER": EMPTY_BORDER,
+    "MIN_MARK_LENGTH": MIN_MARK_LENGTH,
+    "FULL_MARK_LENGTH": FULL_MARK_LENGTH,
     "REDUCE_BLOCK": REDUCE_BLOCK,
     "ROW_BITS": ROW_BITS,
     "POSITION_TEXEL": POSITION_TEXEL,

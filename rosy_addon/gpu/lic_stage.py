@@ -47,6 +47,8 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         "disc_offsets": lookup_tables.undirected_offsets(resources, frame.pixel_look),
         "ink_table": lookup_tables.ink_table(resources, kind, look),
     }
+    if "outline_widths" not in textures:
+        textures["outline_widths"] = textures["depth_slopes"]
     if "paper_grain" not in textures:
         textures["paper_grain"] = lookup_tables.picture_grain(
             resources, *frame.size, look, kind.line_count

@@ -241,9 +241,9 @@ def _write_values(
 
 
 def to_texture_rows(values: np.ndarray) -> np.ndarray:
-    """Return (T, 3) values as (rows, ROW_TEXELS, 4) float32: one texel per triangle."""
+    """Return (n, k) values as (rows, ROW_TEXELS, 4) float32: k of the components of n texels."""
     rows, texels = _empty_records(len(values), 1)
-    texels[:, 0, :3] = values
+    texels[:, 0, : values.shape[1]] = values
     return rows
 
 

@@ -277,7 +277,52 @@ DIRECTIONS = ComputePass(
         ("foreshorten", "int"),
         ("wobble_strength", "float"),
     ),
-    includes=("screen_direction",),
+    includes=("surface_continuity", "screen_direction"),
+)
+
+#: The pixels next to creases, one thread for some of the crossings of each edge.
+OUTLINE_CREASES = ComputePass(
+    "outline_creases",
+    ("crease_points", "field_values", "depth_slopes"),
+    (("crease_marks", "RGBA16F"),),
+    (
+        ("clip_x", "vec4"),
+        ("clip_y", "vec4"),
+        ("clip_w", "vec4"),
+        ("model_view_z", "vec4"),
+        ("instance_id", "float"),
+        ("is_perspective", "int"),
+        ("crease_count", "int"),
+    ),
+)
+
+OUTLINE_EDGES = ComputePass(
+    "outline_edges",
+    ("visibility", "normals", "field_values", "depth_slopes", "crease_marks", "triangle_parts"),
+    (("outline_edges", "RGBA32F"),),
+    (
+        *_BOX_ORIGIN,
+        ("instance_id", "float"),
+        *setting_uniforms(("outline",)),
+        ("min_normal_cosine", "float"),
+        ("has_creases", "int"),
+        ("has_parts", "int"),
+    ),
+    includes=("surface_continuity",),
+)
+
+OUTLINE_BLOCKS = ComputePass(
+    "outline_blocks",
+    ("outline_edges",),
+    (("outline_blocks", "RGBA16F"),),
+    (*_BOX_ORIGIN, ("supersampling", "int")),
+)
+
+OUTLINE_WIDTHS = ComputePass(
+    "outline_widths",
+    ("outline_edges", "outline_blocks"),
+    (("outline_widths", "RGBA32F"),),
+    (*_BOX_ORIGIN, *setting_uniforms(("outline",)), ("supersampling", "int")),
 )
 
 ANGLE_GRADIENT = ComputePass(
@@ -361,6 +406,7 @@ LIC = ComputePass(
         "tones",
         "field_values",
         "depth_slopes",
+        "outline_widths",
         "field_channels[]",
         "max_magnitude",
         "color_map",
@@ -460,6 +506,10 @@ ALL_PASSES = (
     CENTER_NOISE,
     EVEN_LINES,
     DIRECTIONS,
+    OUTLINE_CREASES,
+    OUTLINE_EDGES,
+    OUTLINE_BLOCKS,
+    OUTLINE_WIDTHS,
     ANGLE_GRADIENT,
     SHADOW_MAP,
     SHADOW_VISIBILITY,

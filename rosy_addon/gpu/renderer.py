@@ -29,6 +29,7 @@ from .frame import Frame
 from .gbuffer_stage import render_gbuffer
 from .lic_stage import lic_task
 from .noise_stage import noise_task
+from .outline_stage import outline_task
 from .resources import DrawItem, GpuResources
 from .screen_box import box_size, is_empty, screen_box, union_box
 from .tone_stage import render_target_tones
@@ -120,6 +121,7 @@ class GpuRenderer:
             ("picture", target_key if single_sampled else None), *frame.size
         )
         render_gbuffer(frame)
+        yield from outline_task(frame)
         self.device.clear(fine_picture)
         yield from noise_task(frame)
         yield from even_lines_task(frame)

@@ -19,6 +19,7 @@ from ..progress import Task, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
+from ..projection.outline_mesh import outline_mesh_task
 from ..projection.rest_coordinates import matrix_scale
 from ..projection.surface_lines import cached_surface_lines_task, rest_matrix
 from .device import Device
@@ -83,6 +84,8 @@ class GpuMesh:
     keep_alive : tuple
         Surface, field and tone: the key of the mesh contains their ids.
     tone_atlas : MipAtlas or None
+    outline_textures : OutlineTextures or None
+        Those of the last crease angle.
     last_used : int
         Number of the upload that used it last.
     line_textures : dict
@@ -94,8 +97,29 @@ class GpuMesh:
     records_texture: Any
     keep_alive: tuple[Any, ...]
     tone_atlas: MipAtlas | None = None
+    outline_textures: OutlineTextures | None = None
     last_used: int = 0
     line_textures: dict[tuple, tuple[Any, int]] = dataclass_field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class OutlineTextures:
+    """The creases and parts of a mesh (`outline_mesh.OutlineMesh`) as textures.
+
+    Attributes
+    ----------
+    crease_angle : float or None
+    crease_points : texture or None
+        The two ends of each edge, relative to the center of the mesh, in rows of `ROW_TEXELS`.
+    crease_count : int
+    triangle_parts : texture or None
+        The parts of four triangles in each texel. None if there is only one part.
+    """
+
+    crease_angle: float | None
+    crease_points: Any
+    crease_count: int
+    triangle_parts: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +169,11 @@ class GpuResources:
         """The number of textures on the device."""
         records = sum(mesh.records_texture is not None for mesh in self.meshes)
         atlases = sum(mesh.tone_atlas is not None for mesh in self.meshes)
-        lines = sum(len(mesh.line_textures) for mesh in self.meshes)
-        return records + atlases + lines + len(self._images) + len(self._lookup_textures)
+        records += sum(len(mesh.line_textures) for mesh in self.meshes)
+        outlines = [mesh.outline_textures for mesh in self.meshes if mesh.outline_textures]
+        records += sum(outline.crease_points is not None for outline in outlines)
+        records += sum(outline.triangle_parts is not None for outline in outlines)
+        return records + atlases + len(self._images) + len(self._lookup_textures)
 
     def release(self) -> None:
         """Free all resources."""
@@ -184,6 +211,38 @@ class GpuResources:
             self._images[key] = self._texture_of(to_texture_rows(curvature))
         self._last_used[key] = self._upload_count
         return self._images[key]
+
+    def outline_textures_task(
+        self, item: DrawItem, crease_angle: float | None
+    ) -> Task[OutlineTextures]:
+        """Return the creases and parts of the mesh of an item. They stay on the device with it.
+
+        Raises
+        ------
+        RosyError
+            If there are too many for the device.
+        """
+        mesh, surface = item.mesh, item.instance.surface
+        current = mesh.outline_textures
+        if current is not None and current.crease_angle == crease_angle:
+            return current
+        linear, _ = split_matrix(item.instance.matrix)
+        found = yield from outline_mesh_task(surface, linear, crease_angle)
+        points = (found.crease_points - mesh.buffers.center).reshape(-1, 3)
+        parts = np.empty((0, 4)) if found.triangle_part is None else found.triangle_part
+        parts = np.pad(parts.ravel(), (0, -parts.size % 4)).reshape(-1, 4)
+        textures = []
+        for values in (points, parts):
+            rows = to_texture_rows(values)
+            if len(rows) > self.device.max_texture_size:
+                raise RosyError(
+                    f"{surface.name}: has too many creases for this graphics card: choose the processor"
+                )
+            textures.append(self._texture_of(rows) if len(values) else None)
+        mesh.outline_textures = OutlineTextures(
+            crease_angle, textures[0], len(points) // 2, textures[1]
+        )
+        return mesh.outline_textures
 
     def image(
         self,

@@ -148,7 +148,7 @@ def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
         Depth: z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
         Tolerance: permitted deviation from the prediction of the tangent plane, one pixel away.
     """
-    depth, _, _, tolerance = _depth_slopes(gbuffer, slice(None))
+    depth, _, _, tolerance = depth_slopes(gbuffer, slice(None))
     return depth, tolerance
 
 
@@ -191,7 +191,7 @@ def _pixel_grid(
         grid.reshape(-1)[grid_index] = values
         return grid
 
-    depth, slope_x, slope_y, tolerance = _depth_slopes(gbuffer, pixels)
+    depth, slope_x, slope_y, tolerance = depth_slopes(gbuffer, pixels)
     return _PixelGrid(
         depth=scatter(depth, np.nan),
         slope_x=scatter(slope_x),
@@ -205,10 +205,23 @@ def _pixel_grid(
     )
 
 
-def _depth_slopes(
-    gbuffer: GBuffer, pixels: slice
+def depth_slopes(
+    gbuffer: GBuffer, pixels: slice | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return `depth`, `slope_x`, `slope_y` and `tolerance` of some pixels, as in `_PixelGrid`."""
+    """Return the depth of some pixels, its slopes, and its tolerance.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    pixels : slice or ndarray of int
+        Entries of the G-buffer.
+
+    Returns
+    -------
+    depth, slope_x, slope_y, tolerance : (n,) float32 ndarray
+        Depth and tolerance as of `affine_depth`. The slopes are the changes of the depth to the next
+        column and to the next row, on the tangent plane.
+    """
     camera, normal, z = (
         gbuffer.camera,
         gbuffer.geometric_normal[pixels].T,

@@ -14,18 +14,7 @@ bool is_continuous(ivec2 pixel, ivec2 offset, vec4 value, vec4 normal, vec4 slop
   }
   vec4 other_slope = texelFetch(depth_slopes, neighbor, 0);
   vec4 other_normal = texelFetch(normals, neighbor, 0);
-  float jump = other_slope.x - slope.x;
-  float predicted = dot(slope.yz, vec2(offset)), predicted_back = dot(other_slope.yz, vec2(offset));
-  float tolerance = min(slope.w, other_slope.w);
-  if (offset.x != 0 && offset.y != 0) {
-    tolerance *= 1.41421356;
-  }
-  if (jump > max(predicted, predicted_back) + tolerance ||
-      jump < min(predicted, predicted_back) - tolerance) {
-    return false;
-  }
-  bool both_agree = abs(jump - predicted) <= tolerance && abs(jump - predicted_back) <= tolerance;
-  if (!both_agree && (normal.w > 0.0) != (other_normal.w > 0.0)) {
+  if (!depth_continues(slope, other_slope, (normal.w > 0.0) == (other_normal.w > 0.0), offset)) {
     return false;
   }
   return dot(normal.xyz, other_normal.xyz) >= min_normal_cosine;

@@ -1,0 +1,68 @@
+// The width of the outline at the pixels at an edge of their surface, and what begins there: as
+// `outline`. It is 0 at other pixels, and where a surface in front begins: the outline is then drawn
+// on that surface.
+
+int part_of(ivec2 pixel)
+{
+  int triangle = int(texelFetch(visibility, pixel, 0).y), texel = triangle >> 2;
+  vec4 parts = texelFetch(triangle_parts, ivec2(texel & ((1 << ROW_BITS) - 1), texel >> ROW_BITS), 0);
+  return int(parts[triangle & 3]);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  ivec2 frame = imageSize(outline_edges);
+  if (any(greaterThanEqual(pixel, frame))) {
+    return;
+  }
+  vec4 value = texelFetch(field_values, pixel, 0);
+  if (value.w != instance_id + 1.0 || value.xy == vec2(0.0)) {
+    return;
+  }
+  vec4 normal = texelFetch(normals, pixel, 0), slope = texelFetch(depth_slopes, pixel, 0);
+  bool is_crease = has_creases != 0 && texelFetch(crease_marks, pixel, 0).x > 0.0;
+  float width = is_crease ? 0.5 * outline : 0.0;
+  int border = 0, part = has_parts != 0 ? part_of(pixel) : 0;
+  for (int direction = 0; direction < 4; ++direction) {
+    ivec2 offset = direction == 0 ? ivec2(1, 0) :
+                   direction == 1 ? ivec2(-1, 0) :
+                   direction == 2 ? ivec2(0, 1) :
+                                    ivec2(0, -1);
+    ivec2 neighbor = pixel + offset;
+    if (any(lessThan(neighbor, ivec2(0))) || any(greaterThanEqual(neighbor, frame))) {
+      continue;
+    }
+    vec4 other = texelFetch(field_values, neighbor, 0);
+    if (other.w == 0.0) {
+      width = outline;
+      border |= EMPTY_BORDER;
+      continue;
+    }
+    bool same_instance = other.w == value.w;
+    bool is_undefined = same_instance && other.xy == vec2(0.0);
+    vec4 other_slope = texelFetch(depth_slopes, neighbor, 0);
+    vec4 other_normal = texelFetch(normals, neighbor, 0);
+    bool other_part = !same_instance || (has_parts != 0 && part_of(neighbor) != part);
+    border |= other_part ? PART_BORDER : 0;
+    bool same_side = (normal.w > 0.0) == (other_normal.w > 0.0);
+    if (is_undefined) {
+      continue;
+    }
+    if (same_instance && depth_continues(slope, other_slope, same_side, offset)) {
+      // Where two parts intersect, there is a crease.
+      if (other_part && dot(normal.xyz, other_normal.xyz) < min_normal_cosine) {
+        width = max(width, 0.5 * outline);
+      }
+      continue;
+    }
+    float jump = (other_slope.x - slope.x) / (DEPTH_JUMP * slope.w);
+    if (jump < -1.0) {
+      width = outline;
+    }
+    else if (jump <= 1.0) {
+      width = max(width, 0.5 * outline);
+    }
+  }
+  imageStore(outline_edges, pixel, vec4(width, float(border), 0.0, 0.0));
+}

@@ -1,0 +1,98 @@
+"""The outline of a picture: the widths of lines at the pixels at silhouettes, borders and creases."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..compositor.hatching import has_outline
+from ..progress import Progress, Task
+from . import passes
+from .defines import CREASE_SLICES, CREASES_PER_ROW
+from .frame import Frame
+from .resources import DrawItem, OutlineTextures
+from .screen_box import Box
+from .uniforms import camera_uniforms, clip_uniforms, instance_uniforms
+
+#: Label of all steps of this stage.
+STEP_LABEL = "drawing outlines"
+
+
+def outline_task(frame: Frame) -> Task[None]:
+    """Render the outline of a look that has one, as ``frame.textures["outline_widths"]``.
+
+    The method is that of `compositor.outline`.
+    """
+    look = frame.pixel_look
+    if not has_outline(look):
+        return
+    image, device, size = frame.resources.image, frame.resources.device, frame.size
+    crease_marks, edges = image("crease_marks", *size, "RGBA16F"), image("outline_edges", *size)
+    device.clear(crease_marks)
+    device.clear(edges)
+    crease_angle = None if look.cross_creases else look.crease_angle
+    for instance_id, item, box in frame.fields_in_view():
+        yield Progress(0.01, STEP_LABEL)
+        found = yield from frame.resources.outline_textures_task(item, crease_angle)
+        if found.crease_count:
+            _mark_creases(frame, instance_id, item, found, crease_marks)
+        _render_edges(frame, instance_id, box, found, crease_marks, edges)
+    yield Progress(0.02, STEP_LABEL)
+    block_side = look.supersampling
+    width, height = (side // block_side for side in size)
+    blocks, widths = (
+        image("outline_blocks", width, height, "RGBA16F"),
+        image("outline_widths", *size),
+    )
+    box = 0, 0, width, height
+    textures = {"outline_edges": edges, "outline_blocks": blocks}
+    uniforms = {"outline": look.outline, "supersampling": block_side}
+    frame.run(passes.OUTLINE_BLOCKS, box, textures, {"outline_blocks": blocks}, uniforms)
+    frame.run(passes.OUTLINE_WIDTHS, box, textures, {"outline_widths": widths}, uniforms)
+    frame.textures["outline_widths"] = widths
+
+
+def _mark_creases(
+    frame: Frame, instance_id: int, item: DrawItem, found: OutlineTextures, crease_marks: Any
+) -> None:
+    """Mark the pixels next to the visible creases of an instance."""
+    columns = min(found.crease_count, CREASES_PER_ROW)
+    frame.resources.device.compute(
+        passes.OUTLINE_CREASES,
+        (columns, -(-found.crease_count // columns), CREASE_SLICES),
+        {**frame.textures, "crease_points": found.crease_points},
+        {"crease_marks": crease_marks},
+        {
+            **clip_uniforms(item, frame.camera, frame.clip_planes),
+            **camera_uniforms(frame.camera),
+            **instance_uniforms(instance_id, item, frame.camera),
+            "crease_count": found.crease_count,
+        },
+    )
+
+
+def _render_edges(
+    frame: Frame,
+    instance_id: int,
+    box: Box,
+    found: OutlineTextures,
+    crease_marks: Any,
+    edges: Any,
+) -> None:
+    """Render the edges of an instance: the width of the line, and what begins there."""
+    look, has_parts = frame.pixel_look, found.triangle_parts is not None
+    parts = found.triangle_parts if has_parts else frame.textures["visibility"]
+    frame.run(
+        passes.OUTLINE_EDGES,
+        box,
+        {**frame.textures, "crease_marks": crease_marks, "triangle_parts": parts},
+        {"outline_edges": edges},
+        {
+            "instance_id": float(instance_id),
+            "outline": look.outline,
+            "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
+            "has_creases": int(found.crease_count > 0),
+            "has_parts": int(has_parts),
+        },
+    )

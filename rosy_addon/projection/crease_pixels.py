@@ -1,0 +1,145 @@
+"""The pixels at which a line in space is visible, such as an edge of a crease."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .camera import Camera
+from .gbuffer import GBuffer
+from .pixel_neighbors import depth_slopes
+
+#: Smallest distance from the camera at which a line is drawn, relative to that of its farther end.
+MIN_RELATIVE_DEPTH = 1e-3
+
+#: Edges that are projected at once, and crossings that are tested at once.
+BLOCK_EDGES, BLOCK_CROSSINGS = 1 << 14, 1 << 16
+
+#: Tolerance of the depth of a visible line, in multiples of that of `pixel_neighbors`.
+LINE_TOLERANCE = 2.0
+
+
+def mark_crease_pixels(
+    gbuffer: GBuffer,
+    instance_id: int,
+    points: np.ndarray,
+    entry_of_cell: np.ndarray,
+    origin: int,
+    stride: int,
+    marks: np.ndarray,
+) -> Iterator[float]:
+    """Mark the pixels next to visible edges, in steps.
+
+    An edge crosses the segments between the centers of adjacent pixels. It is visible at one of the
+    two pixels if its depth is that of the surface there, extrapolated to the crossing.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    instance_id : int
+        The instance of the edges. Other instances have no marks.
+    points : (n, 2, 3) float64 ndarray
+        The ends of the edges in world space.
+    entry_of_cell : (cells,) int32 ndarray
+        The entry of the G-buffer in each cell of a frame with a margin, or -1.
+    origin, stride : int
+        Cell of the lower left pixel, and cells in a row.
+    marks : (P,) bool ndarray
+        Is set at the pixels found.
+
+    Yields
+    ------
+    float
+        Fraction of the edges that are done.
+    """
+    for start in range(0, len(points), BLOCK_EDGES):
+        lines = _on_screen(points[start : start + BLOCK_EDGES], gbuffer.camera)
+        for axis in (0, 1):
+            for crossing in _crossings(lines, axis, gbuffer.camera):
+                yield start / len(points)
+                _mark_visible(
+                    gbuffer, instance_id, axis, *crossing, entry_of_cell, origin, stride, marks
+                )
+
+
+def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (m, 2, 3) ends in pixels, with the depth of `pixel_neighbors.depth_slopes`."""
+    view, projection = camera.view, camera.projection
+    ends = points @ view[:3, :3].T + view[:3, 3]
+    if camera.is_perspective:
+        depth = -ends[..., 2]
+        least = MIN_RELATIVE_DEPTH * depth.max(axis=1)
+        ends, depth, least = (values[least > 0] for values in (ends, depth, least))
+        low = np.argmin(depth, axis=1)
+        row = np.arange(len(ends))
+        near, far = depth[row, low], depth[row, 1 - low]
+        share = np.clip((least - near) / np.maximum(far - near, 1e-300), 0.0, 1.0)[:, None]
+        ends[row, low] += share * (ends[row, 1 - low] - ends[row, low])
+    clip = ends @ projection[:, :3].T + projection[:, 3]
+    screen = np.empty_like(ends)
+    screen[..., :2] = 0.5 * (clip[..., :2] / clip[..., 3:] + 1) * (camera.width, camera.height)
+    screen[..., 2] = -1 / ends[..., 2] if camera.is_perspective else ends[..., 2]
+    return screen
+
+
+def _crossings(
+    lines: np.ndarray, axis: int, camera: Camera
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield where lines cross the pixel rows (axis 0) or columns (axis 1).
+
+    Yields
+    ------
+    index : (k,) int64 ndarray
+        Row, or column.
+    position, depth : (k,) float64 ndarray
+        Where along the row, or column, in pixels; and the depth there.
+    """
+    along, across = axis, 1 - axis
+    size = (camera.width, camera.height)
+    order = np.argsort(lines[:, :, across], axis=1)
+    low, high = (lines[np.arange(len(lines)), order[:, end]] for end in (0, 1))
+    first = np.clip(np.ceil(low[:, across] - 0.5), 0, size[across]).astype(np.int64)
+    stop = np.clip(np.ceil(high[:, across] - 0.5), 0, size[across]).astype(np.int64)
+    total = np.cumsum(np.maximum(stop - first, 0))
+    slope = (high - low) / np.maximum(high[:, across] - low[:, across], 1e-300)[:, None]
+    line_start = 0
+    while line_start < len(lines):
+        before = total[line_start - 1] if line_start else 0
+        line_stop = int(np.searchsorted(total, before + BLOCK_CROSSINGS, side="right"))
+        line_stop = max(line_stop, line_start + 1)
+        count = np.maximum(stop - first, 0)[line_start:line_stop]
+        line = np.repeat(np.arange(line_start, line_stop), count)
+        index = first[line] + np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+        point = low[line] + slope[line] * (index + 0.5 - low[line, across])[:, None]
+        inside = (point[:, along] > -0.5) & (point[:, along] < size[along] + 0.5)
+        yield index[inside], point[inside, along], point[inside, 2]
+        line_start = line_stop
+
+
+def _mark_visible(
+    gbuffer: GBuffer,
+    instance_id: int,
+    axis: int,
+    index: np.ndarray,
+    position: np.ndarray,
+    depth: np.ndarray,
+    entry_of_cell: np.ndarray,
+    origin: int,
+    stride: int,
+    marks: np.ndarray,
+) -> None:
+    """Mark the pixels on both sides of crossings at which the edge is visible."""
+    before = np.floor(position - 0.5).astype(np.int64)
+    for side in (0, 1):
+        place = before + side
+        cell = index * stride + place if axis == 0 else place * stride + index
+        entry = entry_of_cell.take(origin + cell)
+        found = np.flatnonzero(entry >= 0)
+        found = found[gbuffer.instance_id[entry[found]] == instance_id]
+        entry = entry[found]
+        surface_depth, slope_x, slope_y, tolerance = depth_slopes(gbuffer, entry)
+        offset = position[found] - (place[found] + 0.5)
+        surface_depth = surface_depth + (slope_x if axis == 0 else slope_y) * offset
+        is_visible = np.abs(depth[found] - surface_depth) <= LINE_TOLERANCE * tolerance
+        marks[entry[is_visible]] = True

@@ -106,19 +106,16 @@ def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))
     mean_length = max(float(length.mean()), 1e-300)
-    noise_angle *= min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length)
+    noise_angle *= min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     yield Progress(0.8, STEP_LABEL)
-    filtered_angle = _large_angles(normals, sides, MIN_FILTERED_SHARE * WEAK_SHARE * crease_angle)
-    is_bent = angle >= WEAK_SHARE * crease_angle
-    is_bent &= filtered_angle >= np.maximum(
-        MIN_FILTERED_SHARE * angle, NOISE_MULTIPLE * noise_angle
-    )
-    is_bent &= (
-        (angle >= SHARP_ANGLE)
-        | _is_between_fans(surface, edges.halfedges)
-        | (angle >= MIN_RATIO * _largest_around(surface, edges, angle))
-    )
-    bent = np.flatnonzero(is_bent)
+    bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
+    least = np.maximum(MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
+    bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
+    is_candidate = angle[bent] >= SHARP_ANGLE
+    is_candidate |= _is_between_fans(surface, edges.halfedges[bent])
+    if not is_candidate.all():
+        is_candidate |= angle[bent] >= MIN_RATIO * _largest_around(surface, edges, angle)[bent]
+    bent = bent[is_candidate]
     if not len(bent):
         return none
     yield Progress(0.9, STEP_LABEL)
@@ -152,7 +149,7 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """(I,) bool: whether normals are not interpolated across the edges of `Edges.halfedges`."""
+    """(n,) bool: whether normals are not interpolated across edges, given as of `Edges.halfedges`."""
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])

@@ -57,15 +57,18 @@ def filtered_normals_task(
     """
     label = "filtering normals"
     face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
-    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
-    area = np.sqrt(dot(vectors, vectors))
-    area /= max(float(area.max(initial=0.0)), 1e-300)
+    corner_vertex, face_start = surface.corner_vertex, surface.face_start
     unfiltered = normals = surface.face_normal
     if region is not None:
         inside = region[face_a] & region[face_b]
         rank = np.cumsum(region) - 1
         face_a, face_b = rank[face_a[inside]], rank[face_b[inside]]
-        area, unfiltered, normals = area[region], unfiltered[region], normals[region]
+        unfiltered = normals = normals[region]
+        corner_vertex = corner_vertex[region[surface.corner_face]]
+        face_start = np.concatenate([[0], np.cumsum(np.diff(face_start)[region])])
+    vectors = face_area_vectors(surface.vertices, corner_vertex, face_start)
+    area = np.sqrt(dot(vectors, vectors))
+    area /= max(float(area.max(initial=0.0)), 1e-300)
     for index in range(FILTER_ROUNDS):
         yield Progress(index / FILTER_ROUNDS, label)
         normal_a, normal_b = normals[face_a], normals[face_b]

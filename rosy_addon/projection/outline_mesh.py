@@ -8,9 +8,9 @@ import numpy as np
 
 from ..cache import Cache
 from ..field.creases import creases_task
-from ..field.frames import transform_components
 from ..field.surface import Surface, connected_components_task
 from ..progress import Progress, Task, subtask
+from .face_values import SIMILARITY_EPS
 
 
 class OutlineMesh(NamedTuple):
@@ -42,18 +42,26 @@ def outline_mesh_task(
         See `creases_task`. None: no creases.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
-        ends = (
-            yield from subtask(creases_task(surface.with_vertices(points.T), crease_angle), 0, 0.6)
-        ).ends
+        shape = surface
+        if not _is_similarity(linear):
+            shape = surface.with_vertices(surface.vertices @ linear.T)
+        ends = (yield from subtask(creases_task(shape, crease_angle), 0, 0.6)).ends
     yield Progress(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     task = connected_components_task(len(surface.vertices), pairs)
     part = yield from subtask(task, 0.6, 1.0)
     part = part[surface.triangle_vertex[:, 0]]
-    return OutlineMesh(points.T[ends], None if (part == part[0]).all() else part)
+    points = surface.vertices[ends] @ linear.T
+    return OutlineMesh(points, None if (part == part[0]).all() else part)
+
+
+def _is_similarity(linear: np.ndarray) -> bool:
+    """Return whether a matrix keeps all angles."""
+    gram = linear.T @ linear
+    scale = np.trace(gram) / 3
+    return bool(np.abs(gram - scale * np.eye(3)).max() <= SIMILARITY_EPS * scale)
 
 
 def cached_outline_mesh_task(

@@ -170,9 +170,10 @@ def _creases_and_parts_task(
     task = cached_outline_mesh_task(instance.surface, instance.matrix, crease_angle, cache)
     mesh = yield from subtask(task, 0.0, 0.5)
     defined = gbuffer.representation != 0
-    if len(mesh.crease_points):
+    if len(mesh.crease_ends):
         marks = np.zeros(len(grid.cell), dtype=bool)
-        points = mesh.crease_points + np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
+        points = mesh.crease_points(instance.surface, instance.matrix)
+        points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
         steps = mark_crease_pixels(
             gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride, marks
         )

@@ -34,8 +34,8 @@ MIN_FILTERED_SHARE = 0.1
 #: Shortest chain on a noisy mesh: its number of mean edges, for each radian of noise.
 MIN_EDGES_PER_NOISE = 100.0
 
-#: Mean edge, relative to `Surface.extent`, above which noise counts less: the edges of a coarse mesh
-#: are meant.
+#: Mean edge, relative to `Surface.extent`, above which the filtered normals count less: the edges of a
+#: coarse mesh are meant.
 NOISY_EDGE_LENGTH = 0.02
 
 #: Rings of faces around sharp edges in which normals are filtered.
@@ -106,10 +106,11 @@ def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))
     mean_length = max(float(length.mean()), 1e-300)
-    noise_angle *= min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
+    density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
+    noise_angle *= density
     yield Progress(0.8, STEP_LABEL)
     bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
-    least = np.maximum(MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
+    least = np.maximum(density * MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
     bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
     is_candidate = angle[bent] >= SHARP_ANGLE
     is_candidate |= _is_between_fans(surface, edges.halfedges[bent])

@@ -19,7 +19,7 @@ from ..progress import Task, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
-from ..projection.outline_mesh import outline_mesh_task
+from ..projection.outline_mesh import cached_outline_mesh_task
 from ..projection.rest_coordinates import matrix_scale
 from ..projection.surface_lines import cached_surface_lines_task, rest_matrix
 from .device import Device
@@ -38,8 +38,11 @@ from .mesh_buffers import (
 #: frame of an animation has new meshes.
 IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
 
-#: Textures of even lines that are kept for each mesh, and bytes of the lines in memory.
-MAX_LINE_TEXTURES, MAX_LINE_BYTES = 3, 1 << 28
+#: Textures of even lines that are kept for each mesh.
+MAX_LINE_TEXTURES = 3
+
+#: Size limit of what was computed from meshes in memory: even lines, creases and parts.
+MAX_MESH_CACHE_BYTES = 1 << 28
 
 #: Maximum side, in texels, of an image that tones are sampled from.
 MAX_TONE_IMAGE_SIDE = 2048
@@ -157,7 +160,7 @@ class GpuResources:
         self._last_used: dict[tuple, int] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
-        self._line_cache = Cache(MAX_LINE_BYTES)
+        self._mesh_cache = Cache(MAX_MESH_CACHE_BYTES)
 
     @property
     def meshes(self) -> list[GpuMesh]:
@@ -179,7 +182,7 @@ class GpuResources:
         """Free all resources."""
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
             cache.clear()
-        self._line_cache.clear()
+        self._mesh_cache.clear()
 
     def upload_task(self, instances: Sequence[MeshInstance], display: str) -> Task[list[DrawItem]]:
         """Return draw items of mesh instances. Meshes on the device are not sent again.
@@ -227,8 +230,11 @@ class GpuResources:
         if current is not None and current.crease_angle == crease_angle:
             return current
         linear, _ = split_matrix(item.instance.matrix)
-        found = yield from outline_mesh_task(surface, linear, crease_angle)
-        points = (found.crease_points - mesh.buffers.center).reshape(-1, 3)
+        found = yield from cached_outline_mesh_task(
+            surface, linear, crease_angle, self._mesh_cache
+        )
+        self._mesh_cache.evict_over_limit()
+        points = found.crease_points(surface, linear).reshape(-1, 3) - mesh.buffers.center
         parts = np.empty((0, 4)) if found.triangle_part is None else found.triangle_part
         parts = np.pad(parts.ravel(), (0, -parts.size % 4)).reshape(-1, 4)
         textures = []
@@ -315,9 +321,9 @@ class GpuResources:
         if key not in textures:
             surface = instance.surface
             lines = yield from cached_surface_lines_task(
-                surface, instance.matrix, instance.field, display, spacing, self._line_cache
+                surface, instance.matrix, instance.field, display, spacing, self._mesh_cache
             )
-            self._line_cache.evict_over_limit()
+            self._mesh_cache.evict_over_limit()
             rows, node_count = line_records(lines)
             if len(rows) > self.device.max_texture_size:
                 raise RosyError(

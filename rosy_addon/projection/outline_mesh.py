@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
+from ..cache import Cache, content_hash
 from ..field.creases import creases_task
 from ..field.surface import Surface, connected_components_task
 from ..progress import Progress, Task, subtask
@@ -14,24 +14,38 @@ from .face_values import SIMILARITY_EPS
 
 
 class OutlineMesh(NamedTuple):
-    """The creases and the parts of a mesh.
+    """The creases and the parts of a mesh, which all its deformations share.
 
     Attributes
     ----------
-    crease_points : (n, 2, 3) float64 ndarray
-        The ends of each edge of a crease, in world space without the translation.
+    crease_ends : (n, 2) int32 ndarray
+        The vertices of each edge of a crease.
     triangle_part : (T,) int32 ndarray or None
         The part of each triangle. Parts are not connected with each other. None if there is only one.
     """
 
-    crease_points: np.ndarray
+    crease_ends: np.ndarray
     triangle_part: np.ndarray | None
+
+    def crease_points(self, surface: Surface, matrix: np.ndarray) -> np.ndarray:
+        """Return the ends of the edges of creases, (n, 2, 3), in world space without the translation.
+
+        Parameters
+        ----------
+        surface : Surface
+        matrix : (3, 3) or (4, 4) ndarray
+            Object to world space.
+        """
+        linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+        return surface.vertices[self.crease_ends] @ linear.T
 
 
 def outline_mesh_task(
     surface: Surface, matrix: np.ndarray, crease_angle: float | None
 ) -> Task[OutlineMesh]:
-    """Find the creases and the parts of a mesh.
+    """Find the creases and the parts of a mesh, in its rest shape.
+
+    Creases neither appear nor vanish while a mesh is deformed, so outlines do not flicker.
 
     Parameters
     ----------
@@ -41,20 +55,39 @@ def outline_mesh_task(
     crease_angle : float or None
         See `creases_task`. None: no creases.
     """
-    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
-        shape = surface
+        shape, linear = surface.in_rest_shape(), np.asarray(matrix, dtype=np.float64)[:3, :3]
         if not _is_similarity(linear):
-            shape = surface.with_vertices(surface.vertices @ linear.T)
-        ends = (yield from subtask(creases_task(shape, crease_angle), 0, 0.6)).ends
+            shape = shape.with_vertices(shape.vertices @ linear.T)
+        ends = (yield from subtask(creases_task(shape, crease_angle), 0.0, 0.6)).ends
     yield Progress(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     task = connected_components_task(len(surface.vertices), pairs)
     part = yield from subtask(task, 0.6, 1.0)
     part = part[surface.triangle_vertex[:, 0]]
-    points = surface.vertices[ends] @ linear.T
-    return OutlineMesh(points, None if (part == part[0]).all() else part)
+    return OutlineMesh(ends, None if (part == part[0]).all() else part)
+
+
+def cached_outline_mesh_task(
+    surface: Surface, matrix: np.ndarray, crease_angle: float | None, cache: Cache | None
+) -> Task[OutlineMesh]:
+    """Do the same as `outline_mesh_task`, with results stored in a cache if one is given.
+
+    All deformations of a mesh share a result.
+    """
+    if cache is None:
+        return (yield from outline_mesh_task(surface, matrix, crease_angle))
+    linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
+    if _is_similarity(linear):
+        linear = np.eye(3)
+    shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
+    return (
+        yield from cache.get_or_create_task(
+            ("outline mesh", *shape_key, linear.tobytes(), crease_angle),
+            lambda: outline_mesh_task(surface, linear, crease_angle),
+        )
+    )
 
 
 def _is_similarity(linear: np.ndarray) -> bool:
@@ -62,18 +95,3 @@ def _is_similarity(linear: np.ndarray) -> bool:
     gram = linear.T @ linear
     scale = np.trace(gram) / 3
     return bool(np.abs(gram - scale * np.eye(3)).max() <= SIMILARITY_EPS * scale)
-
-
-def cached_outline_mesh_task(
-    surface: Surface, matrix: np.ndarray, crease_angle: float | None, cache: Cache | None
-) -> Task[OutlineMesh]:
-    """Do the same as `outline_mesh_task`, with results stored in a cache if one is given."""
-    if cache is None:
-        return (yield from outline_mesh_task(surface, matrix, crease_angle))
-    linear = np.ascontiguousarray(np.asarray(matrix, dtype=np.float64)[:3, :3])
-    return (
-        yield from cache.get_or_create_task(
-            ("outline mesh", surface, linear.tobytes(), crease_angle),
-            lambda: outline_mesh_task(surface, linear, crease_angle),
-        )
-    )

@@ -915,6 +915,68 @@ def test_creases_of_a_cube(card, crossing, degree, display):
         assert_parity(card, [instance], view(perspective=perspective, distance=8.0), outlined)
 
 
+def boxes():
+    """A plate, and a block that intersects it, as one mesh with sharp edges."""
+    box = cube()
+    block = (box.vertices - (0.5, 0.5, 0.0)) * (0.5, 0.3, 0.8)
+    plate = (box.vertices - 0.5) * (2.0, 2.0, 0.2)
+    corners = np.concatenate([box.corner_vertex, box.corner_vertex + 8])
+    start = np.arange(0, len(corners) + 1, 4)
+    return build_surface(np.concatenate([plate, block]), corners, start, sharp_angle=0.5)
+
+
+def noisy_ball():
+    """A dense ball with bumps, which hide each other at grazing angles."""
+    surface = icosphere(4)
+    noise = 1 + 0.012 * np.random.default_rng(2).standard_normal((len(surface.vertices), 1))
+    return build_surface(surface.vertices * noise, surface.corner_vertex, surface.face_start)
+
+
+#: White paper with an outline only.
+OUTLINE_ONLY = Look(ink="hatch", light="scene", shading=0.0, length=4, outline=1.5)
+
+
+@pytest.mark.parametrize(
+    ("supersampling", "perspective"), [(1, True), (2, False), *long((1, False), (3, True))]
+)
+@pytest.mark.parametrize("name", ["boxes", "noise", "degrees"])
+def test_outlines_alone(card, name, supersampling, perspective):
+    """Creases, parts and short marks, without hatching: nearly all pixels of the lines agree."""
+    plate = MeshInstance(boxes(), placed(1.5 * np.eye(3)), axis_field(boxes(), 4, AXIS))
+    bumps = noisy_ball()
+    instances = {
+        "boxes": [plate],
+        "noise": [MeshInstance(bumps, np.eye(4), axis_field(bumps, 4, AXIS))],
+        # The second instance has another degree, and a matrix that changes its shape.
+        "degrees": [plate, MeshInstance(boxes(), placed(SHEAR, (0.4, 0, 0.4)), None)],
+    }[name]
+    if name == "degrees":
+        instances[1] = replace(instances[1], field=axis_field(boxes(), 2, AXIS))
+    camera = view(perspective=perspective, distance=5.0)
+    camera = camera.resized(camera.width * supersampling, camera.height * supersampling)
+    pair = assert_parity(
+        card, instances, camera, replace(OUTLINE_ONLY, supersampling=supersampling)
+    )
+    both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
+    lines = both & (pair.numpy[..., 0] < 0.5)
+    differs = both & (np.abs(pair.card - pair.numpy).max(axis=2) > 0.1)
+    assert lines.sum() > 200 and differs.sum() < 0.03 * lines.sum()
+
+
+def test_creases_on_the_device_are_found_again_for_another_angle(card):
+    """The creases of a mesh stay on the device until the crease angle changes."""
+    instance = MeshInstance(boxes(), np.eye(4), axis_field(boxes(), 4, AXIS))
+    item = card.upload([instance], "smooth")[0]
+
+    def textures(crease_angle):
+        return run_to_completion(card.resources.outline_textures_task(item, crease_angle))
+
+    first = textures(0.7)
+    assert first.crease_count == 24 and first.triangle_parts is not None
+    assert textures(0.7) is first and textures(1.7).crease_count == 0
+    assert textures(None).crease_count == 0
+
+
 @pytest.mark.parametrize("degree", [1, 3, 4])
 def test_normals_with_zeros_of_either_sign(card, degree):
     """The frame of a normal depends on the sign of its z, also if z is 0."""

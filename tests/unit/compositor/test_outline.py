@@ -1,0 +1,255 @@
+"""Outlines: no specks, all silhouettes and creases, and stability under motion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from harness.outline_marks import covered_share, mark_lengths, to_image, visible_silhouettes
+from scipy.ndimage import maximum_filter
+from shapes import cube, cylinder, from_triangles, icosphere, torus
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.outline import (
+    FULL_MARK_LENGTH,
+    MIN_MARK_LENGTH,
+    _mark_strength_task,
+    outline_coverage,
+)
+from rosy_addon.field.frames import normalize
+from rosy_addon.field.generate import axis_field
+from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.outline_mesh import outline_mesh_task
+from rosy_addon.projection.project import project
+
+#: Width of outlines, and side of pictures in pixels.
+WIDTH, SIZE = 1.3, 320
+
+#: Marks from this length on are no specks.
+MIN_LENGTH = 6
+
+
+def instance_of(surface: Surface, matrix=None) -> MeshInstance:
+    matrix = np.eye(4) if matrix is None else matrix
+    return MeshInstance(surface, matrix, axis_field(surface, 4, (0.3, 0.2, 1.0)))
+
+
+def outline_of(instance, camera, **settings):
+    gbuffer = project([instance], camera)
+    coverage = outline_coverage(gbuffer, Look(outline=settings.pop("outline", WIDTH), **settings))
+    return to_image(gbuffer, coverage)
+
+
+@lru_cache(maxsize=4)
+def noisy(name: str, flat: bool) -> Surface:
+    """A dense mesh whose vertices are moved along their normals."""
+    surface = torus(160, 80) if name == "torus" else icosphere(5)
+    edge = 0.025 if name == "torus" else 0.04
+    normal = np.zeros_like(surface.vertices)
+    np.add.at(normal, surface.corner_vertex, surface.corner_normal)
+    noise = np.random.default_rng(5).standard_normal((len(normal), 1))
+    return build_surface(
+        surface.vertices + 0.25 * edge * noise * normalize(normal),
+        surface.corner_vertex,
+        surface.face_start,
+        flat_faces=np.full(surface.face_count, flat),
+    )
+
+
+def combined(*parts: tuple[np.ndarray, np.ndarray]) -> Surface:
+    """Boxes as one mesh, with sharp edges: each is given by its center and its half sides."""
+    box = cube()
+    points, corners, count = [], [], 0
+    for center, half_sides in parts:
+        points.append((box.vertices - 0.5) * 2 * np.asarray(half_sides) + center)
+        corners.append(box.corner_vertex + count)
+        count += len(box.vertices)
+    corners = np.concatenate(corners)
+    start = np.arange(0, len(corners) + 1, 4)
+    return build_surface(np.concatenate(points), corners, start, sharp_angle=0.5)
+
+
+# --- specks --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("name", ["torus", "sphere"])
+def test_noise_makes_no_specks(name, flat):
+    instance = instance_of(noisy(name, flat))
+    camera = orbit_camera(instance.face_points(), 30.0, 35.0, SIZE, SIZE)
+    lengths = mark_lengths(outline_of(instance, camera))
+    assert lengths.max() > SIZE / 2 and (lengths >= MIN_LENGTH).all()
+
+
+@pytest.mark.parametrize("supersampling", [2, 3])
+def test_lengths_of_marks_are_in_pixels_of_the_finished_picture(supersampling):
+    instance = instance_of(noisy("torus", False))
+    side = 200 * supersampling
+    camera = orbit_camera(instance.face_points(), 30.0, 35.0, side, side)
+    coverage = outline_of(
+        instance, camera, outline=WIDTH * supersampling, supersampling=supersampling
+    )
+    blocks = coverage.reshape(200, supersampling, 200, supersampling).max(axis=(1, 3))
+    assert (mark_lengths(blocks) >= MIN_LENGTH).all()
+
+
+@pytest.mark.parametrize("name", ["torus", "noisy torus", "tube", "boxes"])
+def test_silhouettes_are_covered(name):
+    """At least 0.98 of the silhouettes that a search over all edges finds."""
+    surface = {
+        "torus": lambda: torus(),
+        "noisy torus": lambda: noisy("torus", False),
+        "tube": lambda: cylinder(64, 4),
+        "boxes": lambda: combined(((0, 0, 0), (1, 1, 0.2)), ((0.2, 0.3, 0.4), (0.3, 0.2, 0.3))),
+    }[name]()
+    instance = instance_of(surface)
+    for angles in ((30.0, 35.0), (-70.0, 8.0)):
+        camera = orbit_camera(instance.face_points(), *angles, SIZE, SIZE)
+        points, lengths = visible_silhouettes(instance, camera)
+        assert lengths.sum() > SIZE
+        assert covered_share(outline_of(instance, camera), points, lengths) >= 0.98
+
+
+def test_tiny_parts_keep_their_outlines():
+    """A bolt of 5 pixels in front of a plate, also where it belongs to the same mesh."""
+    plate, bolt = ((0, 0, 0), (1, 0.1, 1)), ((0.305, -0.4, 0.205), (0.023, 0.1, 0.023))
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=2.4)
+    coverage = outline_of(instance_of(combined(plate, bolt)), camera)
+    assert sorted(mark_lengths(coverage))[0] == 5
+    bare = outline_of(instance_of(combined(bolt)), camera)
+    np.testing.assert_array_equal(bare > 0, (coverage > 0) & (bare > 0))
+    assert (bare > 0.9).sum() >= 12
+
+
+# --- creases -------------------------------------------------------------------------------------
+
+
+def line_is_covered(coverage, camera, start, end, least=0.6) -> bool:
+    """Whether all points on a line in space have a coverage in the picture, within a pixel."""
+    points = np.linspace(start, end, 400)
+    clip = np.c_[points, np.ones(400)] @ (camera.projection @ camera.view).T
+    place = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (camera.width, camera.height)
+    column, row = place.astype(int).T
+    return bool((maximum_filter(coverage, 3)[row, column] >= least).all())
+
+
+@pytest.mark.parametrize("side", [24, 100, SIZE])
+@pytest.mark.parametrize("sharp", [False, True])
+def test_all_edges_of_a_cube_are_drawn(sharp, side):
+    """Without gaps, at any size, also if the normals are interpolated across its edges."""
+    box = cube()
+    options = {"sharp_angle": 1.0} if sharp else {}
+    box = build_surface(box.vertices, box.corner_vertex, box.face_start, **options)
+    instance = instance_of(box)
+    camera = orbit_camera(instance.face_points(), 35.0, 25.0, side, side)
+    coverage = outline_of(instance, camera)
+    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
+    corner = box.vertices[np.argmin(np.linalg.norm(box.vertices - eye, axis=1))]
+    for axis in range(3):
+        end = corner.copy()
+        end[axis] = 1 - end[axis]
+        assert line_is_covered(coverage, camera, corner, end)
+
+
+def test_creases_of_dense_meshes_have_no_gaps():
+    """A ridge whose triangles are smaller than a pixel."""
+    axis = np.linspace(-1, 1, 301)
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    corner = np.arange(300 * 301).reshape(300, 301)[:, :-1].ravel()
+    above = corner + 301
+    triangles = np.concatenate(
+        [
+            np.stack([corner, above, above + 1], axis=1),
+            np.stack([corner, above + 1, corner + 1], axis=1),
+        ]
+    )
+    points = np.stack([x, y, -0.6 * np.abs(y - 1e-3)], axis=-1).reshape(-1, 3)
+    instance = instance_of(from_triangles(points, triangles))
+    camera = orbit_camera(instance.face_points(), 20.0, 50.0, 200, 200)
+    coverage = outline_of(instance, camera)
+    top = points[np.argmax(points[:301, 2])]
+    assert line_is_covered(coverage, camera, (-0.95, top[1], top[2]), (0.95, top[1], top[2]))
+
+
+def test_hidden_creases_are_not_drawn():
+    """A wall in front of a box hides its edges."""
+    boxes = combined(((0, 0, 0), (0.5, 0.5, 0.5)), ((0, -1.5, 0), (1, 0.1, 1)))
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 200, 200, scale=2.4)
+    coverage = outline_of(instance_of(boxes), camera)
+    assert not coverage[30:170, 30:170].any() and coverage.any()
+
+
+def test_parts_that_intersect_have_a_line_between_them():
+    boxes = combined(((0, 0, 0), (1, 1, 0.1)), ((0, 0, 0.3), (0.4, 0.4, 0.4)))
+    camera = orbit_camera(boxes.vertices, 30.0, 40.0, SIZE, SIZE)
+    coverage = outline_of(instance_of(boxes), camera)
+    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
+    near = 0.4 * np.sign(eye[:2])
+    for end in ((-near[0], near[1]), (near[0], -near[1])):
+        assert line_is_covered(coverage, camera, (*near, 0.1), (*end, 0.1))
+    crossing = outline_of(instance_of(boxes), camera, cross_creases=True)
+    assert not line_is_covered(crossing, camera, (*near, 0.1), (-near[0], near[1], 0.1))
+
+
+# --- motion --------------------------------------------------------------------------------------
+
+
+def test_creases_near_the_limit_do_not_flicker():
+    """A ridge whose angle wavers around the crease angle, seen from angles that change a little.
+
+    From frame to frame, the ink changes by no more than that of a silhouette would.
+    """
+    count = 60
+    x = np.linspace(-1, 1, count)
+    angle = 0.7 + 0.03 * np.sin(20 * x)
+    ridge = np.stack([x, 0 * x, 0 * x], axis=1)
+    sides = [np.stack([x, sign + 0 * x, -np.tan(angle / 2)], axis=1) for sign in (-1.0, 1.0)]
+    points = np.concatenate([sides[0], ridge, sides[1]])
+    first = np.arange(count - 1)
+    rows = [np.stack([first + row * count, first + row * count + 1], axis=1) for row in range(3)]
+    quads = np.concatenate([np.c_[rows[k], rows[k + 1][:, ::-1]] for k in range(2)])
+    surface = build_surface(points, quads.ravel(), np.arange(0, quads.size + 1, 4), sharp_angle=0.4)
+    instance = instance_of(surface)
+    inks = []
+    for step in range(12):
+        camera = orbit_camera(points, 20.0 + 0.15 * step, 50.0, 200, 200)
+        coverage = outline_of(instance, camera)
+        assert line_is_covered(coverage, camera, (-0.95, 0, 0), (0.95, 0, 0))
+        inks.append(coverage.sum())
+    assert np.abs(np.diff(inks)).max() < 0.02 * np.mean(inks)
+
+
+@pytest.mark.parametrize("block_side", [1, 2])
+def test_marks_grow_without_a_jump(block_side):
+    """The width of the line of a mark increases with its length, from 0 to the full width."""
+    lengths = np.arange(2, FULL_MARK_LENGTH + 4)
+    frame = np.zeros((4 * len(lengths), 60), dtype=bool)
+    for index, length in enumerate(lengths):
+        frame[4 * index : 4 * index + 2, 10 : 10 + length] = True
+    frame = frame.repeat(block_side, axis=0).repeat(block_side, axis=1)
+    pixel = np.flatnonzero(frame).astype(np.int32)
+    border = np.zeros(len(pixel), dtype=np.uint8)
+    strength = run_to_completion(_mark_strength_task(pixel, border, frame.shape[1], block_side))
+    mark = pixel // frame.shape[1] // (4 * block_side)
+    by_length = np.array([np.unique(strength[mark == index]) for index in range(len(lengths))])
+    by_length = by_length[:, 0]
+    assert not by_length[lengths < MIN_MARK_LENGTH].any()
+    assert (by_length[lengths >= FULL_MARK_LENGTH] == 1).all()
+    assert (np.diff(by_length) >= 0).all() and np.diff(by_length).max() < 0.2
+
+
+def test_deformed_meshes_keep_their_creases():
+    """Creases are those of the rest shape, so that none appears or vanishes in an animation."""
+    box = cube()
+    box = build_surface(box.vertices, box.corner_vertex, box.face_start, sharp_angle=1.0)
+    sheared = box.vertices.copy()
+    sheared[:, 0] += 2.0 * box.vertices[:, 2]
+    deformed = build_surface(
+        sheared, box.corner_vertex, box.face_start, sharp_angle=0.1, rest_vertices=box.vertices
+    )
+    task = outline_mesh_task(deformed, np.eye(4), 1.4)
+    assert len(run_to_completion(task).crease_ends) == 12

@@ -102,6 +102,22 @@ def test_parity_of_uneven_lines(rosy, card, surface_of, degree, anchor):
     assert pair.likeness >= 0.98
 
 
+@pytest.mark.parametrize("supersampling", [1, 2])
+@pytest.mark.parametrize("name", ["Suzanne", "torus"])
+def test_parity_of_outlines(rosy, card, surface_of, name, supersampling):
+    """White paper with an outline only."""
+    surface = surface_of(name)
+    camera = camera_of_shape(rosy, name, surface, SIZE * supersampling)
+    instance = rosy.MeshInstance(surface, np.eye(4), rosy.generate(surface, "axis", 4))
+    look = rosy.Look(
+        ink="hatch", light="scene", shading=0.0, length=4, outline=1.5, supersampling=supersampling
+    )
+    pair = draw_pair(rosy, card, [instance], camera, look)
+    lines = (pair.numpy[..., 3] == 1) & (pair.numpy[..., 0] < 0.5)
+    assert lines.sum() > SIZE
+    assert pair.likeness >= 0.98
+
+
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     """The input of a bake: a field on faces, a modifier, instances, and a shifted lens."""

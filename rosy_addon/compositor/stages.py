@@ -94,7 +94,7 @@ class ComposeStages:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""
         coverage = yield from self._cache.get_or_create_task(
             ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
-            lambda: outline_task(self._gbuffer, look, self._cache),
+            lambda: outline_task(self._gbuffer, look, self._mesh_cache),
         )
         return coverage[field.gbuffer_index]
 

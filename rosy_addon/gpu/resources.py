@@ -230,9 +230,7 @@ class GpuResources:
         if current is not None and current.crease_angle == crease_angle:
             return current
         linear, _ = split_matrix(item.instance.matrix)
-        found = yield from cached_outline_mesh_task(
-            surface, linear, crease_angle, self._mesh_cache
-        )
+        found = yield from cached_outline_mesh_task(surface, linear, crease_angle, self._mesh_cache)
         self._mesh_cache.evict_over_limit()
         points = found.crease_points(surface, linear).reshape(-1, 3) - mesh.buffers.center
         parts = np.empty((0, 4)) if found.triangle_part is None else found.triangle_part

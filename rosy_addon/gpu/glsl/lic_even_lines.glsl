@@ -28,6 +28,6 @@ float even_line_coverage(vec4 line_sample, float width)
 // weighted breaks and the paper grain.
 float uneven_line_width(float mean_width, float variation, float break_weight)
 {
-  float width = coverage_threshold(mean_width, 0) + variation / ((1.0 - break_weight) * sqrt(12.0));
+  float width = coverage_threshold(mean_width, 0) + variation / ((1.0 - break_weight) * (2.0 * sqrt(3.0)));
   return clamp(width, 0.0, 1.0);
 }

@@ -22,6 +22,7 @@ from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
     MAX_SPACING_RATIO,
     LightSource,
+    fan_vertices,
     lit_tone,
     pixel_spacing,
     spacing_by_curvature_task,
@@ -29,6 +30,7 @@ from .spacing import (
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
+    with_vertices_of_fans,
 )
 from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
@@ -170,32 +172,35 @@ def _trace_instance(
 ) -> Task[Strokes]:
     """Return all strokes of a mesh instance, with its outline, including hidden parts."""
     yield Progress(0.0, "computing the spacing")
-    spacing = _vertex_spacing(instance, camera, style)
+    # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
+    by_fan = with_vertices_of_fans(instance)
+    spacing = _vertex_spacing(by_fan, camera, style)
     yield Progress(0.005, "computing the spacing")
-    tone = lit_tone(instance, camera, lights) if style.tone else None
+    tone = lit_tone(by_fan, camera, lights) if style.tone else None
     # Without changes of the spacing, all of the tone is in the widths.
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     if tone is not None:
         spacing = spacing_by_tone(spacing, tone, max_ratio)
     if style.curvature:
-        task = spacing_by_curvature_task(instance.surface, spacing, style.curvature)
-        spacing = yield from subtask(task, 0.01, 0.02)
+        task = spacing_by_curvature_task(instance.surface, 1.0, style.curvature)
+        factor = yield from subtask(task, 0.01, 0.02)
+        spacing = spacing * factor[fan_vertices(instance.surface)]
     yield Progress(0.02, "computing the spacing")
-    check_stroke_memory(instance, spacing, camera, clipped)
+    check_stroke_memory(by_fan, spacing, camera, clipped)
     mesh = yield from subtask(
         tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.03, 0.1
     )
-    task = trace_on_mesh_task(mesh, spacing, surface_name=instance.surface.name)
+    corner_spacing = spacing[by_fan.surface.triangle_vertex]
+    task = trace_on_mesh_task(mesh, corner_spacing, surface_name=instance.surface.name)
     strokes = yield from subtask(task, 0.1, 0.9)
-    if style.overshoot:
-        strokes = mark_free_boundary_ends(strokes, mesh)
+    strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
         # Strokes may cross creases, families do not.
         mesh = yield from subtask(tangent_mesh_task(instance, cache=cache), 0.9, 0.92)
     task = label_families_task(strokes, mesh, camera.view[0, :3])
     strokes = yield from subtask(task, 0.92, 0.95)
     if tone is not None:
-        point_tone = values_at_points(strokes, instance.surface, tone)
+        point_tone = values_at_points(strokes, by_fan.surface, tone)
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
     if style.gaps:
         task = crossing_gaps_task(strokes, style.gaps, weave=True)
@@ -203,10 +208,12 @@ def _trace_instance(
     if style.taper:
         ends = ~(yield from subtask(head_on_ends_task(strokes), 0.98, 0.99))
         yield Progress(0.99, "shaping ends")
-        if style.overshoot:
-            # Ends that will be extended are tapered after the extension.
-            ends &= ~strokes.free_end_mask
+        # Strokes reach creases and borders at full width, as they reach silhouettes. Those that will be
+        # extended are tapered after the extension.
+        ends &= ~strokes.free_end_mask
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
+    if not style.overshoot:
+        strokes = replace(strokes, free_ends=None)
     if style.outline:
         yield Progress(0.99, "finding outlines")
         strokes = Strokes.concatenate(strokes, outline(instance, camera))

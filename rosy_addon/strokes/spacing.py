@@ -53,6 +53,34 @@ class LightSource(Protocol):
     strength: float
 
 
+def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
+    """Return a mesh instance with a vertex for each smooth fan, so that vertices have one normal.
+
+    Spacing and tone at its vertices are those of either side of a sharp edge. At the vertices of the
+    original they would be mixed: a dark face would be lighter beside its edges, and a light one darker.
+
+    Returns
+    -------
+    MeshInstance
+        Vertex k is fan k; faces, corners and triangles are the same.
+    """
+    surface = instance.surface
+    split = replace(
+        surface,
+        vertices=surface.vertices[fan_vertices(surface)],
+        corner_vertex=surface.corner_fan,
+        rest_vertices=None,
+    )
+    return replace(instance, surface=split)
+
+
+def fan_vertices(surface: Surface) -> np.ndarray:
+    """Return (K,) int32: the vertex of each smooth fan."""
+    vertex = np.zeros(int(surface.corner_fan.max()) + 1, dtype=np.int32)
+    vertex[surface.corner_fan] = surface.corner_vertex
+    return vertex
+
+
 def pixel_spacing(instance: MeshInstance, camera: Camera, pixels: float) -> np.ndarray:
     """Return (V,) float64: the lengths in world space of a number of pixels at the vertices.
 

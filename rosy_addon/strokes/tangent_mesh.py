@@ -319,20 +319,22 @@ def corner_values(mesh: TangentMesh, values: np.ndarray | float, surface_name: s
     Parameters
     ----------
     mesh : TangentMesh
-    values : float, or (V,) or (F,) ndarray
-        One value, or one for each vertex or face.
+    values : float, or (V,), (F,) or (T, 3) ndarray
+        One value, or one for each vertex, face or corner of a triangle.
     surface_name : str
         For the error message.
 
     Raises
     ------
     RosyError
-        If the number of values is that of neither the vertices nor the faces.
+        If the number of values is that of neither the vertices, the faces nor the corners.
     """
     values = np.asarray(values, dtype=np.float64)
     shape = mesh.triangle_vertex.shape
     if values.ndim == 0:
         return np.full(shape, float(values))
+    if values.shape == shape:
+        return values
     face_count, vertex_count = int(mesh.face.max()) + 1, int(mesh.triangle_vertex.max()) + 1
     if values.shape == (face_count,):
         return np.repeat(values[mesh.face][:, None], 3, axis=1)

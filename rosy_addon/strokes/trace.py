@@ -61,9 +61,9 @@ def trace_strokes_task(
     ----------
     instance : MeshInstance
         With a field.
-    spacing : float, or (V,) or (F,) array_like
-        Spacing between strokes of a family in world space: one value, or one for each vertex or
-        face.
+    spacing : float, or (V,), (F,) or (T, 3) array_like
+        Spacing between strokes of a family in world space: one value, or one for each vertex, face
+        or corner of a triangle.
     rules : SeparationRules, optional
     display : {"smooth", "flat"}
         As in `build_tangent_mesh`.

@@ -2,18 +2,62 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..field.frames import dot, normalize
+from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
+from .polyline_chains import chain_segments, point_keys
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
+from .visibility import pixel_size
 
 #: `Strokes.names` of an outline: the kind of line of each family.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
+
+#: A gap in a crease is closed along edges with at least this fraction of the crease angle, and up to this
+#: length in pixels (hysteresis as in Canny, "A Computational Approach to Edge Detection", PAMI 1986).
+WEAK_CREASE_RATIO, MAX_WEAK_PX = 0.6, 16.0
+
+#: Edges by which a gap in a crease is searched from each of its ends.
+WEAK_STEPS = 4
+
+#: Shortest crease in pixels if it is as sharp as the angle, in radians. Sharper ones may be shorter, but
+#: count as at most a right angle; blunter ones have to be longer.
+MIN_CREASE_PX, REFERENCE_ANGLE = 12.0, np.radians(60)
+
+
+class Segments(NamedTuple):
+    """k straight segments of lines on triangles, in world space.
+
+    Attributes
+    ----------
+    ends : (k, 2, 3) float64 ndarray
+    normals : (k, 2, 3) float64 ndarray
+        Unit shading normals at the ends.
+    triangle : (k,) int64 ndarray
+    """
+
+    ends: np.ndarray
+    normals: np.ndarray
+    triangle: np.ndarray
+
+    @staticmethod
+    def concatenate(first: Segments, second: Segments) -> Segments:
+        """Return both sets, one after the other."""
+        return Segments(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
+
+
+class _Corners(NamedTuple):
+    """The (T, 3, 3) corners of triangles, the shading normals there and the normals of triangles."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    flat: np.ndarray
 
 
 def outline(
@@ -23,16 +67,17 @@ def outline(
 
     Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
     the camera. They pass smoothly through the triangles (Hertzmann and Zorin, "Illustrating Smooth
-    Surfaces", SIGGRAPH 2000).
+    Surfaces", SIGGRAPH 2000). At sharp edges that are no creases, they follow the edges.
 
     Parameters
     ----------
     instance : MeshInstance
     camera : Camera, optional
-        Camera of the silhouettes. Without a camera there are no silhouettes.
+        Camera of the silhouettes. With a camera, gaps in creases are closed, and creases are left out
+        that are too short and blunt in pixels. Without a camera there are no silhouettes.
     crease_angle : float
         Smallest angle in radians between the normals of the two triangles at a crease. Creases are
-        only at edges across which normals are not interpolated.
+        only at edges across which normals are not interpolated, and in gaps between them.
 
     Returns
     -------
@@ -41,141 +86,204 @@ def outline(
     """
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
-    points = instance.world_points()
-    corner = points[surface.triangle_vertex]
-    linear = matrix[:3, :3]
-    normal = normalize(surface.corner_normal @ cofactor_matrix(linear).T)[surface.triangles]
-    creases, borders = _crease_and_border_corners(surface, corner, crease_angle)
-    segments = [
-        _silhouettes(surface, corner, normal, camera) if camera is not None else _no_segments(),
-        _edge_segments(corner, normal, creases),
-        _edge_segments(corner, normal, borders),
-    ]
-    return _to_strokes([_chain_segments(*family) for family in segments], surface.triangle_face)
+    points = instance.world_points()[surface.triangle_vertex]
+    normals = normalize(surface.corner_normal @ cofactor_matrix(matrix[:3, :3]).T)
+    flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
+    corners = _Corners(points, normals[surface.triangles], flat)
+    vertex = surface.triangle_vertex.ravel()
+    edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    angle = angle_between(flat[a // 3], flat[b // 3])
+    is_sharp = is_sharp_edge(surface, a, b)
+    is_crease = is_sharp & (angle > crease_angle)
+    is_border = np.ones(len(edges.face_count), dtype=bool)
+    is_border[edges.interior] = False
+    borders = np.flatnonzero(is_border[edges.corner_edge])
+    if camera is None:
+        silhouettes = _edge_segments(corners, a[:0])
+        creases = _chains(_edge_segments(corners, a[is_crease]))
+    else:
+        is_blunt = is_sharp & ~is_crease
+        silhouettes = Segments.concatenate(
+            _smooth_silhouettes(corners, camera),
+            _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera),
+        )
+        is_weak = ~is_crease & (angle > WEAK_CREASE_RATIO * crease_angle)
+        creases = _judged_creases(corners, vertex, a, angle, is_crease, is_weak, camera)
+    families = [_chains(silhouettes), creases, _chains(_edge_segments(corners, borders))]
+    return _to_strokes(families, surface)
 
 
-#: k segments: (k, 2) keys of the end points, (k, 2, 3) end points, (k, 2, 3) normals there and (k,)
-#: triangles. End points are the same if their keys are equal.
-_Segments = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+#: A polyline: (p, 3) points and normals, (p,) triangles, and whether the last point is the first.
+_Chain = tuple[np.ndarray, np.ndarray, np.ndarray, bool]
 
 
-def _no_segments() -> _Segments:
-    """Return the arrays of no segments."""
-    return (
-        np.empty((0, 2), np.int64),
-        np.empty((0, 2, 3)),
-        np.empty((0, 2, 3)),
-        np.empty(0, np.int64),
-    )
-
-
-def _silhouettes(
-    surface: Surface, corner: np.ndarray, normal: np.ndarray, camera: Camera
-) -> _Segments:
+def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
     """Return the zero set of n . w, where w is the direction to the camera.
 
     It has a straight segment in each triangle in which n . w changes its sign.
     """
-    facing = dot(normal, camera.view_directions(corner))
+    facing = dot(corners.normals, camera.view_directions(corners.points))
     front = facing > 0
     triangle = np.flatnonzero(front.any(axis=1) & ~front.all(axis=1))
     front, facing = front[triangle], facing[triangle]
     lone_corner = np.argmax(front == (front.sum(axis=1) == 1)[:, None], axis=1)
     row = np.arange(len(triangle))
-    ends, normals, keys = [], [], []
-    vertex = surface.triangle_vertex[triangle].astype(np.int64)
-    vertex_count = len(surface.vertices)
+    ends, normals = [], []
     for step in (1, 2):
         other = (lone_corner + step) % 3
         fraction = facing[row, lone_corner] / (facing[row, lone_corner] - facing[row, other])
-        for target, values in ((ends, corner), (normals, normal)):
+        for target, values in ((ends, corners.points), (normals, corners.normals)):
             a, b = values[triangle, lone_corner], values[triangle, other]
             target.append(a + fraction[:, None] * (b - a))
-        low, high = np.sort(
-            np.stack([vertex[row, lone_corner], vertex[row, other]], axis=1), axis=1
-        ).T
-        keys.append(low * vertex_count + high)
-    return np.stack(keys, 1), np.stack(ends, 1), normalize(np.stack(normals, 1)), triangle
+    return Segments(np.stack(ends, 1), normalize(np.stack(normals, 1)), triangle)
 
 
-def _crease_and_border_corners(
-    surface: Surface, corner: np.ndarray, crease_angle: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (3 t + k) at which the edges of creases and of borders start."""
-    vertex = surface.triangle_vertex.ravel()
-    edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    normal = normalize(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-    is_bent = dot(normal[a // 3], normal[b // 3]) < np.cos(crease_angle)
-    is_border_edge = np.ones(len(edges.face_count), dtype=bool)
-    is_border_edge[edges.interior] = False
-    borders = np.flatnonzero(is_border_edge[edges.corner_edge])
-    return a[is_bent & is_sharp_edge(surface, a, b)], borders
+def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: Camera) -> Segments:
+    """Return the parts of sharp edges on which one side faces the camera and the other does not.
+
+    Parameters
+    ----------
+    corners : _Corners
+    a, b : (n,) ndarray of int
+        The corners (3 t + k) at which the edges start in the triangles on both sides.
+    camera : Camera
+    """
+    segments = _edge_segments(corners, a)
+    to_eye = camera.view_directions(segments.ends)
+    # The other triangle runs along the edge in the opposite direction.
+    facing = np.stack(
+        [
+            dot(segments.normals, to_eye),
+            dot(_edge_segments(corners, b).normals[:, ::-1], to_eye),
+        ],
+        axis=1,
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = np.clip(np.nan_to_num(facing[..., 0] / (facing[..., 0] - facing[..., 1])), 0, 1)
+    cuts = np.sort(np.concatenate([zero, np.zeros((len(a), 1)), np.ones((len(a), 1))], axis=1))
+    middle = (cuts[:, :-1] + cuts[:, 1:]) / 2
+    at_middle = (
+        facing[:, None, :, 0] + middle[..., None] * (facing[..., 1] - facing[..., 0])[:, None]
+    )
+    is_contour = ((at_middle > 0).sum(axis=2) == 1) & (np.diff(cuts) > 1e-9)
+    edge, part = np.nonzero(is_contour)
+    fraction = np.stack([cuts[edge, part], cuts[edge, part + 1]], axis=1)[..., None]
+    first, last = segments.ends[edge, :1], segments.ends[edge, 1:]
+    return Segments(
+        first + fraction * (last - first), segments.normals[edge], segments.triangle[edge]
+    )
 
 
-def _edge_segments(corner: np.ndarray, normal: np.ndarray, starts: np.ndarray) -> _Segments:
-    """Return the edges that start at the given corners; equal positions get equal keys."""
+def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
+    """Return the edges of triangles that start at the given corners (3 t + k)."""
     triangle, k = starts // 3, starts % 3
-    ends = np.stack([corner[triangle, k], corner[triangle, (k + 1) % 3]], axis=1)
-    normals = np.stack([normal[triangle, k], normal[triangle, (k + 1) % 3]], axis=1)
-    if not len(starts):
-        return _no_segments()
-    _, keys = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
-    return keys.reshape(-1, 2).astype(np.int64), ends, normals, triangle
+    following = (k + 1) % 3
+    return Segments(
+        np.stack([corners.points[triangle, k], corners.points[triangle, following]], axis=1),
+        np.stack([corners.normals[triangle, k], corners.normals[triangle, following]], axis=1),
+        triangle.astype(np.int64),
+    )
 
 
-def _chain_segments(
-    keys: np.ndarray, ends: np.ndarray, normals: np.ndarray, triangle: np.ndarray
-) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]:
-    """Join segments that share end points into polylines.
+# --- creases -----------------------------------------------------------------------------------------
 
-    A polyline ends at each point that does not have exactly two segments.
 
-    Returns
-    -------
-    list of (points, normals, triangles, closed)
-        (p, 3) points and normals, (p,) triangles, and whether the last point is the first.
+def _judged_creases(
+    corners: _Corners,
+    vertex: np.ndarray,
+    starts: np.ndarray,
+    angle: np.ndarray,
+    is_crease: np.ndarray,
+    is_weak: np.ndarray,
+    camera: Camera,
+) -> list[_Chain]:
+    """Return the creases that are long and sharp enough to be drawn, with their gaps closed.
+
+    Parameters
+    ----------
+    corners : _Corners
+    vertex : (3 T,) ndarray of int
+        Vertex of each corner.
+    starts : (I,) ndarray of int
+        Corners at which the edges start.
+    angle : (I,) float64 ndarray
+        Angles at the edges in radians.
+    is_crease, is_weak : (I,) bool ndarray
+        The edges of creases, and those that may close their gaps.
+    camera : Camera
+        Camera that sets the length of a pixel.
     """
-    count = len(keys)
-    flat = keys.ravel()
-    order = np.argsort(flat, kind="stable")
-    _, first, uses = np.unique(flat[order], return_index=True, return_counts=True)
-    mate = np.full(2 * count, -1, dtype=np.int64)
-    pairs = first[uses == 2]
-    mate[order[pairs]], mate[order[pairs + 1]] = order[pairs + 1], order[pairs]
-    mate, unused = mate.tolist(), np.ones(count, dtype=bool).tolist()
-    chain_starts = [end for end in range(2 * count) if mate[end] < 0] + list(range(0, 2 * count, 2))
-    chains = []
-    for chain_start in chain_starts:
-        if not unused[chain_start // 2]:
-            continue
-        chain, end = [chain_start], chain_start
-        while True:
-            unused[end // 2] = False
-            end ^= 1
-            chain.append(end)
-            end = mate[end]
-            if end < 0 or not unused[end // 2]:
-                break
-        points = np.array(chain)
-        chains.append(
-            (
-                ends.reshape(-1, 3)[points],
-                normals.reshape(-1, 3)[points],
-                triangle[points // 2],
-                end >= 0,
-            )
-        )
-    return chains
+    if not is_crease.any():
+        return []
+    ends = np.stack([vertex[starts], vertex[starts - starts % 3 + (starts + 1) % 3]], axis=1)
+    near_gap = np.bincount(ends[is_crease].ravel(), minlength=int(vertex.max()) + 1) == 1
+    bridge = np.zeros(len(starts), dtype=bool)
+    for _ in range(WEAK_STEPS):
+        bridge |= is_weak & near_gap[ends].any(axis=1)
+        near_gap[ends[bridge]] = True
+    chosen = np.flatnonzero(is_crease | bridge)
+    segments = _edge_segments(corners, starts[chosen])
+    length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=1)
+    length = length / pixel_size(segments.ends.mean(axis=1), camera)
+    strong = is_crease[chosen]
+    salience = length * np.minimum(angle[chosen], np.pi / 2) / REFERENCE_ANGLE
+    keys = point_keys(segments.ends)
+    # First without the weak edges in open ends and in long gaps, then chained again.
+    kept = strong.copy()
+    for chain, _ in chain_segments(keys, segments.ends, strong):
+        order = chain[::2] >> 1
+        first, stop = _runs(strong[order])
+        for low, high in zip(stop[:-1], first[1:], strict=True):
+            if length[order[low:high]].sum() <= MAX_WEAK_PX:
+                kept[order[low:high]] = True
+    segments, keys, salience, strong = (
+        Segments(*(column[kept] for column in segments)),
+        keys[kept],
+        salience[kept],
+        strong[kept],
+    )
+    return [
+        _polyline(segments, chain, closed)
+        for chain, closed in chain_segments(keys, segments.ends, strong)
+        if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
+    ]
 
 
-def _to_strokes(
-    families: list[list[tuple[np.ndarray, np.ndarray, np.ndarray, bool]]], face: np.ndarray
-) -> Strokes:
-    """Return the polylines of `_chain_segments` as strokes, one list for each family.
+def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first index of each run of true values, and the index after its last."""
+    change = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return np.flatnonzero(change > 0), np.flatnonzero(change < 0)
 
-    `face` is the (T,) face of each triangle.
-    """
+
+# --- strokes -----------------------------------------------------------------------------------------
+
+
+def _chains(segments: Segments) -> list[_Chain]:
+    """Return the polylines that segments form."""
+    keys = point_keys(segments.ends)
+    # Where a silhouette passes through a vertex, it has segments without a length in some triangles.
+    has_length = keys[:, 0] != keys[:, 1]
+    segments = Segments(*(column[has_length] for column in segments))
+    chains = chain_segments(keys[has_length], segments.ends)
+    return [_polyline(segments, chain, closed) for chain, closed in chains]
+
+
+def _polyline(segments: Segments, chain: np.ndarray, closed: bool) -> _Chain:
+    """Return a chain of `chain_segments` as a polyline."""
+    # Each end of a segment, but the second of two that meet.
+    point = np.append(chain[::2], chain[-1])
+    segment = np.append(chain[:1] >> 1, chain[::2] >> 1)
+    return (
+        segments.ends.reshape(-1, 3)[point],
+        segments.normals.reshape(-1, 3)[point],
+        segments.triangle[segment],
+        closed,
+    )
+
+
+def _to_strokes(families: list[list[_Chain]], surface: Surface) -> Strokes:
+    """Return polylines as strokes, one list for each family."""
     chains = [chain for family in families for chain in family]
     family_index = np.repeat(np.arange(len(families)), [len(family) for family in families])
     counts = [len(points) for points, _, _, _ in chains]
@@ -192,7 +300,7 @@ def _to_strokes(
         start=start,
         family=family_index.astype(np.int32),
         names=OUTLINE_KINDS,
-        face=face[triangle],
+        face=surface.triangle_face[triangle],
         triangle=triangle.astype(np.int32),
         weights=np.full((total, 3), np.nan),
         normal=normal,

@@ -18,6 +18,7 @@ from .crossings import crossing_gaps_task
 from .families import label_families_task
 from .head_on_ends import head_on_ends_task
 from .outline import OUTLINE_KINDS, outline
+from .outline_visibility import clip_outline_task
 from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
     MAX_SPACING_RATIO,
@@ -38,7 +39,7 @@ from .style import StrokeStyle
 from .svg import Pen, simplify_mask_task
 from .tangent_mesh import tangent_mesh_task
 from .trace import trace_on_mesh_task
-from .visibility import clip_task, in_frame, pixel_size, project_to_pixels
+from .visibility import DepthBuffer, clip_task, depth_task, in_frame, pixel_size, project_to_pixels
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
 TIP_WIDTH = 0.15
@@ -144,18 +145,35 @@ def draw_instances_task(
     if not strokes_of_instances:
         raise _no_visible_stroke(camera)
     strokes = reduce(Strokes.concatenate, strokes_of_instances)
-    if not len(strokes):
+    family_counts = [len(traced.names) for traced in strokes_of_instances]
+    clips = clip_to_frame or not style.hidden
+    if not len(strokes) and not style.outline:
         raise RosyError("no stroke fits on the surface: reduce the spacing")
-    if clip_to_frame or not style.hidden:
-        task = clip_task(strokes, instances, camera, remove_hidden=not style.hidden)
-        strokes = yield from subtask(task, 0.85, 0.95)
+    depth_buffer = None
+    if not style.hidden:
+        label = "finding visible strokes"
+        depth_buffer = yield from subtask(depth_task(instances, camera), 0.85, 0.88, label)
+    if clips:
+        task = clip_task(
+            strokes,
+            instances,
+            camera,
+            remove_hidden=not style.hidden,
+            depth_buffer=depth_buffer,
+        )
+        strokes = yield from subtask(task, 0.88, 0.93)
+    if style.outline:
+        task = _outlines_task(instances, drawn, camera, depth_buffer, clips)
+        outlines = yield from subtask(task, 0.93, 0.95)
+        strokes = reduce(Strokes.concatenate, outlines, strokes)
+        family_counts += [len(lines.names) for lines in outlines]
+        drawn = drawn + drawn
     if style.overshoot:
         task = _overshoot_task(strokes, instances, camera, style, clip_to_frame)
         strokes = yield from subtask(task, 0.95, 1.0)
     if not len(strokes):
         raise _no_visible_stroke(camera)
     # Families of different instances are still separate. Each belongs to one instance.
-    family_counts = [len(traced.names) for traced in strokes_of_instances]
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden
@@ -170,7 +188,7 @@ def _trace_instance(
     clipped: bool,
     cache: Cache,
 ) -> Task[Strokes]:
-    """Return all strokes of a mesh instance, with its outline, including hidden parts."""
+    """Return all strokes of a mesh instance, including hidden parts."""
     yield Progress(0.0, "computing the spacing")
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
     by_fan = with_vertices_of_fans(instance)
@@ -214,10 +232,27 @@ def _trace_instance(
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
     if not style.overshoot:
         strokes = replace(strokes, free_ends=None)
-    if style.outline:
-        yield Progress(0.99, "finding outlines")
-        strokes = Strokes.concatenate(strokes, outline(instance, camera))
     return strokes
+
+
+def _outlines_task(
+    instances: Sequence[MeshInstance],
+    drawn: Sequence[int],
+    camera: Camera,
+    depth_buffer: DepthBuffer | None,
+    clips: bool,
+) -> Task[list[Strokes]]:
+    """Return the outline of each drawn instance, clipped like strokes."""
+    outlines = []
+    for rank, index in enumerate(drawn):
+        start, stop = (done / len(drawn) for done in (rank, rank + 1))
+        yield Progress(start, "finding outlines")
+        lines = outline(instances[index], camera)
+        if clips:
+            task = clip_outline_task(lines, index, instances, camera, depth_buffer)
+            lines = yield from subtask(task, start, stop, "finding outlines")
+        outlines.append(lines)
+    return outlines
 
 
 def _overshoot_task(

@@ -117,6 +117,10 @@ class Strokes:
             free_ends=self.free_end_mask[selection],
         )
 
+    def reordered(self, order: np.ndarray) -> Strokes:
+        """Return the strokes with their points in another order: (n,) numbers within each stroke."""
+        return self._take_points(order)
+
     def _take_points(self, point: np.ndarray) -> Strokes:
         """Return a copy with only some points. The caller has to replace `start` as well."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})

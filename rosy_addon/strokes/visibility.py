@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,6 +93,7 @@ def clip_task(
     camera: Camera,
     *,
     remove_hidden: bool = True,
+    depth_buffer: DepthBuffer | None = None,
 ) -> Task[Strokes]:
     """Return the parts of strokes that are in the frame and not hidden.
 
@@ -103,6 +105,8 @@ def clip_task(
     camera : Camera
     remove_hidden : bool
         If false, strokes are only clipped to the frame.
+    depth_buffer : DepthBuffer, optional
+        The result of `depth_task` for these instances, if it is known.
 
     Yields
     ------
@@ -123,27 +127,82 @@ def clip_task(
     it is behind only one of them, but one of the two faces the camera and the other faces away.
     """
     label = "finding visible strokes"
-    depth_buffer = None
-    if remove_hidden:
+    if remove_hidden and depth_buffer is None:
         depth_buffer = yield from subtask(depth_task(instances, camera), 0.0, 0.3, label)
-    yield Progress(0.3, label)
+
+    def find_visible(block: Strokes, pixels: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        visible = inside.copy()
+        if remove_hidden:
+            visible[visible] = ~_is_hidden(block, pixels, visible, depth_buffer, camera)
+        return visible
+
+    min_run = MIN_RUN_PX if remove_hidden else 0.0
+    task = visible_runs_task(strokes, camera, find_visible, min_run, min_run)
+    return (yield from subtask(task, 0.3, 0.9, label))
+
+
+def visible_runs_task(
+    strokes: Strokes,
+    camera: Camera,
+    find_visible: Callable[[Strokes, np.ndarray, np.ndarray], np.ndarray],
+    max_gap: float,
+    min_run: float,
+) -> Task[Strokes]:
+    """Cut strokes into their visible runs.
+
+    Runs of closed strokes continue over their first point.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    camera : Camera
+    find_visible : function
+        Returns (n,) bool for the n points of a part of the strokes, given this part, with points at
+        most `SAMPLE_STEP_PX` pixels apart, their (n, 2) pixels, and whether they are in the frame.
+    max_gap, min_run : float
+        Lengths in pixels below which hidden runs are filled and visible runs are removed.
+    """
+    label = "finding visible strokes"
+    yield Progress(0.0, label)
+    if not len(strokes):
+        return strokes
     clipped = []
     counts = pixel_counts(strokes, camera)
     # Each block ends with the stroke that reaches the next multiple of its size.
     block_index = np.cumsum(counts)[strokes.start[1:] - 1] // BLOCK_POINTS
     cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
     for first, stop in pairwise(cuts):
-        yield Progress(0.3 + 0.6 * first / max(len(strokes), 1), label)
+        yield Progress(first / len(strokes), label)
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
         inside = in_frame(pixels, camera)
-        visible = inside.copy()
-        if depth_buffer is not None:
-            visible[visible] = ~_is_hidden(block, pixels, visible, depth_buffer, camera)
-            visible = _remove_specks(visible, pixels, block.start)
+        visible = find_visible(block, pixels, inside)
+        order = _from_hidden_points(block, visible)
+        block, pixels, inside, visible = (
+            block.reordered(order),
+            pixels[order],
+            inside[order],
+            visible[order],
+        )
+        visible = clean_runs(visible, pixels, block.start, max_gap, min_run)
         clipped.append(block.runs_where(visible, free_at_removed=inside))
-    yield Progress(0.9, label)
+    yield Progress(1.0, label)
     return Strokes.join(clipped)
+
+
+def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
+    """Return the order of points in which closed strokes start at a hidden point, if they have one."""
+    order = np.arange(len(visible))
+    for stroke in np.flatnonzero(strokes.closed & visible[strokes.start[:-1]]):
+        first, last = strokes.start[stroke], strokes.start[stroke + 1] - 1
+        hidden = np.flatnonzero(~visible[first:last])
+        if len(hidden):
+            # The last point is the same as the first.
+            begin = first + hidden[0]
+            order[first : last + 1] = np.concatenate(
+                [np.arange(begin, last + 1), np.arange(first + 1, begin + 1)]
+            )
+    return order
 
 
 def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
@@ -248,39 +307,85 @@ def _is_hidden(
     view = camera.view
     points = strokes.points[in_view] @ view[:3, :3].T + view[:3, 3]
     normals = strokes.normal[in_view] @ view[:3, :3].T
-    eye = -points if camera.is_perspective else np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+    eye = _to_eye(points, camera)
     footprint = pixel_size(strokes.points[in_view], camera)
     # Outlines do not follow a member. They face neither toward the camera nor away from it.
     facing = np.sign(dot(normals, eye)) * strokes.member[in_view].any(axis=1)
-    low_pixel = np.floor(pixels[in_view] - 0.5).astype(np.int64)
     hidden, behind_front = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for plane in planes_around(points, pixels[in_view], footprint, depth_buffer, camera):
+        faces_away = np.sign(plane.facing) * facing < 0
+        hidden &= (plane.triangle >= 0) & (plane.distance > plane.bias)
+        # A point that faces away is behind a triangle that does not, or the reverse: at a
+        # silhouette, one of the four pixels is enough, without a bias.
+        behind_front |= (plane.triangle >= 0) & faces_away & (plane.distance > 0)
+    return hidden | behind_front
+
+
+class PlanesAround(NamedTuple):
+    """The planes of the triangles that are visible at one of the pixels around n points.
+
+    Attributes
+    ----------
+    triangle : (n,) int32 ndarray
+        -1 if there is none.
+    facing : (n,) float64 ndarray
+        Positive if the triangle faces the camera, negative if it faces away.
+    distance : (n,) float64 ndarray
+        Distance of the points behind the planes, along the ray of the camera.
+    bias : (n,) float64 ndarray
+        Distance up to which a plane does not hide a point.
+    """
+
+    triangle: np.ndarray
+    facing: np.ndarray
+    distance: np.ndarray
+    bias: np.ndarray
+
+
+def planes_around(
+    points: np.ndarray,
+    pixels: np.ndarray,
+    footprint: np.ndarray,
+    depth_buffer: DepthBuffer,
+    camera: Camera,
+) -> Iterator[PlanesAround]:
+    """Yield the planes at the four pixel centers around points.
+
+    Parameters
+    ----------
+    points : (n, 3) float64 ndarray
+        Camera space.
+    pixels : (n, 2) float64 ndarray
+        Their pixel coordinates.
+    footprint : (n,) float64 ndarray
+        `pixel_size` at the points.
+    depth_buffer : DepthBuffer
+    camera : Camera
+    """
+    eye = _to_eye(points, camera)
+    length = np.sqrt(dot(eye, eye))
+    low_pixel = np.floor(pixels - 0.5).astype(np.int64)
     for right in (0, 1):
         for up in (0, 1):
             column = np.clip(low_pixel[:, 0] + right, 0, camera.width - 1)
             row = np.clip(low_pixel[:, 1] + up, 0, camera.height - 1)
             triangle = depth_buffer.triangle[row, column]
-            safe_triangle = np.maximum(triangle, 0)
-            facing_plane = dot(depth_buffer.normal[safe_triangle], eye)
+            normal = depth_buffer.normal[triangle]
+            facing = dot(normal, eye)
             # Distance of the point behind the plane: along the normal, then along the view ray.
-            behind_plane = depth_buffer.offset[safe_triangle] - dot(
-                depth_buffer.normal[safe_triangle], points
-            )
-            length = np.sqrt(dot(eye, eye))
+            behind_plane = depth_buffer.offset[triangle] - dot(normal, points)
             with np.errstate(divide="ignore", invalid="ignore"):
-                distance = np.where(facing_plane != 0, behind_plane / facing_plane, 0) * length
-                steepness = np.sqrt(np.maximum(length**2 / facing_plane**2 - 1, 0))
-            bias = footprint * (
-                DEPTH_BIAS_PX
-                + np.minimum(
-                    np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
-                )
+                distance = np.where(facing != 0, behind_plane / facing, 0) * length
+                steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
+            steepness = np.minimum(
+                np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
             )
-            faces_away = np.sign(facing_plane) * facing < 0
-            hidden &= (triangle >= 0) & (distance > bias)
-            # A point that faces away is behind a triangle that does not, or the reverse: at a
-            # silhouette, one of the four pixels is enough, without a bias.
-            behind_front |= (triangle >= 0) & faces_away & (distance > 0)
-    return hidden | behind_front
+            yield PlanesAround(triangle, facing, distance, footprint * (DEPTH_BIAS_PX + steepness))
+
+
+def _to_eye(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (n, 3) vectors from points to the camera, in camera space."""
+    return -points if camera.is_perspective else np.broadcast_to((0.0, 0.0, 1.0), points.shape)
 
 
 def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
@@ -290,18 +395,30 @@ def _camera_triangles(instance: MeshInstance, camera: Camera) -> np.ndarray:
     return vertices[instance.surface.triangle_vertex]
 
 
-def _remove_specks(visible: np.ndarray, pixels: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Fill short hidden runs of (n,) points, then remove short visible runs; see `MIN_RUN_PX`."""
+def clean_runs(
+    visible: np.ndarray, pixels: np.ndarray, start: np.ndarray, max_gap: float, min_run: float
+) -> np.ndarray:
+    """Fill short hidden runs of points, then remove short visible runs.
+
+    Parameters
+    ----------
+    visible : (n,) bool ndarray
+    pixels : (n, 2) ndarray
+    start : (S + 1,) ndarray of int
+        As in `Strokes`.
+    max_gap, min_run : float
+        Lengths in pixels below which hidden runs are filled and visible runs are removed.
+    """
     arc = arc_lengths(np.nan_to_num(np.column_stack([pixels, np.zeros(len(pixels))])), start)
-    for value in (False, True):
-        visible = _flip_short_runs(visible, arc, start, value)
+    for value, length in ((False, max_gap), (True, min_run)):
+        visible = _flip_short_runs(visible, arc, start, value, length)
     return visible
 
 
 def _flip_short_runs(
-    visible: np.ndarray, arc: np.ndarray, start: np.ndarray, value: bool
+    visible: np.ndarray, arc: np.ndarray, start: np.ndarray, value: bool, min_length: float
 ) -> np.ndarray:
-    """Invert runs of `value` that are shorter than `MIN_RUN_PX`.
+    """Invert runs of `value` that are shorter than `min_length` pixels.
 
     Hidden runs at the ends of strokes are kept: they are not gaps between visible runs.
     """
@@ -310,7 +427,7 @@ def _flip_short_runs(
     starts_run[start[:-1]] = True
     first = np.flatnonzero(starts_run)
     last = np.append(first[1:], len(visible)) - 1
-    flip = (visible[first] == value) & (arc[last] - arc[first] < MIN_RUN_PX)
+    flip = (visible[first] == value) & (arc[last] - arc[first] < min_length)
     if not value:
         ends = np.zeros(len(visible) + 1, dtype=bool)
         ends[start] = True

@@ -1,0 +1,147 @@
+"""Outlines in pictures: silhouettes without gaps, creases without specks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cylinder, from_quads, grid_of_quads, icosphere, torus
+
+from rosy_addon.field.generate import axis_field
+from rosy_addon.field.surface import build_surface
+from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.outline import OUTLINE_KINDS, outline
+from rosy_addon.strokes.pipeline import draw_instances
+from rosy_addon.strokes.style import StrokeStyle
+from rosy_addon.strokes.visibility import project_to_pixels, rasterize_depth
+
+IDENTITY = np.eye(4)
+
+#: Outlines shorter than this in pixels are specks.
+MIN_MARK_PX = 6.0
+
+
+def outlines_of(surface, camera):
+    """Return the outlines of a drawing."""
+    instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0.1, 0.2, 1)))
+    strokes = draw_instances([instance], camera, StrokeStyle(spacing=40, outline=True)).strokes
+    kinds = [strokes.names.index(kind) for kind in OUTLINE_KINDS]
+    return strokes.select(np.isin(strokes.family, kinds))
+
+
+def pixel_lengths(lines, camera):
+    """Return (S,): the lengths of strokes in pixels."""
+    pixels, _ = project_to_pixels(lines.points, camera)
+    step = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
+    step[lines.start[1:-1] - 1] = 0
+    return np.add.reduceat(step, lines.start[:-1])
+
+
+def coverage(lines, surface, camera, tolerance):
+    """Return the share of the border of a surface in a picture that is near an outline.
+
+    The border is where pixels of the surface meet those of the background, at four times the
+    resolution.
+    """
+    fine = camera.scaled(4)
+    shown = rasterize_depth([MeshInstance(surface, IDENTITY)], fine).triangle >= 0
+    borders = []
+    for axis in (0, 1):
+        row, column = np.nonzero(np.diff(shown, axis=axis))
+        borders.append(
+            np.stack([column + (1.0 if axis else 0.5), row + (0.5 if axis else 1.0)], axis=1) / 4
+        )
+    border = np.concatenate(borders)[::3]
+    pixels, _ = project_to_pixels(lines.points, camera)
+    is_first = np.zeros(len(pixels), dtype=bool)
+    is_first[lines.start[:-1]] = True
+    # Points are about a pixel apart.
+    assert np.linalg.norm(np.diff(pixels, axis=0), axis=1)[~is_first[1:]].max() < 1.5
+    distance = np.concatenate(
+        [
+            np.linalg.norm(block[:, None] - pixels[None], axis=2).min(axis=1)
+            for block in np.array_split(border, 1 + len(border) // 500)
+        ]
+    )
+    return np.mean(distance <= tolerance)
+
+
+def closed_cylinder(columns):
+    """Return a cylinder with ends, whose edges are sharp above 60 degrees."""
+    tube = cylinder(columns, 1)
+    vertex = np.arange(2 * columns).reshape(columns, 2)
+    corners = np.concatenate([tube.corner_vertex, vertex[::-1, 0], vertex[:, 1]])
+    start = [*tube.face_start, 5 * columns, 6 * columns]
+    return build_surface(tube.vertices, corners, start, name="cylinder", sharp_angle=np.pi / 3)
+
+
+@pytest.mark.parametrize("view", [(-26, 8), (40, 30), (100, -15)])
+@pytest.mark.parametrize(
+    ("coarse", "dense"),
+    [
+        (torus(48, 12, 1, 0.25), torus(384, 192, 1, 0.25)),
+        (closed_cylinder(32), closed_cylinder(256)),
+        (icosphere(3), icosphere(5)),
+    ],
+    ids=["torus", "cylinder", "sphere"],
+)
+def test_silhouettes_of_coarse_meshes_are_those_of_the_smooth_surface(coarse, dense, view):
+    camera = orbit_camera(dense, *view, 300, 300)
+    lines = outlines_of(coarse, camera)
+    lengths = pixel_lengths(lines, camera)
+    assert lengths.min() >= MIN_MARK_PX
+    assert len(lines) <= 4
+    assert coverage(lines, dense, camera, tolerance=2.5) >= 0.98
+
+
+def test_silhouettes_of_flat_faces_are_edges():
+    smooth = icosphere(3)
+    flat = build_surface(
+        smooth.vertices,
+        smooth.corner_vertex,
+        smooth.face_start,
+        flat_faces=np.ones(smooth.face_count, dtype=bool),
+    )
+    camera = orbit_camera(flat, 20, 10, 300, 300)
+    lines = outlines_of(flat, camera)
+    assert set(lines.family.tolist()) == {lines.names.index("silhouettes")}
+    assert pixel_lengths(lines, camera).min() >= MIN_MARK_PX
+    assert coverage(lines, flat, camera, tolerance=1.0) >= 0.98
+
+
+def test_a_silhouette_on_the_far_side_is_hidden():
+    """Inside the hole of a torus, only one of two silhouettes is visible where they run in parallel."""
+    surface = torus(96, 48, 1, 0.4)
+    camera = orthographic_camera(look_at((0, -5, 1.2), (0, 0, 0)), 300, 300, scale=3)
+    lines = outlines_of(surface, camera)
+    to_eye = camera.view_directions(lines.points)
+    ring = lines.points[:, :2] / np.linalg.norm(lines.points[:, :2], axis=1)[:, None]
+    # On the far outer side and the near inner side, another part of the torus is in front.
+    is_inside = np.linalg.norm(lines.points[:, :2], axis=1) < 1
+    is_near = (ring * to_eye[:, :2]).sum(axis=1) > 0.5
+    assert not (is_inside & is_near & (lines.points[:, 2] < 0)).any()
+
+
+def folded(cells=60, gap=()):
+    """Return a sheet with a fold of 60 degrees along y, less in the given cells, and sharp pyramids."""
+    quads, count = grid_of_quads(cells, cells, False, False)
+    u, v = np.divmod(np.arange(count), cells + 1)
+    x, y = 2 * u / cells - 1, 2 * v / cells - 1
+    height = -0.577 * np.abs(x)
+    height[(2 * u == cells) & np.isin(v, gap)] -= 0.0059
+    height[((u % 20) == 5) & ((v % 15) == 7)] += 0.06
+    points = np.stack([x, y, height], axis=1)
+    return from_quads(points, quads, sharp_angle=np.radians(50))
+
+
+def test_gaps_in_creases_are_closed_and_specks_left_out():
+    """A hysteresis closes the gap of two cells; the pyramids are one cell high and wide."""
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 120, 120, scale=2.4)
+    surface = folded(gap=(30, 31))
+    creases = outline(MeshInstance(surface, IDENTITY))
+    assert len(creases.select(creases.family == 1)) >= 8
+    lines = outlines_of(surface, camera)
+    creases = lines.select(lines.family == lines.names.index("creases"))
+    assert len(creases) == 1
+    assert pixel_lengths(creases, camera)[0] == pytest.approx(100, abs=2)
+    assert pixel_lengths(lines, camera).min() >= MIN_MARK_PX

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.creases import creases_task
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
+from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
@@ -18,13 +20,6 @@ from .visibility import pixel_size
 
 #: `Strokes.names` of an outline: the kind of line of each family.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
-
-#: A gap in a crease is closed along edges with at least this fraction of the crease angle, and up to this
-#: length in pixels (hysteresis as in Canny, "A Computational Approach to Edge Detection", PAMI 1986).
-WEAK_CREASE_RATIO, MAX_WEAK_PX = 0.6, 16.0
-
-#: Edges by which a gap in a crease is searched from each of its ends.
-WEAK_STEPS = 4
 
 #: Shortest crease in pixels if it is as sharp as the angle, in radians. Sharper ones may be shorter, but
 #: count as at most a right angle; blunter ones have to be longer.
@@ -63,6 +58,13 @@ class _Corners(NamedTuple):
 def outline(
     instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
 ) -> Strokes:
+    """Run `outline_task` to its end."""
+    return run_to_completion(outline_task(instance, camera, crease_angle=crease_angle))
+
+
+def outline_task(
+    instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
+) -> Task[Strokes]:
     """Extract the silhouettes, creases and borders of a mesh instance.
 
     Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
@@ -73,17 +75,23 @@ def outline(
     ----------
     instance : MeshInstance
     camera : Camera, optional
-        Camera of the silhouettes. With a camera, gaps in creases are closed, and creases are left out
-        that are too short and blunt in pixels. Without a camera there are no silhouettes.
+        Camera of the silhouettes. With a camera, creases are left out that are too short and blunt in
+        pixels. Without a camera there are no silhouettes.
     crease_angle : float
-        Smallest angle in radians between the normals of the two triangles at a crease. Creases are
-        only at edges across which normals are not interpolated, and in gaps between them.
+        Smallest angle in radians between the normals of the two faces at a crease; see
+        `field.creases.creases_task`.
+
+    Yields
+    ------
+    Progress
 
     Returns
     -------
     Strokes
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
+    label = "finding outlines"
+    yield Progress(0.0, label)
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -93,24 +101,29 @@ def outline(
     vertex = surface.triangle_vertex.ravel()
     edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    angle = angle_between(flat[a // 3], flat[b // 3])
-    is_sharp = is_sharp_edge(surface, a, b)
-    is_crease = is_sharp & (angle > crease_angle)
+    yield Progress(0.3, label)
+    task = creases_task(surface, crease_angle)
+    is_crease = _are_pairs(vertex, a, (yield from subtask(task, 0.3, 0.7, label)).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])
+    yield Progress(0.8, label)
+    starts = a[is_crease]
+    creases = _edge_segments(corners, starts)
     if camera is None:
         silhouettes = _edge_segments(corners, a[:0])
-        creases = _chains(_edge_segments(corners, a[is_crease]))
+        families = [_chains(silhouettes), _chains(creases)]
     else:
-        is_blunt = is_sharp & ~is_crease
+        is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
         silhouettes = Segments.concatenate(
             _smooth_silhouettes(corners, camera),
             _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera),
         )
-        is_weak = ~is_crease & (angle > WEAK_CREASE_RATIO * crease_angle)
-        creases = _judged_creases(corners, vertex, a, angle, is_crease, is_weak, camera)
-    families = [_chains(silhouettes), creases, _chains(_edge_segments(corners, borders))]
+        angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
+        salience = _pixel_salience(creases, angle, camera)
+        families = [_chains(silhouettes), _chains(creases, salience, MIN_CREASE_PX)]
+    yield Progress(0.9, label)
+    families.append(_chains(_edge_segments(corners, borders)))
     return _to_strokes(families, surface)
 
 
@@ -186,87 +199,52 @@ def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
     )
 
 
-# --- creases -----------------------------------------------------------------------------------------
-
-
-def _judged_creases(
-    corners: _Corners,
-    vertex: np.ndarray,
-    starts: np.ndarray,
-    angle: np.ndarray,
-    is_crease: np.ndarray,
-    is_weak: np.ndarray,
-    camera: Camera,
-) -> list[_Chain]:
-    """Return the creases that are long and sharp enough to be drawn, with their gaps closed.
+def _are_pairs(vertex: np.ndarray, starts: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: whether edges of triangles are among pairs of vertices, the smaller first.
 
     Parameters
     ----------
-    corners : _Corners
     vertex : (3 T,) ndarray of int
         Vertex of each corner.
-    starts : (I,) ndarray of int
+    starts : (n,) ndarray of int
         Corners at which the edges start.
-    angle : (I,) float64 ndarray
-        Angles at the edges in radians.
-    is_crease, is_weak : (I,) bool ndarray
-        The edges of creases, and those that may close their gaps.
-    camera : Camera
-        Camera that sets the length of a pixel.
+    pairs : (m, 2) ndarray of int
     """
-    if not is_crease.any():
-        return []
-    ends = np.stack([vertex[starts], vertex[starts - starts % 3 + (starts + 1) % 3]], axis=1)
-    near_gap = np.bincount(ends[is_crease].ravel(), minlength=int(vertex.max()) + 1) == 1
-    bridge = np.zeros(len(starts), dtype=bool)
-    for _ in range(WEAK_STEPS):
-        bridge |= is_weak & near_gap[ends].any(axis=1)
-        near_gap[ends[bridge]] = True
-    chosen = np.flatnonzero(is_crease | bridge)
-    segments = _edge_segments(corners, starts[chosen])
+    stride = int(vertex.max()) + 1
+    following = starts - starts % 3 + (starts + 1) % 3
+    low, high = np.sort(np.stack([vertex[starts], vertex[following]]).astype(np.int64), axis=0)
+    return np.isin(low * stride + high, pairs[:, 0].astype(np.int64) * stride + pairs[:, 1])
+
+
+def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (k,) float64: the lengths of creases in pixels, times their sharpness.
+
+    Pixels are measured at the depth of the segment, so that the result does not change when the mesh
+    turns.
+    """
     length = np.linalg.norm(segments.ends[:, 1] - segments.ends[:, 0], axis=1)
     length = length / pixel_size(segments.ends.mean(axis=1), camera)
-    strong = is_crease[chosen]
-    salience = length * np.minimum(angle[chosen], np.pi / 2) / REFERENCE_ANGLE
-    keys = point_keys(segments.ends)
-    # First without the weak edges in open ends and in long gaps, then chained again.
-    kept = strong.copy()
-    for chain, _ in chain_segments(keys, segments.ends, strong):
-        order = chain[::2] >> 1
-        first, stop = _runs(strong[order])
-        for low, high in zip(stop[:-1], first[1:], strict=True):
-            if length[order[low:high]].sum() <= MAX_WEAK_PX:
-                kept[order[low:high]] = True
-    segments, keys, salience, strong = (
-        Segments(*(column[kept] for column in segments)),
-        keys[kept],
-        salience[kept],
-        strong[kept],
-    )
-    return [
-        _polyline(segments, chain, closed)
-        for chain, closed in chain_segments(keys, segments.ends, strong)
-        if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
-    ]
-
-
-def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first index of each run of true values, and the index after its last."""
-    change = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-    return np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    return length * np.minimum(angle, np.pi / 2) / REFERENCE_ANGLE
 
 
 # --- strokes -----------------------------------------------------------------------------------------
 
 
-def _chains(segments: Segments) -> list[_Chain]:
-    """Return the polylines that segments form."""
+def _chains(
+    segments: Segments, salience: np.ndarray | None = None, min_salience: float = 0.0
+) -> list[_Chain]:
+    """Return the polylines that segments form, without those with a small sum of (k,) saliences."""
     keys = point_keys(segments.ends)
+    salience = np.zeros(len(keys)) if salience is None else salience
     # Where a silhouette passes through a vertex, it has segments without a length in some triangles.
     has_length = keys[:, 0] != keys[:, 1]
     segments = Segments(*(column[has_length] for column in segments))
-    chains = chain_segments(keys[has_length], segments.ends)
-    return [_polyline(segments, chain, closed) for chain, closed in chains]
+    salience = salience[has_length]
+    return [
+        _polyline(segments, chain, closed)
+        for chain, closed in chain_segments(keys[has_length], segments.ends)
+        if salience[chain[::2] >> 1].sum() >= min_salience
+    ]
 
 
 def _polyline(segments: Segments, chain: np.ndarray, closed: bool) -> _Chain:

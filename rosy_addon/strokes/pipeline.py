@@ -17,7 +17,7 @@ from ..projection.gbuffer import MeshInstance
 from .crossings import crossing_gaps_task
 from .families import label_families_task
 from .head_on_ends import head_on_ends_task
-from .outline import OUTLINE_KINDS, outline
+from .outline import OUTLINE_KINDS, outline_task
 from .outline_visibility import clip_outline_task
 from .overshoot import extension_task, mark_free_boundary_ends
 from .spacing import (
@@ -245,12 +245,12 @@ def _outlines_task(
     """Return the outline of each drawn instance, clipped like strokes."""
     outlines = []
     for rank, index in enumerate(drawn):
-        start, stop = (done / len(drawn) for done in (rank, rank + 1))
-        yield Progress(start, "finding outlines")
-        lines = outline(instances[index], camera)
+        start, middle, stop = (done / len(drawn) for done in (rank, rank + 0.5, rank + 1))
+        task = outline_task(instances[index], camera)
+        lines = yield from subtask(task, start, middle)
         if clips:
             task = clip_outline_task(lines, index, instances, camera, depth_buffer)
-            lines = yield from subtask(task, start, stop, "finding outlines")
+            lines = yield from subtask(task, middle, stop)
         outlines.append(lines)
     return outlines
 

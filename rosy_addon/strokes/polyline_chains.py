@@ -27,13 +27,10 @@ def point_keys(ends: np.ndarray) -> np.ndarray:
     return keys.reshape(-1, 2).astype(np.int64)
 
 
-def chain_segments(
-    keys: np.ndarray, ends: np.ndarray, strong: np.ndarray | None = None
-) -> list[tuple[np.ndarray, bool]]:
+def chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray, bool]]:
     """Join segments into chains.
 
     Two segments are joined where no others meet. Where others do, the straightest pairs are joined.
-    Pairs of strong segments come first.
 
     Parameters
     ----------
@@ -41,7 +38,6 @@ def chain_segments(
         From `point_keys`.
     ends : (k, 2, 3) ndarray
         End points of the segments.
-    strong : (k,) bool ndarray, optional
 
     Returns
     -------
@@ -57,9 +53,8 @@ def chain_segments(
     pairs = first[uses == 2]
     mate[order[pairs]], mate[order[pairs + 1]] = order[pairs + 1], order[pairs]
     outward = normalize(ends[:, ::-1] - ends).reshape(-1, 3)
-    strong = np.ones(count, dtype=bool) if strong is None else strong
     for begin, use in zip(first[uses > 2].tolist(), uses[uses > 2].tolist(), strict=True):
-        _join_at_junction(order[begin : begin + use], outward, strong, mate)
+        _join_at_junction(order[begin : begin + use], outward, mate)
     mate_of, unused = mate.tolist(), np.ones(count, dtype=bool).tolist()
     starts = np.flatnonzero(mate < 0).tolist() + list(range(0, 2 * count, 2))
     chains = []
@@ -75,19 +70,11 @@ def chain_segments(
     return chains
 
 
-def _join_at_junction(
-    junction: np.ndarray, outward: np.ndarray, strong: np.ndarray, mate: np.ndarray
-) -> None:
+def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarray) -> None:
     """Set the mates of the ends at a point where three or more segments meet."""
-    is_strong = strong[junction >> 1]
-    if is_strong.sum() == 2:
-        a, b = junction[is_strong]
-        mate[a], mate[b] = b, a
-        junction = junction[~is_strong]
     turn = np.arccos(np.clip(-outward[junction] @ outward[junction].T, -1, 1))
     row, column = np.triu_indices(len(junction), 1)
-    weak_count = 2 - np.sum(strong[junction[np.stack([row, column])] >> 1], axis=0)
-    for pair in np.lexsort((turn[row, column], weak_count)).tolist():
+    for pair in np.argsort(turn[row, column], kind="stable").tolist():
         a, b = junction[row[pair]], junction[column[pair]]
         if turn[row[pair], column[pair]] < MAX_JUNCTION_TURN and mate[a] < 0 and mate[b] < 0:
             mate[a], mate[b] = b, a

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..field.frames import dot, normalize
 from ..progress import Progress, Task, subtask
+from .directional_spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
@@ -58,7 +59,7 @@ class _ClosingTrace(NamedTuple):
     passed: np.ndarray
 
 
-def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -> Task[Strokes]:
+def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> Task[Strokes]:
     """Close the strokes whose ends almost meet.
 
     The angle to the field that closes a loop is found with the secant method. Strokes for which it
@@ -69,8 +70,7 @@ def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: np.ndarray) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-    spacing : (T, 3) ndarray
-        Spacing at the corners of the triangles, in world space.
+    spacing : CornerSpacing
 
     Yields
     ------
@@ -215,7 +215,7 @@ def _loop_strokes(
     strokes: Strokes,
     trace: _ClosingTrace,
     closes: np.ndarray,
-    spacing: np.ndarray,
+    spacing: CornerSpacing,
 ) -> Strokes:
     """Return the traced paths of the strokes that close, as closed strokes."""
     loop_index = np.flatnonzero(closes)
@@ -238,7 +238,7 @@ def _loop_strokes(
         weights=weights,
         normal=mesh.shading_normals_at(triangle, weights),
         member=mesh.to_world(triangle, direction),
-        spacing=np.einsum("nk,nk->n", weights, spacing[triangle]),
+        spacing=spacing.at(triangle, weights, direction),
         width=np.ones(len(triangle)),
         opacity=np.ones(len(triangle)),
         closed=np.ones(len(loop_index), dtype=bool),

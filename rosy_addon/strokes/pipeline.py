@@ -15,6 +15,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .crossings import crossing_gaps_task
+from .directional_spacing import CornerSpacing, spacing_in_picture
 from .families import label_families_task
 from .head_on_ends import head_on_ends_task
 from .outline import OUTLINE_KINDS, outline_task
@@ -208,7 +209,9 @@ def _trace_instance(
     mesh = yield from subtask(
         tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.03, 0.1
     )
-    corner_spacing = spacing[by_fan.surface.triangle_vertex]
+    corner_spacing = CornerSpacing(spacing[by_fan.surface.triangle_vertex])
+    if style.unit == "pixels":
+        corner_spacing = spacing_in_picture(mesh, corner_spacing.values, camera)
     task = trace_on_mesh_task(mesh, corner_spacing, surface_name=instance.surface.name)
     strokes = yield from subtask(task, 0.1, 0.9)
     strokes = mark_free_boundary_ends(strokes, mesh)

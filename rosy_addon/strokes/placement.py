@@ -21,6 +21,7 @@ import numpy as np
 
 from ..field.frames import dot
 from ..progress import Progress, Task
+from .directional_spacing import CornerSpacing
 from .growing_strokes import GrowingStrokes, StrokeSegments, Tips
 from .lateral_neighbors import find_lateral_neighbors
 from .samples import SAMPLE_STEP, StrokeSamples
@@ -48,8 +49,7 @@ class StreamlinePlacer:
     Parameters
     ----------
     mesh : TangentMesh
-    corner_spacing : (T, 3) ndarray
-        Spacing at the corners of the triangles, in world space.
+    spacing : CornerSpacing
     rules : SeparationRules
 
     Attributes
@@ -73,11 +73,9 @@ class StreamlinePlacer:
     rosy_addon.strokes.trace.place_streamlines_task : Runs the steps in their order.
     """
 
-    def __init__(
-        self, mesh: TangentMesh, corner_spacing: np.ndarray, rules: SeparationRules
-    ) -> None:
-        self.mesh, self.corner_spacing, self.rules = mesh, corner_spacing, rules
-        self.samples = StrokeSamples(mesh, corner_spacing)
+    def __init__(self, mesh: TangentMesh, spacing: CornerSpacing, rules: SeparationRules) -> None:
+        self.mesh, self.spacing, self.rules = mesh, spacing, rules
+        self.samples = StrokeSamples(mesh, spacing)
         self.strokes = GrowingStrokes()
         self.tips = Tips.empty()
         self.segments: list[StrokeSegments] = []

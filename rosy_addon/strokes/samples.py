@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import RosyError
 from .column_table import ColumnTable
+from .directional_spacing import CornerSpacing
 from .point_grid import PointGrid
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
@@ -53,8 +54,7 @@ class StrokeSamples(ColumnTable):
     Parameters
     ----------
     mesh : TangentMesh
-    corner_spacing : (T, 3) ndarray
-        Spacing at the corners of the triangles, in world space.
+    spacing : CornerSpacing
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class StrokeSamples(ColumnTable):
     local_member: np.ndarray
     local_direction: np.ndarray
 
-    def __init__(self, mesh: TangentMesh, corner_spacing: np.ndarray) -> None:
+    def __init__(self, mesh: TangentMesh, spacing: CornerSpacing) -> None:
         super().__init__(
             frame=((4, 3), float),
             spacing=((), float),
@@ -123,8 +123,8 @@ class StrokeSamples(ColumnTable):
             local_member=((), complex),
             local_direction=((), complex),
         )
-        self.mesh, self.corner_spacing = mesh, corner_spacing
-        mean_spacing = np.einsum("tk->t", corner_spacing) / 3
+        self.mesh, self.required_spacing = mesh, spacing
+        mean_spacing = np.einsum("tk->t", spacing.values) / 3
         self.expected_count = (
             float((mesh.area / mean_spacing**2).sum()) * mesh.family_count / SAMPLE_STEP
         )
@@ -157,7 +157,7 @@ class StrokeSamples(ColumnTable):
 
     def spacing_at(self, particles: SurfaceParticles) -> np.ndarray:
         """Return (n,) float64: the required spacing at particles, in world space."""
-        return np.einsum("nk,nk->n", particles.weights, self.corner_spacing[particles.triangle])
+        return self.required_spacing.at(particles.triangle, particles.weights, particles.member)
 
     # --- adding and removing ----------------------------------------------------------------------
 

@@ -119,7 +119,12 @@ def spacing_by_foreshortening(
         np.maximum(lambert_tone(instance, to_eye), lambert_tone(instance, -to_eye)),
         MIN_FACING_COSINE,
     )
-    return spacing * (1 + cosine) / (2 * cosine)
+    return spacing * foreshortening_factor(cosine)
+
+
+def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
+    """Return the factor of `spacing_by_foreshortening` for cosines above 0."""
+    return (1 + cosine) / (2 * cosine)
 
 
 def spacing_by_tone(

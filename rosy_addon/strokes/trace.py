@@ -11,6 +11,7 @@ from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from .closed_strokes import close_loops_task
+from .directional_spacing import CornerSpacing
 from .families import label_families_task
 from .growing_strokes import StrokeSegments
 from .placement import StreamlinePlacer
@@ -100,19 +101,20 @@ def trace_strokes_task(
 
 def trace_on_mesh_task(
     mesh: TangentMesh,
-    spacing: np.ndarray | float,
+    spacing: CornerSpacing | np.ndarray | float,
     rules: SeparationRules | None = None,
     surface_name: str = "mesh",
 ) -> Task[Strokes]:
     """Do the same as `trace_strokes_task` on a tangent mesh, but do not assign families."""
-    corner_spacing = corner_values(mesh, spacing, surface_name)
-    if not (np.isfinite(corner_spacing).all() and (corner_spacing > 0).all()):
+    if not isinstance(spacing, CornerSpacing):
+        spacing = CornerSpacing(corner_values(mesh, spacing, surface_name))
+    if not (np.isfinite(spacing.values).all() and (spacing.values > 0).all()):
         raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
-    placer = StreamlinePlacer(mesh, corner_spacing, rules or SeparationRules())
+    placer = StreamlinePlacer(mesh, spacing, rules or SeparationRules())
     rules = placer.rules
     yield from subtask(place_streamlines_task(placer), 0.0, 0.9)
     strokes = yield from subtask(collect_task(placer), 0.9, 0.92)
-    strokes = yield from subtask(close_loops_task(mesh, strokes, corner_spacing), 0.92, 0.95)
+    strokes = yield from subtask(close_loops_task(mesh, strokes, spacing), 0.92, 0.95)
     return (yield from subtask(separation_task(mesh, strokes, rules.min_length), 0.95, 1.0))
 
 
@@ -130,16 +132,16 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     placer.rules = replace(
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
-    placer.add_seeds(seeds_around_singularities(placer.mesh, placer.corner_spacing))
+    placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
     for _ in range(WARMUP_STEPS):
         yield Progress(0.0, label)
         if len(placer.tips):
             placer.step()
     placer.suspend()
     yield Progress(0.0, label)
-    seeds = candidate_seeds(placer.mesh, placer.corner_spacing)
+    seeds = candidate_seeds(placer.mesh, placer.spacing.values)
     seeds = yield from uncovered_seeds_task(placer.samples, seeds)
-    seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.corner_spacing))
+    seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.spacing.values))
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     while len(seeds):
         yield Progress(placer.samples.coverage, label)
@@ -169,7 +171,7 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     yield from _grow_until(placer, label)
     if not placer.strokes.alive[: placer.strokes.count].any():
         # Where only short strokes fit, none has survived the minimum lengths of the first rounds.
-        placer.add_seeds(candidate_seeds(placer.mesh, placer.corner_spacing))
+        placer.add_seeds(candidate_seeds(placer.mesh, placer.spacing.values))
         yield from _grow_until(placer, label)
 
 
@@ -244,7 +246,7 @@ def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
     row = np.searchsorted(stroke_ids, stroke)
     points = mesh.points_at(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
-    spacing = np.einsum("nk,nk->n", weights, placer.corner_spacing[triangle])
+    spacing = placer.spacing.at(triangle, weights, direction)
     yield Progress(0.9, label)
     return Strokes(
         points=points,

@@ -21,6 +21,7 @@ from .head_on_ends import head_on_ends_task
 from .outline import OUTLINE_KINDS, outline_task
 from .outline_visibility import clip_outline_task
 from .overshoot import extension_task, mark_free_boundary_ends
+from .smoothing import smooth_task
 from .spacing import (
     MAX_SPACING_RATIO,
     LightSource,
@@ -162,7 +163,8 @@ def draw_instances_task(
             remove_hidden=not style.hidden,
             depth_buffer=depth_buffer,
         )
-        strokes = yield from subtask(task, 0.88, 0.93)
+        strokes = yield from subtask(task, 0.88, 0.92)
+        strokes = yield from subtask(smooth_task(strokes, camera), 0.92, 0.93)
     if style.outline:
         task = _outlines_task(instances, drawn, camera, depth_buffer, clips)
         outlines = yield from subtask(task, 0.93, 0.95)
@@ -248,12 +250,13 @@ def _outlines_task(
     """Return the outline of each drawn instance, clipped like strokes."""
     outlines = []
     for rank, index in enumerate(drawn):
-        start, middle, stop = (done / len(drawn) for done in (rank, rank + 0.5, rank + 1))
+        start, middle, clipped, stop = ((rank + done) / len(drawn) for done in (0.0, 0.5, 0.9, 1.0))
         task = outline_task(instances[index], camera)
         lines = yield from subtask(task, start, middle)
         if clips:
             task = clip_outline_task(lines, index, instances, camera, depth_buffer)
-            lines = yield from subtask(task, middle, stop)
+            lines = yield from subtask(task, middle, clipped)
+            lines = yield from subtask(smooth_task(lines, camera), clipped, stop)
         outlines.append(lines)
     return outlines
 

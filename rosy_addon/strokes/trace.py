@@ -37,9 +37,10 @@ STRAGGLER_RATIO = 0.1
 #: the minimum separation for the strokes that fill the last gaps.
 FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.85
 
-#: Steps by which strokes around singularities grow before all others, and their minimum separation
-#: in spacings during these steps.
-WARMUP_STEPS, WARMUP_SEPARATION = 6, 0.6
+#: Steps by which strokes around singularities grow before all others, so that the ends of the others do
+#: not form a ring around them. During the first of these steps they have another minimum separation, in
+#: spacings.
+WARMUP_STEPS, NEAR_STEPS, WARMUP_SEPARATION = 16, 6, 0.6
 
 
 def trace_strokes(instance: MeshInstance, spacing: np.ndarray | float, **options) -> Strokes:
@@ -133,8 +134,10 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
-    for _ in range(WARMUP_STEPS):
+    for step in range(WARMUP_STEPS):
         yield Progress(0.0, label)
+        if step == NEAR_STEPS:
+            placer.rules = replace(rules, max_gap=np.inf)
         if len(placer.tips):
             placer.step()
     placer.suspend()

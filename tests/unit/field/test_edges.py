@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosy_addon.field.surface import _sorted_with_order, connected_components
+from rosy_addon.field.surface import sorted_with_order, connected_components
 
 
 @pytest.mark.parametrize("limit", [50, 1 << 40, 1 << 62])
@@ -13,7 +13,7 @@ def test_keys_are_sorted_with_their_order(limit):
     """Also if keys and indices do not fit into one number."""
     key = np.random.default_rng(1).integers(0, limit, 3000)
     key[1::3] = key[::3]
-    ordered, order = _sorted_with_order(key, limit)
+    ordered, order = sorted_with_order(key, limit)
     np.testing.assert_array_equal(order, np.argsort(key, kind="stable"))
     np.testing.assert_array_equal(ordered, np.sort(key))
 

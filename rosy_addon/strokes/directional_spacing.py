@@ -10,13 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import RosyError
 from ..field.frames import dot
 from ..projection.camera import Camera
-from .spacing import MIN_FACING_COSINE, foreshortening_factor
 from .tangent_mesh import TangentMesh
+from .visibility import pixel_size
+
+#: Smallest cosine between the normal and the direction to the camera for which the density is kept.
+MIN_FACING_COSINE = 1 / 3
+
+
+def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
+    """Return the factor of the spacing that keeps the density even; see `spacing_in_picture`."""
+    return (1 + cosine) / (2 * cosine)
+
 
 #: Smallest distance in the picture, relative to the requested spacing. It is that of strokes across the
-#: foreshortened direction at the cosine at which `spacing_by_foreshortening` stops to grow.
+#: foreshortened direction at `MIN_FACING_COSINE`.
 MIN_PICTURE_RATIO = foreshortening_factor(MIN_FACING_COSINE) * MIN_FACING_COSINE
 
 #: Smallest cosine between the normal and the direction to the camera for which the spacing grows. Below it,
@@ -61,23 +71,37 @@ class CornerSpacing:
         return spacing
 
 
-def spacing_in_picture(mesh: TangentMesh, values: np.ndarray, camera: Camera) -> CornerSpacing:
-    """Widen a spacing across the foreshortened direction, where strokes would crowd in the picture.
+def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> CornerSpacing:
+    """Return the spacing in world space of strokes that are some pixels apart in the picture.
 
-    Let c be the cosine between the normal and the direction to the camera, and p the angle between a
-    stroke and the foreshortened direction. Strokes at a distance s on the surface are
-    s / sqrt(cos^2 p + sin^2 p / c^2) apart in the picture.
+    Let c be the cosine between the normal and the direction to the camera. The visible area of the
+    surface is c times its area. Lines on it appear between c and 1 times as long, and (1 + c) / 2
+    times on average over their directions. So the spacing grows by (1 + c) / (2 c), to keep the
+    density even.
+
+    It grows more for strokes that would crowd. Let p be the angle between a stroke and the foreshortened
+    direction. Strokes at a distance s on the surface are s / sqrt(cos^2 p + sin^2 p / c^2) apart in the
+    picture.
 
     Parameters
     ----------
     mesh : TangentMesh
-    values : (T, 3) float64 ndarray
-        Spacing at the corners, from `spacing_by_foreshortening`, before tone and curvature or after.
     camera : Camera
+    pixels : float
+        Spacing for a surface that faces the camera.
+
+    Raises
+    ------
+    RosyError
+        If `pixels` is not finite or not above 0.
     """
+    if not (np.isfinite(pixels) and pixels > 0):
+        raise RosyError(f"the spacing must be above 0 pixels, not {pixels:g}")
     to_eye = camera.view_directions(mesh.points)
     cosine = np.abs(dot(mesh.corner_normal, to_eye))
-    relative = MIN_PICTURE_RATIO / foreshortening_factor(np.maximum(cosine, MIN_FACING_COSINE))
+    factor = foreshortening_factor(np.maximum(cosine, MIN_FACING_COSINE))
+    values = pixels * factor * pixel_size(mesh.points.reshape(-1, 3), camera).reshape(-1, 3)
+    relative = MIN_PICTURE_RATIO / factor
     steepness = relative**2 * (1 / np.maximum(cosine, MIN_COSINE) ** 2 - 1)
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
     norm = np.abs(tangent)

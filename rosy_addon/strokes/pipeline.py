@@ -18,6 +18,7 @@ from .crossings import crossing_gaps_task
 from .directional_spacing import CornerSpacing, spacing_in_picture
 from .families import label_families_task
 from .head_on_ends import head_on_ends_task
+from .mesh_in_view import mesh_in_view_task, whole_mesh
 from .outline import OUTLINE_KINDS, outline_task
 from .outline_visibility import clip_outline_task
 from .overshoot import extension_task, mark_free_boundary_ends
@@ -27,9 +28,7 @@ from .spacing import (
     LightSource,
     fan_vertices,
     lit_tone,
-    pixel_spacing,
     spacing_by_curvature_task,
-    spacing_by_foreshortening,
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
@@ -39,7 +38,7 @@ from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
 from .style import StrokeStyle
 from .svg import Pen, simplify_mask_task
-from .tangent_mesh import tangent_mesh_task
+from .tangent_mesh import TangentMesh, tangent_mesh_task
 from .trace import trace_on_mesh_task
 from .visibility import DepthBuffer, clip_task, depth_task, in_frame, pixel_size, project_to_pixels
 
@@ -137,18 +136,20 @@ def draw_instances_task(
     if not drawn:
         raise RosyError("no object has a field: strokes need one")
     if clip_to_frame or not style.hidden:
-        drawn = [index for index in drawn if _is_in_view(instances[index], camera)]
-    strokes_of_instances = []
+        drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
+    clips = clip_to_frame or not style.hidden
+    traced = {}
     for rank, index in enumerate(drawn):
         start, stop = (0.05 + 0.8 * done / len(drawn) for done in (rank, rank + 1))
-        clipped = clip_to_frame or not style.hidden
-        task = _trace_instance(instances[index], camera, style, lights, clipped, cache)
-        strokes_of_instances.append((yield from subtask(task, start, stop)))
-    if not strokes_of_instances:
+        task = _trace_instance(instances[index], camera, style, lights, clips, cache)
+        strokes = yield from subtask(task, start, stop)
+        if strokes is not None:
+            traced[index] = strokes
+    if not traced:
         raise _no_visible_stroke(camera)
-    strokes = reduce(Strokes.concatenate, strokes_of_instances)
-    family_counts = [len(traced.names) for traced in strokes_of_instances]
-    clips = clip_to_frame or not style.hidden
+    drawn = list(traced)
+    strokes = reduce(Strokes.concatenate, traced.values())
+    family_counts = [len(strokes.names) for strokes in traced.values()]
     if not len(strokes) and not style.outline:
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     depth_buffer = None
@@ -190,32 +191,37 @@ def _trace_instance(
     lights: Sequence[LightSource],
     clipped: bool,
     cache: Cache,
-) -> Task[Strokes]:
-    """Return all strokes of a mesh instance, including hidden parts."""
-    yield Progress(0.0, "computing the spacing")
+) -> Task[Strokes | None]:
+    """Return all strokes of a mesh instance, including hidden parts; None if none can be in view."""
+    label = "computing the spacing"
+    yield Progress(0.0, label)
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
     by_fan = with_vertices_of_fans(instance)
-    spacing = _vertex_spacing(by_fan, camera, style)
-    yield Progress(0.005, "computing the spacing")
+    factor = np.ones(len(by_fan.surface.vertices))
     tone = lit_tone(by_fan, camera, lights) if style.tone else None
     # Without changes of the spacing, all of the tone is in the widths.
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     if tone is not None:
-        spacing = spacing_by_tone(spacing, tone, max_ratio)
+        factor = spacing_by_tone(factor, tone, max_ratio)
     if style.curvature:
         task = spacing_by_curvature_task(instance.surface, 1.0, style.curvature)
-        factor = yield from subtask(task, 0.01, 0.02)
-        spacing = spacing * factor[fan_vertices(instance.surface)]
-    yield Progress(0.02, "computing the spacing")
-    check_stroke_memory(by_fan, spacing, camera, clipped)
+        vertex_factor = yield from subtask(task, 0.01, 0.02)
+        factor = factor * vertex_factor[fan_vertices(instance.surface)]
     mesh = yield from subtask(
-        tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.03, 0.1
+        tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.02, 0.08
     )
-    corner_spacing = CornerSpacing(spacing[by_fan.surface.triangle_vertex])
-    if style.unit == "pixels":
-        corner_spacing = spacing_in_picture(mesh, corner_spacing.values, camera)
-    task = trace_on_mesh_task(mesh, corner_spacing, surface_name=instance.surface.name)
-    strokes = yield from subtask(task, 0.1, 0.9)
+    part = whole_mesh(mesh)
+    if clipped:
+        part = yield from subtask(mesh_in_view_task(mesh, camera), 0.08, 0.09)
+    yield Progress(0.09, label)
+    if not part.mesh.z.any():
+        return None
+    spacing = _corner_spacing(part.mesh, camera, style, clipped)
+    values = spacing.values * part.corner_values(factor[by_fan.surface.triangle_vertex])
+    spacing = replace(spacing, values=values)
+    check_stroke_memory(part.mesh, values, camera, clipped, instance.surface.name)
+    task = trace_on_mesh_task(part.mesh, spacing, surface_name=instance.surface.name)
+    strokes = part.on_whole_mesh((yield from subtask(task, 0.1, 0.9)))
     strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
         # Strokes may cross creases, families do not.
@@ -279,38 +285,35 @@ def _overshoot_task(
     return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
 
 
-def _vertex_spacing(instance: MeshInstance, camera: Camera, style: StrokeStyle) -> np.ndarray:
-    """Return (V,) float64: the spacing at vertices, in world space.
+def _corner_spacing(
+    mesh: TangentMesh, camera: Camera, style: StrokeStyle, clipped: bool
+) -> CornerSpacing:
+    """Return the spacing at corners, in world space, without tone and curvature.
 
-    Outside the frame of a perspective camera, the spacing is not smaller than the smallest spacing
-    inside. Otherwise the number of strokes near the camera plane would be unlimited.
+    If strokes are not clipped, the spacing outside the frame of a perspective camera is not smaller than
+    the smallest spacing inside. Otherwise the number of strokes near the camera plane would be unlimited.
     """
     if style.unit == "world":
-        return np.full(len(instance.surface.vertices), style.distance)
-    spacing = spacing_by_foreshortening(
-        instance, camera, pixel_spacing(instance, camera, style.spacing)
-    )
-    if not camera.is_perspective:
+        return CornerSpacing(np.full(mesh.triangle_vertex.shape, style.distance))
+    spacing = spacing_in_picture(mesh, camera, style.spacing)
+    if clipped or not camera.is_perspective:
         return spacing
-    points = instance.face_points()
-    pixels, _ = project_to_pixels(points, camera)
-    inside = in_frame(pixels, camera)
+    points, values = mesh.points.reshape(-1, 3), spacing.values
+    inside = in_frame(project_to_pixels(points, camera)[0], camera)
     if inside.any():
-        return np.maximum(spacing, spacing[instance.surface.used_vertices[inside]].min())
-    mean_pixel_size = (
-        float(np.linalg.norm(points - camera.eye, axis=1).mean()) / camera.pixels_per_unit
-    )
-    ratio = OFFSCREEN_DISTANCE_RATIO if _is_in_view(instance, camera) else 1.0
-    return np.maximum(spacing, style.spacing * ratio * mean_pixel_size)
+        least = values.ravel()[inside].min()
+    else:
+        mean_distance = float(np.linalg.norm(points - camera.eye, axis=1).mean())
+        ratio = OFFSCREEN_DISTANCE_RATIO if _is_in_view(points, camera) else 1.0
+        least = style.spacing * ratio * mean_distance / camera.pixels_per_unit
+    return replace(spacing, values=np.maximum(values, least))
 
 
-def _is_in_view(instance: MeshInstance, camera: Camera) -> bool:
-    """Return whether an instance may be in view.
+def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
+    """Return whether a surface with these (n, 3) vertices may be in view.
 
-    It is not if all vertices of its faces are outside one plane of the view frustum. The far plane
-    is not tested.
+    It is not if all of them are outside one plane of the view frustum. The far plane is not tested.
     """
-    points = instance.face_points()
     matrix = camera.projection @ camera.view
     clip = points @ matrix[:, :3].T + matrix[:, 3]
     outside = np.abs(clip[:, :2]) > clip[:, 3:]

@@ -1,4 +1,4 @@
-"""Spacing of strokes at vertices: by pixels of a camera, foreshortening, tone and curvature."""
+"""Spacing of strokes at vertices, by tone and curvature."""
 
 from __future__ import annotations
 
@@ -18,16 +18,12 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
-from .visibility import pixel_size
 
 #: Largest and smallest factor by which tone and curvature change a spacing.
 MAX_SPACING_RATIO, MIN_SPACING_RATIO = 3.0, 0.5
 
 #: Strokes end where the tone reduces their width to this fraction.
 MIN_STROKE_WIDTH = 0.12
-
-#: Smallest cosine between the normal and the direction to the camera for which the spacing grows.
-MIN_FACING_COSINE = 1 / 3
 
 #: Luminance of linear red, green and blue, in double precision.
 LUMINANCE_WEIGHTS = np.array(REC709_LUMINANCE)
@@ -79,52 +75,6 @@ def fan_vertices(surface: Surface) -> np.ndarray:
     vertex = np.zeros(int(surface.corner_fan.max()) + 1, dtype=np.int32)
     vertex[surface.corner_fan] = surface.corner_vertex
     return vertex
-
-
-def pixel_spacing(instance: MeshInstance, camera: Camera, pixels: float) -> np.ndarray:
-    """Return (V,) float64: the lengths in world space of a number of pixels at the vertices.
-
-    Raises
-    ------
-    RosyError
-        If `pixels` is not finite or not above 0.
-    """
-    if not (np.isfinite(pixels) and pixels > 0):
-        raise RosyError(f"the spacing must be above 0 pixels, not {pixels:g}")
-    return pixels * pixel_size(instance.world_points(), camera)
-
-
-def spacing_by_foreshortening(
-    instance: MeshInstance, camera: Camera, spacing: np.ndarray
-) -> np.ndarray:
-    """Widen the spacing where the surface turns away from the camera, to keep the density even.
-
-    Let c be the cosine between the normal and the direction to the camera. The visible area of the
-    surface is c times its area. Lines on it appear between c and 1 times as long, and (1 + c) / 2
-    times on average over their directions. So the spacing grows by (1 + c) / (2 c).
-
-    Parameters
-    ----------
-    instance : MeshInstance
-    camera : Camera
-    spacing : (V,) ndarray
-        Spacing for a surface that faces the camera, in world space.
-
-    Returns
-    -------
-    (V,) float64 ndarray
-    """
-    to_eye = camera.view_directions(instance.world_points())
-    cosine = np.maximum(
-        np.maximum(lambert_tone(instance, to_eye), lambert_tone(instance, -to_eye)),
-        MIN_FACING_COSINE,
-    )
-    return spacing * foreshortening_factor(cosine)
-
-
-def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
-    """Return the factor of `spacing_by_foreshortening` for cosines above 0."""
-    return (1 + cosine) / (2 * cosine)
 
 
 def spacing_by_tone(

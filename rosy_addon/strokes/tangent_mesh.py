@@ -8,7 +8,7 @@ transported by unfolding the two triangles.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -310,6 +310,23 @@ def tangent_mesh_task(
         edge_transport=edge_transport,
         area=area,
         triangle_vertex=surface.triangle_vertex,
+    )
+
+
+def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
+    """Return a mesh with other corners, (T, 3, 3), in the planes of its triangles.
+
+    Strokes stop at triangles that have no area.
+    """
+    _, _, _, area = _triangle_frames(points)
+    is_flat = area == 0
+    return replace(
+        mesh,
+        points=points,
+        area=area,
+        gradient=_barycentric_gradients(points, mesh.x, mesh.y, area),
+        z=np.where(is_flat[:, None], 0, mesh.z),
+        neighbor=np.where(is_flat[:, None] | is_flat[mesh.neighbor], np.int32(-1), mesh.neighbor),
     )
 
 

@@ -28,6 +28,7 @@ from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_cam
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.strokes.crossings import cut_intervals, find_crossings, with_crossing_gaps
+from rosy_addon.strokes.directional_spacing import spacing_in_picture
 from rosy_addon.strokes.families import global_labels
 from rosy_addon.strokes.head_on_ends import head_on_ends_task
 from rosy_addon.strokes.outline import outline
@@ -36,9 +37,7 @@ from rosy_addon.strokes.separation_rules import SeparationRules
 from rosy_addon.strokes.singularity_seeds import singularities
 from rosy_addon.strokes.spacing import (
     headlight_tone,
-    pixel_spacing,
     spacing_by_curvature_task,
-    spacing_by_foreshortening,
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
@@ -585,7 +584,7 @@ def test_slanted_surfaces_are_as_dense_in_the_picture(slant):
         instance = MeshInstance(
             floor, IDENTITY, axis_field(floor, 4, (np.cos(angle), np.sin(angle), 0))
         )
-        spacing = spacing_by_foreshortening(instance, camera, pixel_spacing(instance, camera, 6.0))
+        spacing = spacing_in_picture(build_tangent_mesh(instance), camera, 6.0).values
         strokes = trace_strokes(instance, spacing)
         pixels, _ = project_to_pixels(strokes.points, camera)
         segment_length = np.linalg.norm(np.diff(pixels, axis=0), axis=1)

@@ -23,12 +23,11 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.strokes.outline import outline
 from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.spacing import pixel_spacing
 from rosy_addon.strokes.stroke_set import Strokes
 from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.svg import Pen, write_svg
 from rosy_addon.strokes.trace import trace_strokes
-from rosy_addon.strokes.visibility import clip_to_visible
+from rosy_addon.strokes.visibility import clip_to_visible, pixel_size
 
 pytestmark = pytest.mark.slow
 
@@ -143,7 +142,9 @@ def strokes(scene):
     """Tapered strokes along and across the axis, and silhouettes."""
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
-    lines = trace_strokes(crossed, pixel_spacing(crossed, camera, 9.0)).tapered(0.8, 0.15)
+    lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera)).tapered(
+        0.8, 0.15
+    )
     return clip_to_visible(
         Strokes.concatenate(lines, outline(instance, camera)), [instance], camera
     )
@@ -170,7 +171,7 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
     lines = clip_to_visible(
-        trace_strokes(crossed, pixel_spacing(crossed, camera, 14.0)), [crossed], camera
+        trace_strokes(crossed, 14.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
     )
     lines = Strokes.concatenate(
         lines, clip_to_visible(outline(instance, camera), [instance], camera)
@@ -234,7 +235,9 @@ def test_half_the_opacity_is_half_the_ink(program, tmp_path):
 def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
     instance, camera = scene
     lines = clip_to_visible(
-        trace_strokes(instance, pixel_spacing(instance, camera, 5.0)), [instance], camera
+        trace_strokes(instance, 5.0 * pixel_size(instance.world_points(), camera)),
+        [instance],
+        camera,
     )
     write_svg(tmp_path / "a.svg", lines, camera)
     browser(tmp_path / "a.svg", tmp_path / "a.png")

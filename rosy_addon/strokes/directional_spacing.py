@@ -29,9 +29,10 @@ def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
 #: foreshortened direction at `MIN_FACING_COSINE`.
 MIN_PICTURE_RATIO = foreshortening_factor(MIN_FACING_COSINE) * MIN_FACING_COSINE
 
-#: Smallest cosine between the normal and the direction to the camera for which the spacing grows. Below it,
-#: lines that approach the silhouette at an angle would end before they reach it.
-MIN_COSINE = 0.2
+#: Limits of the smallest cosine between the normal and the direction to the camera for which the spacing
+#: grows. Between them, the part of the surface with smaller cosines is this many spacings wide in the
+#: picture. Lines that approach a silhouette at an angle would otherwise end before they reach it.
+MIN_COSINES, SILHOUETTE_SPACINGS = (0.03, 0.2), 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +101,31 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     to_eye = camera.view_directions(mesh.points)
     cosine = np.abs(dot(mesh.corner_normal, to_eye))
     factor = foreshortening_factor(np.maximum(cosine, MIN_FACING_COSINE))
-    values = pixels * factor * pixel_size(mesh.points.reshape(-1, 3), camera).reshape(-1, 3)
+    facing_values = pixels * pixel_size(mesh.points.reshape(-1, 3), camera).reshape(-1, 3)
     relative = MIN_PICTURE_RATIO / factor
-    steepness = relative**2 * (1 / np.maximum(cosine, MIN_COSINE) ** 2 - 1)
+    # On a surface of curvature k, c is below a limit in a band as wide as limit^2 / (2 k).
+    band = 2 * SILHOUETTE_SPACINGS * facing_values * _curvature(mesh)[:, None]
+    steepness = relative**2 * (
+        1 / np.maximum(cosine, np.clip(np.sqrt(band), *MIN_COSINES)) ** 2 - 1
+    )
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
     norm = np.abs(tangent)
     tangent = np.divide(tangent, norm, out=np.zeros_like(tangent), where=norm > 0)
     mean = relative**2 + steepness / 2
     return CornerSpacing(
-        values, mean, steepness / 2 * tangent**2, (relative**2 + steepness > 1).any(axis=1)
+        facing_values * factor,
+        mean,
+        steepness / 2 * tangent**2,
+        (relative**2 + steepness > 1).any(axis=1),
     )
+
+
+def _curvature(mesh: TangentMesh) -> np.ndarray:
+    """Return (T,) float64: the largest change of the normal along an edge, over its length."""
+    curvature = np.zeros(len(mesh.points))
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        turn = mesh.corner_normal[:, first] - mesh.corner_normal[:, second]
+        edge = mesh.points[:, first] - mesh.points[:, second]
+        squared_length = np.maximum(dot(edge, edge), 1e-300)
+        curvature = np.maximum(curvature, np.sqrt(dot(turn, turn) / squared_length))
+    return curvature

@@ -1,0 +1,128 @@
+"""The part of a mesh in view: exactly what is in the frame, and the same surface where it is cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import icosphere, plane
+
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.mesh_in_view import MARGIN_PIXELS, mesh_in_view_task
+from rosy_addon.strokes.pipeline import draw_instances
+from rosy_addon.strokes.style import StrokeStyle
+from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
+from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
+from rosy_addon.strokes.visibility import project_to_pixels
+
+#: A camera at the height 2 above a ground plane, whose horizon is in the picture.
+ABOVE_GROUND = perspective_camera(look_at((0, 0, 2), (0, 20, 1)), 192, 108)
+
+#: A camera inside a sphere of radius 1, and one that sees a part of it.
+INSIDE = perspective_camera(look_at((0.2, 0.1, 0.3), (1, 0.4, 0.1)), 100, 80)
+CLOSE = orthographic_camera(look_at((0, -3, 1), (0.4, 0, 0)), 100, 80, scale=0.6)
+
+SCENES = {
+    "ground": (plane(3, 3, 1000.0), ABOVE_GROUND),
+    "inside a sphere": (icosphere(2), INSIDE),
+    "close to a sphere": (icosphere(2), CLOSE),
+}
+
+
+def mesh_and_part(name):
+    surface, camera = SCENES[name]
+    field = (
+        axis_field(surface, 4, (1, 0.3, 0)) if name == "ground" else generate(surface, "form", 4)
+    )
+    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
+    return mesh, run_to_completion(mesh_in_view_task(mesh, camera)), camera
+
+
+def random_weights(count, rng):
+    weights = -np.log(rng.random((count, 3)))
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_part_is_what_is_in_the_frame(name):
+    mesh, part, camera = mesh_and_part(name)
+    points = part.mesh.points.reshape(-1, 3)
+    assert np.allclose(
+        points, np.einsum("tkj,tji->tki", part.weights, mesh.points[part.triangle]).reshape(-1, 3)
+    )
+    pixels, _ = project_to_pixels(points + 1e-7 * (points.mean(axis=0) - points), camera)
+    size = np.array([camera.width, camera.height])
+    finite = np.isfinite(pixels).all(axis=1)
+    assert np.all(np.abs(pixels[finite] - size / 2) <= size / 2 + MARGIN_PIXELS + 0.01)
+    assert 0 < part.mesh.area.sum() < mesh.area.sum()
+    # Random points of triangles that are in the frame are in one part each, others in none.
+    rng = np.random.default_rng(5)
+    triangle = rng.integers(len(mesh.points), size=4000)
+    weights = random_weights(len(triangle), rng)
+    pixels, _ = project_to_pixels(mesh.points_at(triangle, weights), camera)
+    with np.errstate(invalid="ignore"):
+        expected = (np.abs(pixels - size / 2) <= size / 2 + MARGIN_PIXELS).all(axis=1)
+    parts_around = np.zeros(len(triangle), dtype=int)
+    to_part = np.linalg.inv(part.weights[part.mesh.area > 0])
+    for piece, inverse in zip(part.triangle[part.mesh.area > 0], to_part, strict=True):
+        on_triangle = np.flatnonzero(triangle == piece)
+        parts_around[on_triangle] += (weights[on_triangle] @ inverse >= 0).all(axis=1)
+    assert expected.sum() > 30
+    assert np.array_equal(parts_around, expected)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_parts_are_connected_as_the_mesh(name):
+    """A straight walk in the part ends at the same point as on the whole mesh, unless at a cut."""
+    mesh, part, _ = mesh_and_part(name)
+    triangle, edge = np.nonzero(part.mesh.neighbor >= 0)
+    other = part.mesh.neighbor[triangle, edge], part.mesh.neighbor_edge[triangle, edge]
+    assert np.array_equal(part.mesh.neighbor[other], triangle)
+    assert np.array_equal(part.mesh.neighbor_edge[other], edge)
+    rng = np.random.default_rng(6)
+    with_area = np.flatnonzero(part.mesh.area > 0)
+    start = rng.choice(with_area, 500).astype(np.int32)
+    weights = random_weights(len(start), rng)
+    direction = np.exp(2j * np.pi * rng.random(len(start)))
+    length = rng.random(len(start)) * 0.5 * np.sqrt(part.mesh.area[start])
+    ends = []
+    on_whole = np.einsum("nk,nkj->nj", weights, part.weights[start])
+    for of_mesh, at, on in ((part.mesh, start, weights), (mesh, part.triangle[start], on_whole)):
+        particles = SurfaceParticles(at, on, np.ones(len(at), dtype=complex), np.ones(len(at)))
+        arrived, walked = trace_geodesics(of_mesh, particles, direction, length)
+        ends.append((of_mesh.points_at(arrived.triangle, arrived.weights), walked))
+    reached = ends[0][1] >= 0.999 * length
+    assert reached.mean() > 0.7
+    size = np.abs(ends[1][0]).max()
+    np.testing.assert_allclose(ends[0][0][reached], ends[1][0][reached], atol=1e-6 * size)
+
+
+def test_a_mesh_in_the_frame_is_not_changed():
+    surface = icosphere(2)
+    mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, "form", 4)))
+    camera = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 100, 100)
+    assert run_to_completion(mesh_in_view_task(mesh, camera)).mesh is mesh
+
+
+def test_ground_up_to_the_horizon():
+    """Strokes keep their distance in the picture on a ground of any number of faces, and end."""
+    spacing, counts = 9.0, []
+    for columns in (1, 20):
+        ground = plane(columns, columns, 1000.0)
+        instance = MeshInstance(ground, np.eye(4), axis_field(ground, 4, (1, 0, 0)))
+        strokes = draw_instances([instance], ABOVE_GROUND, StrokeStyle(spacing=spacing)).strokes
+        pixels, _ = project_to_pixels(strokes.points, ABOVE_GROUND)
+        length = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
+        in_rows = [
+            length[
+                (np.diff(strokes.stroke) == 0) & (pixels[1:, 1] >= low) & (pixels[1:, 1] < low + 15)
+            ]
+            for low in (0, 15, 30, 45)
+        ]
+        density = np.array([row.sum() for row in in_rows]) / (15 * ABOVE_GROUND.width)
+        # Two families; foreshortened lines are kept at most this much denser.
+        assert np.all((density > 1.6 / spacing) & (density < 3.2 / spacing)), density
+        counts.append(density)
+    np.testing.assert_allclose(counts, np.mean(counts, axis=0)[None].repeat(2, axis=0), rtol=0.2)

@@ -16,7 +16,7 @@ from PIL import Image
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import Surface
 from rosy_addon.presets.store import Preset, load_preset, preset_keys
@@ -38,9 +38,6 @@ LARGE, SMALL = (820, 640), (410, 320)
 #: Empty margin at each border, as a fraction of the frame.
 MARGIN = 0.04
 
-#: Smoothing length of the curvature field.
-REACH = 0.1
-
 #: Palette sizes of the .png files: of hatching (ink, paper and the edges between) and of others.
 HATCHING_COLORS, COLORS = 32, 192
 
@@ -53,16 +50,16 @@ class Model:
     ----------
     name : str
     instance : MeshInstance
-        With a smoothed curvature field, for presets that do not show the magnitude.
-    raw : MeshInstance
-        With an unsmoothed curvature field and its magnitude.
+        With the default field, for presets that do not show the magnitude.
+    with_magnitude : MeshInstance
+        With the curvature of each face.
     view : (float, float)
         Azimuth and elevation in degrees.
     """
 
     name: str
     instance: MeshInstance
-    raw: MeshInstance
+    with_magnitude: MeshInstance
     view: tuple[float, float]
 
 
@@ -86,14 +83,13 @@ def write(folder: Path) -> None:
         "# Presets",
         "Here you can compare all presets that come with RoSy, on Suzanne (subdivided three "
         "times), on [Spot](https://www.cs.cmu.edu/~kmcrane/Projects/ModelRepository/) and on the "
-        f"Stanford bunny. All pictures use a curvature field with a reach of {REACH:g} and the "
-        "light of the preset, unless the lines below the picture say otherwise. These two lines "
-        "make the picture from a selected mesh in a new scene. Use them in Blender's Python "
-        "console or in a script. In the panel, use *Make Field*, *Look* and *Bake*. The view "
-        "transform *Standard* shows ink and paper as they were drawn.",
+        "Stanford bunny. All pictures use the default field, *Form* with degree 4, and the light of "
+        "the preset, unless the lines below the picture say otherwise. These two lines make the "
+        "picture from a selected mesh in a new scene. Use them in Blender's Python console or in a "
+        "script. In the panel, use *Make Field*, *Look* and *Bake*. The view transform *Standard* "
+        "shows ink and paper as they were drawn.",
         "With a mesh file and without Blender:",
-        "    python -m rosy_addon render bunny.obj -o bunny.png --generate curvature --reach "
-        f"{REACH:g} --preset engraving --size 1600x1200",
+        "    python -m rosy_addon render bunny.obj -o bunny.png --preset engraving --size 1600x1200",
         "Lengths are in pixels of the finished picture. A picture of twice the size shows twice as "
         "many lines, not broader ones. `python -m tools.gallery.presets_page FOLDER` draws this "
         "page, given a folder with `meshes/spot.obj` and `meshes/stanford-bunny.obj`.",
@@ -114,15 +110,10 @@ def _load_models(meshes: Path) -> dict[str, Model]:
 
 
 def _model(name: str, surface: Surface, matrix: np.ndarray, view: tuple[float, float]) -> Model:
-    smooth, raw = (
-        MeshInstance(
-            surface,
-            matrix,
-            generate(surface, GeneratorSettings("curvature", smoothing_length=reach), 4),
-        )
-        for reach in (REACH, 0.0)
+    along_form, curvature = (
+        MeshInstance(surface, matrix, generate(surface, kind, 4)) for kind in ("form", "curvature")
     )
-    return Model(name, smooth, raw, view)
+    return Model(name, along_form, curvature, view)
 
 
 def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
@@ -136,14 +127,14 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
     sheet.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
         path, optimize=True
     )
-    reach = 0.0 if look.magnitude != "none" else REACH
+    kind = "" if look.magnitude == "none" else 'kind="curvature"'
     return "\n\n".join(
         [
             f"## {preset.name}",
             f"{preset.description}.",
             f"![{preset.name} on {first.name}, {others[0].name} and {others[1].name}]"
             f"(images/{path.name})",
-            f'    bpy.ops.rosy.field_generate(kind="curvature", reach={reach:g})\n'
+            f"    bpy.ops.rosy.field_generate({kind})\n"
             f'    bpy.ops.rosy.preset_apply(preset="{name}"); bpy.ops.rosy.bake()',
         ]
     )
@@ -151,7 +142,7 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
 
 def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
     """Return a picture of a model on the paper of a look, (H, W, 3) uint8."""
-    instance = model.instance if look.magnitude == "none" else model.raw
+    instance = model.instance if look.magnitude == "none" else model.with_magnitude
     points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
     camera = orbit_camera(points, *model.view, width, height, margin=MARGIN)

@@ -29,6 +29,11 @@ def is_hatched(look: Any) -> bool:
     return look.ink == "hatch"
 
 
+def _has_streaks(look: Any) -> bool:
+    """Return whether streaks of noise are drawn, or break even lines."""
+    return not (is_hatched(look) and look.lines == "even" and not (look.breaks or look.wobble))
+
+
 def _is_lit(look: Any) -> bool:
     return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
@@ -130,11 +135,13 @@ class Look:
         "Length of the streaks: the number of steps in each direction",
         is_pixel_length=True,
         panel="streaks",
+        applies=_has_streaks,
     )
     taper: bool = switch(
         False,
         "Fade streaks toward their ends. Lines end in points and change less when the view zooms",
         panel="streaks",
+        applies=_has_streaks,
     )
     step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
     grain: float = number(

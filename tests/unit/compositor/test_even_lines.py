@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import mainly
+from conftest import long, mainly
 from scipy.ndimage import gaussian_filter
 from shapes import icosphere, plane
 
@@ -30,6 +30,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.settings import Choice, Number, Switch, settings_of
 
 SIZE = 256
 LOOK = Look(
@@ -134,6 +135,46 @@ def test_undefined_pixels_have_the_mean_tone():
     assert undefined.any() and not lines.period[:, undefined].any()
     width = np.full(len(gbuffer.pixel), 0.3, dtype=np.float32)
     np.testing.assert_allclose(lines.coverage(0, width, LOOK)[undefined], 0.3, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "effect", ["plain", *long("paper_grain", "overshoot"), "breaks", *long("wobble")]
+)
+def test_settings_that_do_not_apply_do_not_change_the_picture(effect):
+    """Pictures are up to date when only such settings change. Some faces have no direction."""
+    surface = plane(8, 8, 20.0)
+    vectors = axis_field(surface, 4, (1, 0.3, 0)).vectors.copy()
+    vectors[24:40] = 0
+    instance = MeshInstance(surface, np.eye(4), RosyField(4, vectors))
+    camera = camera_above(20.0, size=96)
+    look = replace(LOOK, crispness=0.8, layers=2)
+    if effect != "plain":
+        look = replace(look, **{effect: 6.0 if effect == "overshoot" else 0.5})
+    expected = picture(instance, camera, look)
+    others = {"length": 7, "taper": True}
+    applied = {name for name in others if settings_of(Look)[name].applies(look)}
+    assert applied == (set(others) if effect in ("breaks", "wobble") else set())
+    for name, setting in settings_of(Look).items():
+        if setting.applies(look):
+            continue
+        other = others.get(name, _other_value(setting))
+        actual = picture(instance, camera, replace(look, **{name: other}))
+        np.testing.assert_array_equal(actual, expected, err_msg=name)
+    for name in applied:
+        actual = picture(instance, camera, replace(look, **{name: others[name]}))
+        assert np.abs(actual - expected).max() > 0.1, name
+
+
+def _other_value(setting):
+    """A valid value of a setting that is not its default."""
+    if isinstance(setting, Choice):
+        return next(option for option in setting.options if option != setting.default)
+    if isinstance(setting, Switch):
+        return not setting.default
+    if isinstance(setting, Number):
+        middle = setting.low + 0.3 * min(setting.high - setting.low, 8.0)
+        return round(middle) if setting.is_integer else middle
+    return "#3366aa"
 
 
 def test_lines_of_the_same_input_are_the_same():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from PIL import Image
 
 from rosy_addon.compositor.look import Look
@@ -11,9 +10,9 @@ from rosy_addon.presets.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
-#: Size of the palette of pictures with few hues, and step of the tones of others. Neither is
-#: visible, and both reduce the files to a third.
-COLORS, TONE = 64, 8
+#: Sizes of the palettes of pictures with few hues, and with noise of many. They are not visible
+#: at the size of previews, and reduce the files to a third.
+TONES, COLORS = 32, 256
 
 
 def write() -> None:
@@ -23,8 +22,6 @@ def write() -> None:
 
 
 def _small(look: Look) -> Image.Image:
-    shown = display(draw_preview(look))
-    if look.noise == "colour":
-        return Image.fromarray(np.minimum(np.rint(shown / TONE) * TONE, 255).astype(np.uint8))
-    method = Image.Quantize.MEDIANCUT
-    return Image.fromarray(shown).quantize(COLORS, method, kmeans=2, dither=Image.Dither.NONE)
+    shown = Image.fromarray(display(draw_preview(look)))
+    size = COLORS if look.noise == "colour" else TONES
+    return shown.quantize(size, Image.Quantize.MEDIANCUT, kmeans=4, dither=Image.Dither.NONE)

@@ -27,6 +27,10 @@ from .look import Look
 #: `pixel_neighbors.affine_depth`).
 DEPTH_JUMP = 2.0
 
+#: Minimum depth difference at a step, in multiples of the depth tolerance, and relative to the changes
+#: of depth from the pixels at the step to the next ones.
+MIN_STEP, STEP_RATIO = 3.0, 2.0
+
 #: Length in pixels of the finished picture below which a mark is not drawn, and from which on it has
 #: its full width: it grows and shrinks when something moves, but it does not flicker.
 MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
@@ -99,7 +103,9 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
             STEP_LABEL,
         )
     task = _occlusions_task(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
-    yield from subtask(task, 0.6, 0.8, STEP_LABEL)
+    yield from subtask(task, 0.6, 0.75, STEP_LABEL)
+    task = _steps_task(gbuffer, look, grid, mask, depth, tolerance, line_width)
+    yield from subtask(task, 0.75, 0.8, STEP_LABEL)
     edge_pixels = np.flatnonzero(line_width)
     strength = yield from subtask(
         _mark_strength_task(
@@ -239,6 +245,41 @@ def _occlusions_task(
             line_width[edge] = np.maximum(line_width[edge], width)
             border[edge[is_empty]] |= EMPTY_BORDER
             border[edge[~is_empty & ~same_instance]] |= PART_BORDER
+
+
+def _steps_task(
+    gbuffer: GBuffer,
+    look: Look,
+    grid: _CellGrid,
+    mask: np.ndarray,
+    depth: np.ndarray,
+    tolerance: np.ndarray,
+    line_width: np.ndarray,
+) -> Task[None]:
+    """Set the width of lines at the nearer pixel of steps in the depth of a surface.
+
+    A surface that is seen edge-on predicts any difference in depth, so `mask`, that of
+    `neighbor_masks_task`, does not tell it from a silhouette. At a step, the depth changes much more
+    than from either pixel on to the next.
+    """
+    defined = gbuffer.representation != 0
+    for block in pixel_blocks(len(grid.cell)):
+        yield Progress(block.start / len(grid.cell), STEP_LABEL)
+        for offset, bit in ((1, 5), (grid.stride, 7)):
+            first = np.flatnonzero(mask[block] >> np.uint16(bit) & 1) + block.start
+            second = grid.entry.take(grid.cell[first] + offset)
+            jump = np.abs(depth[second] - depth[first])
+            steep = jump > np.float32(MIN_STEP) * np.minimum(tolerance[first], tolerance[second])
+            first, second, jump = first[steep], second[steep], jump[steep]
+            is_step = np.ones(len(first), dtype=bool)
+            for near, beyond in ((first, -offset), (second, offset)):
+                neighbor = grid.entry.take(grid.cell[near] + beyond)
+                change = np.abs(depth.take(neighbor) - depth[near])
+                change[neighbor < 0] = 0
+                is_step &= jump > np.float32(STEP_RATIO) * change
+            first, second = first[is_step], second[is_step]
+            nearer = np.where(depth[first] > depth[second], first, second)
+            line_width[nearer[defined[first] & defined[second]]] = look.outline
 
 
 def _mark_strength_task(

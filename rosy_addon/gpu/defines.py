@@ -27,7 +27,9 @@ from ..compositor.outline import (
     EMPTY_BORDER,
     FULL_MARK_LENGTH,
     MIN_MARK_LENGTH,
+    MIN_STEP,
     PART_BORDER,
+    STEP_RATIO,
 )
 from ..compositor.streak_statistics import WOBBLE_BREAKS
 from ..compositor.surface_noise import (
@@ -91,6 +93,8 @@ FLOAT_CONSTANTS = {
     "GROWTH_STOP": GROWTH_OCTAVES[1],
     "MIN_COVERAGE": MIN_COVERAGE,
     "DEPTH_JUMP": DEPTH_JUMP,
+    "MIN_STEP": MIN_STEP,
+    "STEP_RATIO": STEP_RATIO,
     "LINE_TOLERANCE": LINE_TOLERANCE,
     "MIN_RELATIVE_DEPTH": MIN_RELATIVE_DEPTH,
     "MAX_SLOPE": MAX_SLOPE,

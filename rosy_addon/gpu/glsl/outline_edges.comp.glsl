@@ -9,6 +9,17 @@ int part_of(ivec2 pixel)
   return int(parts[triangle & 3]);
 }
 
+// How much the depth changes from a pixel to the next; 0 where there is no surface.
+float depth_change(ivec2 pixel, ivec2 offset, float depth)
+{
+  ivec2 next = pixel + offset, frame = imageSize(outline_edges);
+  if (any(lessThan(next, ivec2(0))) || any(greaterThanEqual(next, frame)) ||
+      texelFetch(field_values, next, 0).w == 0.0) {
+    return 0.0;
+  }
+  return abs(texelFetch(depth_slopes, next, 0).x - depth);
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
@@ -53,6 +64,13 @@ void main()
       // Where two parts intersect, there is a crease.
       if (other_part && dot(normal.xyz, other_normal.xyz) < min_normal_cosine) {
         width = max(width, 0.5 * outline);
+      }
+      // A surface that is seen edge-on predicts any depth: a step is much steeper than what is around.
+      float fall = slope.x - other_slope.x;
+      if (fall > MIN_STEP * min(slope.w, other_slope.w) &&
+          fall > STEP_RATIO * depth_change(pixel, -offset, slope.x) &&
+          fall > STEP_RATIO * depth_change(neighbor, offset, other_slope.x)) {
+        width = outline;
       }
       continue;
     }

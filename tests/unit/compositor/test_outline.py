@@ -97,21 +97,32 @@ def test_lengths_of_marks_are_in_pixels_of_the_finished_picture(supersampling):
     assert (mark_lengths(blocks) >= MIN_LENGTH).all()
 
 
-@pytest.mark.parametrize("name", ["torus", "noisy torus", "tube", "boxes"])
+def hills() -> Surface:
+    """A landscape with slopes that many views see edge-on, behind other slopes."""
+    x, y = np.meshgrid(np.linspace(-3, 3, 160), np.linspace(-3, 3, 160))
+    z = 0.35 * np.sin(2.2 * x) * np.cos(2 * y) + 0.15 * np.sin(3 * y + x)
+    corner = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
+    start = np.arange(0, quads.size + 1, 4)
+    return build_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads.ravel(), start)
+
+
+@pytest.mark.parametrize("name", ["torus", "noisy torus", "tube", "boxes", "hills"])
 def test_silhouettes_are_covered(name):
-    """At least 0.98 of the silhouettes that a search over all edges finds."""
+    """At least 0.995 of the silhouettes that a search over all edges finds."""
     surface = {
+        "hills": hills,
         "torus": lambda: torus(),
         "noisy torus": lambda: noisy("torus", False),
         "tube": lambda: cylinder(64, 4),
         "boxes": lambda: combined(((0, 0, 0), (1, 1, 0.2)), ((0.2, 0.3, 0.4), (0.3, 0.2, 0.3))),
     }[name]()
     instance = instance_of(surface)
-    for angles in ((30.0, 35.0), (-70.0, 8.0)):
+    for angles in ((30.0, 35.0), (-70.0, 8.0), (0.0, 20.0)):
         camera = orbit_camera(instance.face_points(), *angles, SIZE, SIZE)
         points, lengths = visible_silhouettes(instance, camera)
         assert lengths.sum() > SIZE
-        assert covered_share(outline_of(instance, camera), points, lengths) >= 0.98
+        assert covered_share(outline_of(instance, camera), points, lengths) >= 0.995
 
 
 def test_tiny_parts_keep_their_outlines():

@@ -6,7 +6,8 @@ distributed. So a line that covers a fraction of the paper is that fraction of t
 lines wide, and the tone is exact. Lines swell and thin with the tone.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
-they fade into their mean. Where they are too far apart, as in near parts of a perspective picture,
+they fade into their mean. Where a surface turns away across some lines, these are drawn last, after
+those in other directions. Where lines are too far apart, as in near parts of a perspective picture,
 further lines grow between them.
 """
 
@@ -39,6 +40,10 @@ SPACING_GRAINS = 2.0
 
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
 FADE_PIXELS = (1.3, 2.6)
+
+#: Distances between lines on screen, relative to the one asked for, between which crowded lines leave
+#: their place to lines in other directions.
+CROWDED_SHARES = (0.3, 0.6)
 
 #: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
 #: which further lines grow between them.
@@ -116,6 +121,29 @@ class EvenLines:
         low, high = (np.float32(pixels * look.supersampling) for pixels in FADE_PIXELS)
         contrast = smoothstep((period - low) / (high - low))
         return width + contrast * (covered - width)
+
+    def crowding(self, line: int, look: Look) -> np.ndarray:
+        """Compute how much one line is crowded.
+
+        Parameters
+        ----------
+        line : int
+        look : Look
+            In pixels of the frame. Its `grain` is used.
+
+        Returns
+        -------
+        (P,) float32 ndarray
+            0 to 1.
+        """
+        low, high = (np.float32(pixels) for pixels in crowded_pixels(look))
+        return 1 - smoothstep((self.period[line] - low) / (high - low))
+
+
+def crowded_pixels(look: Look) -> tuple[float, float]:
+    """`CROWDED_SHARES` as distances in pixels of the frame."""
+    low, high = CROWDED_SHARES
+    return low * SPACING_GRAINS * look.grain, high * SPACING_GRAINS * look.grain
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:

@@ -141,7 +141,8 @@ def _render_one_ink(
     if not by_magnitude:
         transmittance = 1 - inks.required_coverage(inks.target_transmittance(transmittance), ink)
     bare_paper = np.ones_like(tone)
-    for line, share in enumerate(line_shares(field, look, transmittance)):
+    shares = line_shares(field, look, transmittance, modulation.even_lines)
+    for line, share in enumerate(shares):
         target_coverage = 1 - transmittance[line % len(transmittance)] ** share
         bare_paper *= 1 - line_coverage(line, target_coverage, images, look, modulation)
     if modulation.outline is not None:
@@ -166,7 +167,8 @@ def _render_many_inks(
     target_transmittance = inks.target_transmittance(transmittance)
     bare_paper = np.ones_like(tone)
     transmitted = np.ones((len(tone), 3), dtype=np.float32)
-    for line, share in enumerate(line_shares(field, look, transmittance)):
+    shares = line_shares(field, look, transmittance, modulation.even_lines)
+    for line, share in enumerate(shares):
         ink = inks.ink_at_tone(ink_indices[line], tone)
         target_coverage = inks.required_coverage(
             target_transmittance[line % len(target_transmittance)] ** share, ink
@@ -349,11 +351,13 @@ def _soft_rank(rank: np.ndarray, rank_count: int) -> np.ndarray:
     return soft_rank
 
 
-def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> list[np.ndarray]:
+def line_shares(
+    field: PixelField, look: Look, transmittance: np.ndarray, even_lines: EvenLines | None = None
+) -> list[np.ndarray]:
     """Compute the share of the ink that each line takes.
 
-    Lines join as the picture gets darker, in the order of their ranks. The shares are continuous
-    where two lines swap ranks, so no seam is visible.
+    Lines join as the picture gets darker, in the order of their ranks. Even lines that are crowded
+    join last. The shares are continuous where two lines swap ranks, so no seam is visible.
 
     Parameters
     ----------
@@ -362,6 +366,8 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
         Its `guiding_angle`, `layers` and `layering` are used.
     transmittance : (M, P) or (1, P) ndarray
         Target transmittance of each line, or of all lines.
+    even_lines : EvenLines, optional
+        At the pixels of the field.
 
     Returns
     -------
@@ -369,7 +375,7 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
         If all lines have the same target, the shares sum to 1 at each pixel. Where the field is
         undefined, the first line has the share 1.
     """
-    onsets = [_onset_darkness(rank, look) for rank in _line_ranks(field, look)]
+    onsets = _onset_darkness(field, look, even_lines)
     first_onset = np.minimum.reduce(onsets)
     delays = [onset - first_onset for onset in onsets]
     shares = []
@@ -390,7 +396,17 @@ def line_shares(field: PixelField, look: Look, transmittance: np.ndarray) -> lis
     return shares
 
 
-def _onset_darkness(rank: np.ndarray, look: Look) -> np.ndarray:
-    """(P,) darkness at which lines of a rank join. Above 1 for ranks beyond `look.layers`."""
-    onset = _soft_rank(rank, look.layers) * np.float32(look.layering)
-    return onset + 2 * smoothstep((rank - look.layers + RANK_BLEND) / (2 * RANK_BLEND))
+def _onset_darkness(
+    field: PixelField, look: Look, even_lines: EvenLines | None
+) -> list[np.ndarray]:
+    """(P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
+    onsets = []
+    for line, rank in enumerate(_line_ranks(field, look)):
+        onset = _soft_rank(rank, look.layers) * np.float32(look.layering)
+        if look.layers < field.line_count:
+            onset += 2 * smoothstep((rank - look.layers + RANK_BLEND) / (2 * RANK_BLEND))
+        if even_lines is not None:
+            delay = np.float32(field.line_count * look.layering)
+            onset += delay * even_lines.crowding(line, look)
+        onsets.append(onset)
+    return onsets

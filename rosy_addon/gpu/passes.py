@@ -458,6 +458,7 @@ LIC = ComputePass(
         ("even_lines", "int"),
         ("min_edge_width", "float"),
         ("fade_pixels", "vec2"),
+        ("crowded_pixels", "vec2"),
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
 )

@@ -14,6 +14,7 @@ from ..compositor.even_lines import (
     MAX_EDGE_WIDTH,
     SPACING_GRAINS,
     WOBBLE_SHIFT,
+    crowded_pixels,
     has_even_lines,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
@@ -138,6 +139,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "even_lines": int(has_even_lines(look)),
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": tuple(pixels * look.supersampling for pixels in FADE_PIXELS),
+        "crowded_pixels": crowded_pixels(pixel_look),
     }
 
 

@@ -78,7 +78,7 @@ void main()
       one_ink = ink_of_tone(0.0, pixel_tone);
     }
     for (int line = 0; line < line_count; ++line) {
-      first_onset = min(first_onset, onset_darkness(line, line_angle));
+      first_onset = min(first_onset, onset_darkness(line, line_angle, pixel));
     }
   }
   // Even lines have no streaks, but breaks.
@@ -115,11 +115,11 @@ void main()
         }
         onset_sum = 0.0;
         for (int other_line = 0; other_line < line_count; ++other_line) {
-          float delay = onset_darkness(other_line, line_angle) - first_onset;
+          float delay = onset_darkness(other_line, line_angle, pixel) - first_onset;
           onset_sum += onset_weight(delay, transmittance);
         }
       }
-      float line_delay = onset_darkness(line, line_angle) - first_onset;
+      float line_delay = onset_darkness(line, line_angle, pixel) - first_onset;
       float line_share = onset_weight(line_delay, transmittance) / onset_sum;
       if (is_undirected) {
         line_share = line == 0 ? 1.0 : 0.0;

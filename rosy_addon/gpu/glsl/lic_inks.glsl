@@ -26,11 +26,19 @@ float soft_rank(float rank, int count)
 
 // The darkness from which a line is drawn, as `hatching._onset_darkness`. Beyond 1 for a line that
 // exceeds the number of layers.
-float onset_darkness(int line, float first)
+float onset_darkness(int line, float first, ivec2 pixel)
 {
-  float rank = line_rank(line, first);
-  float surplus = smooth_unit_step((rank - float(layers) + RANK_BLEND) / (2.0 * RANK_BLEND));
-  return soft_rank(rank, layers) * layering + 2.0 * surplus;
+  float rank = line_rank(line, first), onset = soft_rank(rank, layers) * layering;
+  if (layers < line_count) {
+    onset += 2.0 * smooth_unit_step((rank - float(layers) + RANK_BLEND) / (2.0 * RANK_BLEND));
+  }
+  if (even_lines != 0) {
+    float period = texelFetch(line_image, ivec3(pixel, line), 0).y;
+    float low = crowded_pixels.x, high = crowded_pixels.y;
+    float crowding = 1.0 - smooth_unit_step((period - low) / (high - low));
+    onset += crowding * layering * float(line_count);
+  }
+  return onset;
 }
 
 // The weight, 0 to 1, of a line whose onset is a delay later than the first one.

@@ -13,6 +13,7 @@ from shapes import cube
 
 from rosy_addon.color import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
 from rosy_addon.compositor.fast_lic import fast_lic_task
 from rosy_addon.compositor.hatching import (
@@ -198,6 +199,21 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
         # Where two families swap ranks, both are drawn, and possibly a third one.
         typical_count = np.median((shares > 0.02).sum(axis=0))
         assert typical_count <= min(layers, field.line_count)
+        if layers >= field.line_count and tone < 0.1:
+            # All lines are drawn, whatever their angle to the guiding angle.
+            np.testing.assert_allclose(shares, 1 / field.line_count, atol=0.02)
+
+
+def test_crowded_even_lines_are_drawn_last():
+    """Where a surface turns away across the first lines, the ink of light tones is in the others."""
+    field = planar_pixel_field(np.zeros((1, 3)), 4)
+    look = Look(ink="hatch", lines="even", grain=2.5, layers=2, layering=0.5)
+    period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
+    lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
+    first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
+    np.testing.assert_allclose(first + second, 1, atol=1e-6)
+    assert first[0] > 0.95 and second[1] > 0.95
+    assert abs(first[2] - first[0]) < 1e-6
 
 
 @pytest.mark.parametrize("name", mainly(HATCHED[::3], HATCHED))

@@ -16,7 +16,8 @@ import numpy as np
 
 from ..progress import Progress, Task, run_to_completion, subtask
 
-#: Relative increase of the diagonal of a matrix that is singular.
+#: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,
+#: relative to the largest one.
 SINGULAR_SHIFT = 1e-10
 
 #: Largest number of unknowns of the coarsest level; it is solved with a dense inverse.
@@ -287,9 +288,15 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
 
 def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
     """(n,) weights of a Jacobi step that damps the upper part of the spectrum."""
-    diagonal = matrix.diagonal
+    diagonal = _positive_diagonal(matrix)
     scaled_row_sum = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1]) / diagonal
     return 4 / (3 * scaled_row_sum.max() * diagonal)
+
+
+def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
+    """(n,) diagonal without zeros: the eigenvalue of a component of tiny area is lost in rounding."""
+    diagonal = matrix.diagonal
+    return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
 
 
 def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
@@ -303,8 +310,7 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     try:
         return np.linalg.inv(dense)
     except np.linalg.LinAlgError:
-        # A component of tiny area has an eigenvalue that is lost in rounding.
-        np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * matrix.diagonal)
+        np.fill_diagonal(dense, (1 + SINGULAR_SHIFT) * _positive_diagonal(matrix))
         return np.linalg.inv(dense)
 
 

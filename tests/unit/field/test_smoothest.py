@@ -91,6 +91,28 @@ def test_multigrid_cycles_converge(degree):
     assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
 
 
+def test_multigrid_cycles_ignore_rows_of_rounding():
+    """The row of a component of tiny area can be all rounding, with 0 on the diagonal."""
+    matrix = laplacian(build_connection(bumpy(icosphere(4))), 4, 0.1)
+    count = len(matrix)
+    with_row = from_coo(
+        np.concatenate([matrix.row_indices, [count, count, 0]]),
+        np.concatenate([matrix.indices, [count, 0, count]]),
+        np.concatenate([matrix.data, [0, 1e-16, 1e-16]]),
+        count + 1,
+        count + 1,
+    )
+    right = np.append(np.random.default_rng(0).standard_normal(count), 0) + 0j
+    solution = np.zeros_like(right)
+    with np.errstate(divide="raise", invalid="raise", over="raise"):
+        levels = run_to_completion(hierarchy_task(with_row))
+        for _ in range(12):
+            solution += w_cycle(levels, right - with_row @ solution)
+    assert len(levels) > 1
+    expected = spsolve(as_scipy(matrix).tocsc(), right[:-1])
+    assert np.linalg.norm(solution[:-1] - expected) < 0.1 * np.linalg.norm(expected)
+
+
 # --- the connection --------------------------------------------------------------------------------
 
 

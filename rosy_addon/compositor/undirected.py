@@ -89,7 +89,8 @@ def undirected_texture_task(
             total = np.zeros(len(cell), dtype=np.complex64)
             for dx, dy in offsets.tolist():
                 total += samples.take(cell + (dy * stride + dx))
-            texture[band[block]] = total.real / total.imag
+            # The disc around a lone pixel may have no samples.
+            texture[band[block]] = total.real / np.maximum(total.imag, 1)
     return texture
 
 

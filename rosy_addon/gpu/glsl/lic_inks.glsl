@@ -127,5 +127,5 @@ vec3 disc_mean(ivec2 pixel)
       count += 1.0;
     }
   }
-  return sum / count;
+  return sum / max(count, 1.0);
 }

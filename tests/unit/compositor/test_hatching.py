@@ -422,6 +422,19 @@ def test_undefined_faces_keep_the_tone(name):
     assert ramp_error(PRESETS[name], undefined) <= 0.03
 
 
+def test_lone_pixels_of_undefined_faces_have_ink_or_not():
+    """A face of one pixel has no neighbors to average, whatever its tone."""
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 40, 40, scale=40.0)
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    speck = build_surface(square, np.arange(4), np.array([0, 4]))
+    instance = MeshInstance(speck, np.eye(4), RosyField(4, np.zeros((1, 3))))
+    gbuffer = project([instance], camera)
+    assert len(gbuffer.pixel) == 1
+    with np.errstate(all="raise"):
+        rgba = compose(gbuffer, Look(ink="hatch", grain=10.0, length=4)).rgba
+    assert np.isfinite(rgba).all()
+
+
 @pytest.mark.parametrize("kind", ["families", "ramp"])
 def test_undefined_faces_keep_the_tone_in_color(kind):
     undefined = RosyField(4, np.zeros((ball().face_count, 3)))

@@ -29,7 +29,7 @@ DEPTH_JUMP = 2.0
 
 #: Minimum depth difference at a step, in multiples of the depth tolerance, and relative to the changes
 #: of depth from the pixels at the step to the next ones.
-MIN_STEP, STEP_RATIO = 3.0, 2.0
+MIN_STEP, STEP_RATIO = 6.0, 2.0
 
 #: Length in pixels of the finished picture below which a mark is not drawn, and from which on it has
 #: its full width: it grows and shrinks when something moves, but it does not flicker.

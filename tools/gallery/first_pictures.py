@@ -31,7 +31,7 @@ from .solid import compose_view, view
 PAGE = ROOT / "docs" / "first-pictures.md"
 
 #: Size of a picture in pixels, and pictures in a row.
-SIDE, COLUMNS = 193, 4
+SIDE, COLUMNS = 262, 3
 
 #: Presets of the sheets.
 PRESETS = ("default", "cross-hatch", "engraving", "pencil")
@@ -67,7 +67,7 @@ def write(folder: Path) -> None:
         pieces += [
             f"## {preset.name}",
             f"![{preset.name} on sixteen meshes](images/{path.name})",
-            f"    python -m rosy_addon render mesh.obj -o mesh.png --preset {name} --size 193x193",
+            f"    python -m rosy_addon render mesh.obj -o mesh.png --preset {name} --size {SIDE}x{SIDE}",
         ]
     PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
 

@@ -27,7 +27,7 @@ OUTWARD_STEPS_PX = (0.0, 1.0, 2.0)
 
 #: A silhouette is not hidden by triangles that share a vertex with its own and are in front of it by less
 #: than this fraction of the longest edge of its own.
-MAX_RING_DEPTH = 0.5
+MAX_RING_DEPTH = 1.0
 
 #: Shorter gaps in outlines are closed, and shorter outlines are left out, in pixels.
 MAX_GAP_PX, MIN_MARK_PX = 4.0, 6.0

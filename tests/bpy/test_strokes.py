@@ -1,4 +1,4 @@
-"""The spacing of strokes on Suzanne."""
+"""The spacing of strokes on Suzanne, and her outlines."""
 
 from __future__ import annotations
 
@@ -7,19 +7,24 @@ import numpy as np
 import pytest
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.surface import build_surface
+from rosy.rosy_addon.projection.camera import orbit_camera
 from rosy.rosy_addon.projection.gbuffer import MeshInstance
+from rosy.rosy_addon.strokes.pipeline import draw_instances
+from rosy.rosy_addon.strokes.style import StrokeStyle
 from rosy.rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy.rosy_addon.strokes.trace import trace_strokes
+from rosy.rosy_addon.strokes.visibility import project_to_pixels
+from rosy.tests.harness.outline_marks import visible_silhouettes
 from rosy.tests.harness.stroke_spacing import lateral_gaps
-
-pytestmark = pytest.mark.long
+from scipy.spatial import cKDTree
 
 
 def suzanne(levels=2):
     """Return the surface of Suzanne, subdivided."""
     bpy.ops.mesh.primitive_monkey_add()
     monkey = bpy.context.object
-    monkey.modifiers.new("smooth", "SUBSURF").levels = levels
+    if levels:
+        monkey.modifiers.new("smooth", "SUBSURF").levels = levels
     mesh = monkey.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     points = [tuple(vertex.co) for vertex in mesh.vertices]
     faces = [list(polygon.vertices) for polygon in mesh.polygons]
@@ -27,6 +32,7 @@ def suzanne(levels=2):
     return build_surface(points, np.concatenate(faces), starts, name="Suzanne")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [2, 4, 6])
 def test_spacing_on_suzanne(scene, degree):
     surface = suzanne()
@@ -36,3 +42,15 @@ def test_spacing_on_suzanne(scene, degree):
     )
     assert gaps.evenness() >= 0.9
     assert gaps.nearest_distance.min() >= 0.5
+
+
+def test_outlines_of_a_coarse_mesh_have_no_gaps(scene):
+    """Silhouettes of interpolated normals lie behind faces of their mesh, here by up to 0.3 units."""
+    surface = suzanne(0)
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", 4))
+    camera = orbit_camera(surface, -32.0, 24.0, 300, 300)
+    strokes = draw_instances([instance], camera, StrokeStyle(spacing=60, outline=True)).strokes
+    outlines = strokes.select(strokes.family == strokes.names.index("silhouettes"))
+    silhouettes, _ = visible_silhouettes(instance, camera, min_jump=50)
+    distance, _ = cKDTree(project_to_pixels(outlines.points, camera)[0]).query(silhouettes)
+    assert distance.max() < 6.5

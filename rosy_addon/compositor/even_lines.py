@@ -7,8 +7,8 @@ lines wide, and the tone is exact. Lines swell and thin with the tone.
 
 Edges are smoothed by a box filter of at least a pixel. Where lines are too close for the pixels,
 they fade into their mean. Where a surface turns away across some lines, these are drawn last, after
-those in other directions. Where lines are too far apart, as in near parts of a perspective picture,
-further lines grow between them.
+those in other directions, and lines at a larger distance on the surface take their place. Where lines
+are too far apart, as in near parts of a perspective picture, further lines grow between them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ FADE_PIXELS = (1.3, 2.6)
 
 #: Distances between lines on screen, relative to the one asked for, between which crowded lines leave
 #: their place to lines in other directions.
-CROWDED_SHARES = (0.3, 0.6)
+CROWDED_SHARES = (0.25, 0.5)
+
+#: Distance on the surface between the lines that replace crowded ones, relative to that of these.
+COARSE_RATIO = 3.0
 
 #: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
 #: which further lines grow between them.
@@ -81,16 +84,20 @@ class EvenLines:
     growth : (P,) float32 ndarray or None
         Width of the lines that grow between them, from 0 to 1: as wide as the others. None if
         there are none.
+    coarse_streaks : (M, P) float32 ndarray or None
+        `streaks` of the lines that replace crowded ones. None if no lines are crowded.
     """
 
     streaks: np.ndarray
     period: np.ndarray
     growth: np.ndarray | None
+    coarse_streaks: np.ndarray | None = None
 
     def part(self, extent: slice) -> EvenLines:
         """Return the lines at some of the pixels."""
         growth = None if self.growth is None else self.growth[extent]
-        return EvenLines(self.streaks[:, extent], self.period[:, extent], growth)
+        coarse = None if self.coarse_streaks is None else self.coarse_streaks[:, extent]
+        return EvenLines(self.streaks[:, extent], self.period[:, extent], growth, coarse)
 
     def coverage(self, line: int, target_coverage: np.ndarray, look: Look) -> np.ndarray:
         """Compute the coverage of each pixel by one line.
@@ -108,19 +115,39 @@ class EvenLines:
         (P,) float32 ndarray
         """
         width = np.asarray(target_coverage, dtype=np.float32)
-        period = self.period[line]
-        position = np.float32(0.5) - np.float32(0.5) * self.streaks[line]
+        if self.coarse_streaks is None:
+            return width + self._relief(self.streaks[line], self.period[line], width, look)
+        crowding = self.crowding(line, look)
+        covered = width + (1 - crowding) * self._relief(
+            self.streaks[line], self.period[line], width, look
+        )
+        crowded = np.flatnonzero(crowding)
+        coarse_period = np.float32(COARSE_RATIO) * self.period[line, crowded]
+        streak, width = self.coarse_streaks[line, crowded], width[crowded]
+        relief = self._relief(streak, coarse_period, width, look, crowded)
+        covered[crowded] += crowding[crowded] * relief
+        return covered
+
+    def _relief(
+        self,
+        streak: np.ndarray,
+        period: np.ndarray,
+        width: np.ndarray,
+        look: Look,
+        pixels: np.ndarray | slice = slice(None),
+    ) -> np.ndarray:
+        """(n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
+        position = np.float32(0.5) - np.float32(0.5) * streak
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
         if self.growth is None:
             covered = _box_filtered(position, width, edge)
         else:
-            between = np.float32(0.5) * self.growth * width
+            between = np.float32(0.5) * self.growth[pixels] * width
             covered = _box_filtered(position, width - between, edge)
             covered += _box_filtered(np.float32(0.5) - position, between, edge)
         low, high = (np.float32(pixels * look.supersampling) for pixels in FADE_PIXELS)
-        contrast = smoothstep((period - low) / (high - low))
-        return width + contrast * (covered - width)
+        return smoothstep((period - low) / (high - low)) * (covered - width)
 
     def crowding(self, line: int, look: Look) -> np.ndarray:
         """Compute how much one line is crowded.
@@ -272,40 +299,87 @@ def even_lines_task(
     count = len(field.pixel)
     streaks, period = np.zeros((2, field.line_count, count), dtype=np.float32)
     growth = np.zeros(count, dtype=np.float32)
+    coarse_streaks = None
     instance_id = gbuffer.instance_id[field.gbuffer_index]
-    all_entries = np.arange(len(gbuffer.pixel), dtype=np.intp)[field.gbuffer_index]
     present = np.flatnonzero(np.bincount(instance_id)).tolist()
-    asked_pixels = SPACING_GRAINS * look.grain
     for number, index in enumerate(present):
-        instance = gbuffer.instances[index]
-        spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
-        task = cached_surface_lines_task(
-            instance.surface, instance.matrix, instance.field, look.display, spacing, cache
-        )
         start, stop = number / len(present), (number + 1) / len(present)
-        lines = yield from subtask(task, start, stop)
-        sides = _camera_space_sides(gbuffer, instance)
         pixels = np.flatnonzero(instance_id == index)
-        for block in pixel_blocks(len(pixels)):
-            yield Progress(stop, STEP_LABEL)
-            part = pixels[block]
-            is_all = len(pixels) == count
-            block_field = field.part(block) if is_all else _taken(field, part)
-            phases, line_period, octaves = _evaluate(
-                gbuffer, all_entries[part], block_field, look, lines, sides, spacing / asked_pixels
+        task = _instance_lines_task(gbuffer, field, look, index, pixels, wobble_angle, 1.0, cache)
+        result = yield from subtask(task, start, (start + stop) / 2)
+        streaks[:, pixels], period[:, pixels], growth[pixels] = result
+        is_crowded = (result[1] < crowded_pixels(look)[1]).any(axis=0)
+        pixels = pixels[is_crowded & (field.representation[pixels] != 0)]
+        if len(pixels):
+            task = _instance_lines_task(
+                gbuffer, field, look, index, pixels, wobble_angle, COARSE_RATIO, cache
             )
-            if wobble_angle is not None:
-                phases += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[part]
-            if octaves is not None:
-                doublings = np.floor(octaves)
-                first, last = GROWTH_OCTAVES
-                growth[part] = smoothstep((octaves - doublings - first) / (last - first))
-                scale = np.exp2(doublings).astype(np.float32)
-                phases *= scale
-                line_period /= scale
-            streaks[:, part] = 1 - 2 * np.abs(phases - np.rint(phases))
-            period[:, part] = line_period
-    return EvenLines(streaks, period, growth if growth.any() else None)
+            result = yield from subtask(task, (start + stop) / 2, stop)
+            coarse_streaks = np.zeros_like(streaks) if coarse_streaks is None else coarse_streaks
+            coarse_streaks[:, pixels] = result[0]
+    return EvenLines(streaks, period, growth if growth.any() else None, coarse_streaks)
+
+
+def _instance_lines_task(
+    gbuffer: GBuffer,
+    field: PixelField,
+    look: Look,
+    index: int,
+    pixels: np.ndarray,
+    wobble_angle: np.ndarray | None,
+    ratio: float,
+    cache: Cache | None,
+) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Evaluate the lines of one mesh instance at some pixels of the field.
+
+    Parameters
+    ----------
+    gbuffer, field, look, wobble_angle, cache
+        As for `even_lines_task`.
+    index : int
+        Of the instance.
+    pixels : (n,) intp ndarray
+        Of the field.
+    ratio : float
+        Distance between lines on the surface, relative to that of the look.
+
+    Returns
+    -------
+    streaks, period : (M, n) float32 ndarray
+        As in `EvenLines`. The period is that of the ratio 1.
+    growth : (n,) float32 ndarray
+    """
+    instance = gbuffer.instances[index]
+    spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
+    task = cached_surface_lines_task(
+        instance.surface, instance.matrix, instance.field, look.display, ratio * spacing, cache
+    )
+    lines = yield from subtask(task, 0.0, 1.0)
+    sides = _camera_space_sides(gbuffer, instance)
+    unit = spacing / (SPACING_GRAINS * look.grain)
+    entries = np.arange(len(gbuffer.pixel), dtype=np.intp)[field.gbuffer_index]
+    streaks, period = np.empty((2, field.line_count, len(pixels)), dtype=np.float32)
+    growth = np.zeros(len(pixels), dtype=np.float32)
+    is_all = len(pixels) == len(field.pixel)
+    for block in pixel_blocks(len(pixels)):
+        yield Progress(1.0, STEP_LABEL)
+        part = pixels[block]
+        block_field = field.part(block) if is_all else _taken(field, part)
+        phases, line_period, octaves = _evaluate(
+            gbuffer, entries[part], block_field, look, lines, sides, unit
+        )
+        if wobble_angle is not None:
+            phases += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[part]
+        if octaves is not None:
+            doublings = np.floor(octaves)
+            first, last = GROWTH_OCTAVES
+            growth[block] = smoothstep((octaves - doublings - first) / (last - first))
+            scale = np.exp2(doublings).astype(np.float32)
+            phases *= scale
+            line_period /= scale
+        streaks[:, block] = 1 - 2 * np.abs(phases - np.rint(phases))
+        period[:, block] = line_period
+    return streaks, period, growth
 
 
 def _taken(field: PixelField, pixels: np.ndarray) -> PixelField:

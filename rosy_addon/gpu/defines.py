@@ -13,7 +13,7 @@ import numpy as np
 from ..color import REC709_LUMINANCE
 from ..compositor.compose import COLOR_CONTRAST
 from ..compositor.covering import ALL_NEIGHBORS
-from ..compositor.even_lines import GROWTH_OCTAVES, MAX_BREAK_AMOUNT
+from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOUNT
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
@@ -89,6 +89,7 @@ FLOAT_CONSTANTS = {
     "WOBBLE_BREAKS": WOBBLE_BREAKS,
     "RANK_BLEND": RANK_BLEND,
     "MAX_BREAK_AMOUNT": MAX_BREAK_AMOUNT,
+    "COARSE_RATIO": COARSE_RATIO,
     "GROWTH_START": GROWTH_OCTAVES[0],
     "GROWTH_STOP": GROWTH_OCTAVES[1],
     "MIN_COVERAGE": MIN_COVERAGE,

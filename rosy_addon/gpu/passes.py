@@ -259,6 +259,7 @@ EVEN_LINES = ComputePass(
         ("spacing_pixels", "float"),
         ("asked_pixels", "float"),
         ("node_count", "int"),
+        ("first_layer", "int"),
     ),
     includes=("triangle_record", "screen_direction", "line_member"),
 )

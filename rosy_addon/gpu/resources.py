@@ -38,8 +38,8 @@ from .mesh_buffers import (
 #: frame of an animation has new meshes.
 IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
 
-#: Textures of even lines that are kept for each mesh.
-MAX_LINE_TEXTURES = 3
+#: Textures of even lines that are kept for each mesh: two for each distance.
+MAX_LINE_TEXTURES = 6
 
 #: Size limit of what was computed from meshes in memory: even lines, creases and parts.
 MAX_MESH_CACHE_BYTES = 1 << 28

@@ -1,6 +1,6 @@
 // Evenly spaced lines at the pixels of one instance, as `even_lines._evaluate`: the distance from the
 // middle of the nearest line, the distance between lines in pixels, and the width of the lines that
-// grow between them.
+// grow between them. Lines that replace crowded ones have the distance and the width of these.
 
 vec4 line_texel(int index)
 {
@@ -104,6 +104,6 @@ void main()
                        0.0 :
                        spacing * exp2(-doublings) * across / max(along_length, 1e-6);
     float streak = 1.0 - 2.0 * abs(phase - round(phase));
-    imageStore(line_image, ivec3(pixel, line), vec4(streak, min(period, 6e4), growth, 0.0));
+    imageStore(line_image, ivec3(pixel, first_layer + line), vec4(streak, min(period, 6e4), growth, 0.0));
   }
 }

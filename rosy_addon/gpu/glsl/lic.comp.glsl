@@ -154,7 +154,7 @@ void main()
           float variation = break_weight * break_streak + grain_offset;
           width = uneven_line_width(darkness, variation, break_weight);
         }
-        coverage = even_line_coverage(texelFetch(line_image, ivec3(pixel, line), 0), width);
+        coverage = even_line_coverage(line, pixel, width);
       }
       else {
         if (break_steps > 0) {

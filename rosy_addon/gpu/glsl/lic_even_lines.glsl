@@ -10,18 +10,34 @@ float box_filtered(float position, float width, float edge)
   return covered / edge;
 }
 
-// As `even_lines.EvenLines.coverage`, from a texel of the image of lines.
-float even_line_coverage(vec4 line_sample, float width)
+// As `even_lines.EvenLines._relief`.
+float even_line_relief(float streak, float period, float growth, float width)
 {
-  float position = 0.5 - 0.5 * line_sample.x, period = line_sample.y;
+  float position = 0.5 - 0.5 * streak;
   float edge = clamp(1.0 / max(period, 1e-6), min_edge_width, 1.0);
-  float between = 0.5 * line_sample.z * width;
+  float between = 0.5 * growth * width;
   float covered = box_filtered(position, width - between, edge);
   if (between > 0.0) {
     covered += box_filtered(0.5 - position, between, edge);
   }
-  float contrast = smooth_unit_step((period - fade_pixels.x) / (fade_pixels.y - fade_pixels.x));
-  return mix(width, covered, contrast);
+  return smooth_unit_step((period - fade_pixels.x) / (fade_pixels.y - fade_pixels.x)) *
+         (covered - width);
+}
+
+// As `even_lines.EvenLines.coverage`.
+float even_line_coverage(int line, ivec2 pixel, float width)
+{
+  vec4 fine = texelFetch(line_image, ivec3(pixel, line), 0);
+  float crowding = line_crowding(line, pixel);
+  float coverage = width;
+  if (crowding < 1.0) {
+    coverage += (1.0 - crowding) * even_line_relief(fine.x, fine.y, fine.z, width);
+  }
+  if (crowding > 0.0) {
+    float streak = texelFetch(line_image, ivec3(pixel, line_count + line), 0).x;
+    coverage += crowding * even_line_relief(streak, COARSE_RATIO * fine.y, fine.z, width);
+  }
+  return coverage;
 }
 
 // The width of a line at a mean width, as `even_lines.uneven_width`. `variation` is the sum of the

@@ -24,6 +24,14 @@ float soft_rank(float rank, int count)
   return position;
 }
 
+// As `even_lines.EvenLines.crowding`.
+float line_crowding(int line, ivec2 pixel)
+{
+  float period = texelFetch(line_image, ivec3(pixel, line), 0).y;
+  float low = crowded_pixels.x, high = crowded_pixels.y;
+  return 1.0 - smooth_unit_step((period - low) / (high - low));
+}
+
 // The darkness from which a line is drawn, as `hatching._onset_darkness`. Beyond 1 for a line that
 // exceeds the number of layers.
 float onset_darkness(int line, float first, ivec2 pixel)
@@ -33,10 +41,7 @@ float onset_darkness(int line, float first, ivec2 pixel)
     onset += 2.0 * smooth_unit_step((rank - float(layers) + RANK_BLEND) / (2.0 * RANK_BLEND));
   }
   if (even_lines != 0) {
-    float period = texelFetch(line_image, ivec3(pixel, line), 0).y;
-    float low = crowded_pixels.x, high = crowded_pixels.y;
-    float crowding = 1.0 - smooth_unit_step((period - low) / (high - low));
-    onset += crowding * layering * float(line_count);
+    onset += line_crowding(line, pixel) * layering * float(line_count);
   }
   return onset;
 }

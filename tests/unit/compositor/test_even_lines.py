@@ -14,6 +14,7 @@ from rosy_addon.cache import Cache
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import (
+    COARSE_RATIO,
     EvenLines,
     even_lines_task,
     look_width_table,
@@ -104,6 +105,20 @@ def test_spacings_in_pixels_come_in_steps():
     steps = np.diff(np.log2(sorted(spacings)))
     np.testing.assert_allclose(steps, 1 / 8, atol=1e-9)
     assert len(spacings) == 9
+
+
+def test_lines_at_a_larger_distance_replace_crowded_ones():
+    """On a wall that is seen at a small angle, all lines along the horizon would run together."""
+    cosine = 0.2
+    eye = (0, -5 * np.sqrt(1 - cosine**2), 5 * cosine)
+    view = look_at(eye, (0, 0, 0), (0, 0, 1))
+    camera = orthographic_camera(view, SIZE, SIZE, scale=2.0)
+    rgba = picture(wall_instance(), camera, replace(LOOK, grain=4.0))
+    columns = rgba[..., 0] - rgba[..., 0].mean()
+    assert columns.std() > 0.2
+    spectrum = (np.abs(np.fft.rfft(columns * np.hanning(SIZE)[:, None], 2**16, axis=0)) ** 2).sum(1)
+    distance = 2**16 / np.argmax(spectrum)
+    assert abs(np.log2(distance / (COARSE_RATIO * 2 * 4.0 * cosine))) <= 0.5 / 8 + 0.02
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])

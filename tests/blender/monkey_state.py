@@ -187,7 +187,8 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
         obj.hide_render,
         obj.hide_viewport,
         obj.add_rest_position_attribute,
-        sorted(set(obj.keys()) - {"rosy"}),
+        # Cycles adds its settings to objects when a file is opened.
+        sorted(set(obj.keys()) - {"rosy", "cycles"}),
     )
     state[f"{path}/collections"] = sorted(collection.name for collection in obj.users_collection)
     state[f"{path}/slots"] = [

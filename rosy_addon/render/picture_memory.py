@@ -62,7 +62,7 @@ SURFACE_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 34
 MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 59, 39, 79, 34
 
 #: Bytes of a visible sample with even lines instead of streaks, and of each of its lines.
-EVEN_LINES_BYTES, EVEN_LINE_BYTES = 26, 8
+EVEN_LINES_BYTES, EVEN_LINE_BYTES = 26, 14
 
 #: Bytes of a step of the streamlines of a batch.
 STEP_BYTES = 24

@@ -16,9 +16,9 @@ from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, with_corners
 
-#: Distance from the frame, in pixels, up to which strokes are traced. They then reach the frame as if
-#: the mesh went on.
-MARGIN_PIXELS = 64.0
+#: Distance from the frame up to which strokes are traced, in pixels and as a fraction of the frame; the
+#: lesser of both counts. Strokes then reach the frame as if the mesh went on.
+MARGIN_PIXELS, MARGIN_RATIO = 64.0, 0.125
 
 #: Triangles are cut at planes of constant depth, each this many times as far away as the one before, if
 #: one of them has a larger ratio of depths than `MAX_DEPTH_RATIO`: spacings are interpolated in triangles.
@@ -76,7 +76,10 @@ def mesh_in_view_task(mesh: TangentMesh, camera: Camera) -> Task[MeshInView]:
     label = "finding the part in view"
     yield Progress(0.0, label)
     x, y, z, w = _clip_coordinates(mesh.points, camera)
-    right, top = (w * (1 + 2 * MARGIN_PIXELS / side) for side in (camera.width, camera.height))
+    right, top = (
+        w * (1 + 2 * min(MARGIN_PIXELS / side, MARGIN_RATIO))
+        for side in (camera.width, camera.height)
+    )
     whole = whole_mesh(mesh)
     pieces = _Pieces(
         whole.triangle, whole.weights, mesh.neighbor, mesh.neighbor_edge, mesh.edge_transport

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.frames import dot
+
 #: Factors of the three cell coordinates, and of the level, in the hash.
 _PRIMES = np.array([73856093, 19349663, 83492791], dtype=np.int64)
 _LEVEL_PRIME = np.int64(49979687)
@@ -21,7 +23,7 @@ LEVEL_RATIO = 16.0
 MAX_RINGS = 4
 
 #: Points in a block. The points of a cell are a linked list of blocks.
-BLOCK_SIZE = 8
+BLOCK_SIZE = 16
 
 #: Queries that are answered at once, so that their data fit into the CPU caches.
 QUERY_BATCH_SIZE = 1 << 11
@@ -189,10 +191,11 @@ class PointGrid:
             rings = np.clip(np.ceil(radius / cell), 1, MAX_RINGS).astype(np.int64)
             for ring_count in range(1, int(rings.max(initial=0)) + 1):
                 queries = np.flatnonzero(rings == ring_count)
-                offset = _ring_offsets(ring_count)
                 for start in range(0, len(queries), QUERY_BATCH_SIZE):
                     batch = queries[start : start + QUERY_BATCH_SIZE]
-                    pairs += self._batch_pairs(points, radius * radius, batch, level, offset, band)
+                    pairs += self._batch_pairs(
+                        points, radius * radius, batch, level, ring_count, band
+                    )
         if not pairs:
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
         return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -203,47 +206,47 @@ class PointGrid:
         radius_squared: np.ndarray,
         queries: np.ndarray,
         level: int,
-        offset: np.ndarray,
+        rings: int,
         band: QueryBand | None,
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the pairs of some queries at a level: two arrays for each step along the lists.
 
-        `offset` holds the cell offsets of `_ring_offsets`, `queries` the numbers of the queries.
+        `queries` holds the numbers of the queries. They are at most `rings` cells large.
         """
-        levels = np.full(len(queries), level, dtype=np.int64)
-        hash_parts = self._cells(points[queries], levels) * _PRIMES
-        key = hash_parts[:, 0, None] + offset[:, 0]
-        key ^= hash_parts[:, 1, None] + offset[:, 1]
-        key ^= hash_parts[:, 2, None] + offset[:, 2]
-        key ^= np.int64(level) * _LEVEL_PRIME
-        key &= self.mask
-        block = self.last_block.take(key).ravel()
+        cell = self.cell * LEVEL_RATIO**level
+        scaled = points.take(queries, axis=0) / cell
+        corner = np.floor(scaled)
+        ratio = np.sqrt(radius_squared.take(queries)) / cell
+        if band is not None:
+            band = band._replace(direction=band.direction.take(queries, axis=0))
+        is_reached = _reached_cells(scaled - corner, ratio, rings, band)
+        row, column = np.divmod(np.flatnonzero(is_reached), is_reached.shape[1])
+        cells = corner.astype(np.int64).take(row, axis=0) + _ring_offsets(rings).take(
+            column, axis=0
+        )
+        block = self.last_block.take(self._hash_cells(cells, np.int64(level)))
         occupied = np.flatnonzero(block >= 0)
-        block = block[occupied]
-        query = queries[occupied // len(offset)]
+        block, row = block.take(occupied), row.take(occupied)
         pairs = []
         while len(block):
             delta = self.position.take(block, axis=0)
+            query = queries.take(row)
             delta -= points.take(query, axis=0)[:, :, None]
             distance = np.einsum("nij,nij->nj", delta, delta)
             limit = radius_squared.take(query)[:, None]
             within = distance <= limit
             if band is not None:
-                along = np.einsum("nij,ni->nj", delta, band.direction.take(query, axis=0))
+                along = np.einsum("nij,ni->nj", delta, band.direction.take(row, axis=0))
                 within &= (distance <= band.inner_ratio**2 * limit) | (
                     along * along <= band.band_ratio**2 * limit
                 )
             hit = np.flatnonzero(within)
-            row = hit // BLOCK_SIZE
-            pairs.append(
-                (
-                    query.take(row),
-                    self.point_index.take(block.take(row) * BLOCK_SIZE + hit % BLOCK_SIZE),
-                )
-            )
+            hit_row, slot = np.divmod(hit, BLOCK_SIZE)
+            point_slot = block.take(hit_row) * BLOCK_SIZE + slot
+            pairs.append((query.take(hit_row), self.point_index.take(point_slot)))
             block = self.next_block.take(block)
             has_next = np.flatnonzero(block >= 0)
-            block, query = block.take(has_next), query.take(has_next)
+            block, row = block.take(has_next), row.take(has_next)
         return pairs
 
     def _cells(self, points: np.ndarray, level: np.ndarray) -> np.ndarray:
@@ -257,10 +260,43 @@ class PointGrid:
 
 
 def _ring_offsets(rings: int) -> np.ndarray:
-    """Return (cells, 3) int64: the cell offsets within `rings` rings, times the hash factors."""
+    """Return (cells, 3) int64: the offsets of the cells within `rings` rings around a cell."""
     side = np.arange(-rings, rings + 1)
-    offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
-    return offset * _PRIMES
+    return np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _reached_cells(
+    position: np.ndarray, radius: np.ndarray, rings: int, band: QueryBand | None
+) -> np.ndarray:
+    """Return (n, cells) bool: the cells of `_ring_offsets` that queries reach.
+
+    Parameters
+    ----------
+    position : (n, 3) ndarray
+        Centers of the queries relative to the lowest corner of their cells. The unit is a cell.
+    radius : (n,) ndarray
+        In cells.
+    rings : int
+    band : QueryBand, optional
+        Restricts the queries.
+    """
+    side = np.arange(-rings, rings + 1)
+    beyond = np.maximum(side - position[:, :, None], position[:, :, None] - (side + 1))
+    squared = np.maximum(beyond, 0) ** 2
+    distance = squared[:, 0, :, None, None] + squared[:, 1, None, :, None]
+    distance = (distance + squared[:, 2, None, None, :]).reshape(len(position), -1)
+    limit = (radius * radius)[:, None]
+    is_reached = distance <= limit
+    if band is None:
+        return is_reached
+    to_center = (
+        band.direction @ _ring_offsets(rings).T + dot(0.5 - position, band.direction)[:, None]
+    )
+    half_width = 0.5 * np.abs(band.direction).sum(axis=1) + band.band_ratio * radius
+    is_reached &= (np.abs(to_center) <= half_width[:, None]) | (
+        distance <= band.inner_ratio**2 * limit
+    )
+    return is_reached
 
 
 def _grow_to(values: np.ndarray, count: int, fill: float) -> np.ndarray:

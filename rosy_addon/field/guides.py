@@ -21,8 +21,12 @@ from .surface import Surface, edges_task, mean_per_face, sum_per_face
 #: away are ignored.
 MAX_STROKE_DISTANCE = 0.05
 
+#: Smallest distance between samples of a stroke, relative to `Surface.extent`. Half of a mean edge may
+#: be much less, if a few faces are large and all others are tiny.
+MIN_STROKE_SPACING = 2.0**-14
+
 #: Largest number of samples of all strokes.
-MAX_STROKE_SAMPLES = 5_000_000
+MAX_STROKE_SAMPLES = 1_000_000
 
 
 def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
@@ -98,7 +102,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
     surface : Surface
     strokes : sequence of (n, 3) float ndarray
         Points in object space, in drawing order. Strokes are resampled at half the mean edge
-        length, which smooths finer jitter.
+        length, which smooths finer jitter, but not more finely than `MIN_STROKE_SPACING`.
     degree : int
         N of the field. A face gets the mean RoSy of all stroke samples on it.
 
@@ -116,6 +120,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
     corners = surface.vertices[surface.corner_vertex]
     edge = corners[surface.next_corner] - corners
     spacing = 0.5 * float(np.sqrt(dot(edge, edge)).mean())
+    spacing = max(spacing, MIN_STROKE_SPACING * surface.extent)
     polylines = [
         polyline
         for stroke in strokes

@@ -82,6 +82,8 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
     if stray := _stray_files(case, run, killed):
         return Verdict.STRAY, stray
     for name in sorted(filter(case.may_write, run.after)):
+        if killed and Path(name).name.startswith(".rosy-"):
+            continue  # nothing can remove the temporary file of a process that is killed
         if run.after[name] != run.before.get(name) and (folder / name).is_file():
             if fault := _file_fault(folder / name):
                 return Verdict.HALF_WRITTEN, f"{name}: {fault}"
@@ -155,8 +157,8 @@ def _stray_files(case: Case, run: Run, killed: bool) -> str:
     for name in sorted(run.before.keys() | run.after.keys()):
         if case.may_write(name) or run.before.get(name) == run.after.get(name):
             continue
-        if case.kill_when_writing and Path(name).name.startswith(".rosy-"):
-            continue  # nothing can remove the temporary file of a process that is killed
+        if killed and Path(name).name.startswith(".rosy-"):
+            continue
         change = "new" if name not in run.before else "changed" if name in run.after else "gone"
         return f"{name}: {change}"
     return ""

@@ -106,6 +106,16 @@ def test_strokes_far_from_the_surface_are_refused(error_of):
         assert expected in error_of(guides_from_strokes, BALL, [np.array(stroke, float)], 4)
 
 
+def test_strokes_between_tiny_parts_have_few_samples():
+    """The edges of tiny parts that are far apart do not make samples of strokes ever denser."""
+    part = icosphere(1)
+    points = np.concatenate([1e-7 * part.vertices, 1e-7 * part.vertices + (2, 0, 0)])
+    triangles = np.concatenate([part.triangle_vertex, part.triangle_vertex + len(part.vertices)])
+    surface = from_triangles(points, triangles)
+    guides = guides_from_strokes(surface, [np.array([(0.0, 0, 0), (2, 0, 0)])], 4)
+    assert (dot(guides, guides) > 0).any()
+
+
 def test_only_the_parts_of_strokes_near_the_surface_count():
     near, far = np.array([(0.0, 0, 1), (0.2, 0, 1)]), np.array([(0.2, 0, 9), (9e3, 0, 9)])
     guides = guides_from_strokes(BALL, [near, np.zeros((5, 3)), far], 4)

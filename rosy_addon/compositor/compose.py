@@ -10,7 +10,7 @@ import numpy as np
 from ..cache import Cache
 from ..color import map_colors, to_linear
 from ..progress import Progress, Task, run_to_completion, subtask
-from ..projection.gbuffer import GBuffer
+from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
@@ -28,7 +28,7 @@ from .image_noise import NOISE_MEAN
 from .lic import METHODS, lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
-from .look_units import look_in_pixels, supersampled_look
+from .look_units import antialiased_look, look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
 from .picture import DegreeLayer, Picture
 from .pixel_field import PixelField, planar_pixel_field
@@ -54,7 +54,8 @@ def compose_task(
     Parameters
     ----------
     gbuffer : GBuffer
-        Its resolution is that of the picture times `look.supersampling`, in both directions.
+        Its resolution is that of the picture times `look.supersampling`, in both directions; or that
+        of the picture, if it has a `coverage`.
     look : Look
         Its lengths are in pixels of the picture or in Blender units, not in pixels of the G-buffer.
     lights : sequence of Light
@@ -81,8 +82,10 @@ def compose_task(
     compose : The same, run to its end.
     """
     camera = gbuffer.camera
+    if gbuffer.coverage is not None:
+        look = replace(look, supersampling=1)
     look = look_in_pixels(look, camera, gbuffer.instances)
-    pixel_look = supersampled_look(look)
+    pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
     color = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
@@ -128,7 +131,13 @@ def compose_task(
         color *= tone_rgb
     rgba = yield from subtask(
         _resolve_pixels_task(
-            gbuffer.pixel, color, alpha, camera.width, camera.height, look.supersampling
+            gbuffer.pixel,
+            color,
+            alpha,
+            camera.width,
+            camera.height,
+            look.supersampling,
+            gbuffer.coverage,
         ),
         1.0,
         1.0,
@@ -291,6 +300,7 @@ def _resolve_pixels_task(
     width: int,
     height: int,
     supersampling: int,
+    coverage: PixelCoverage | None = None,
 ) -> Task[np.ndarray]:
     """Assemble the image from the colors of subpixels.
 
@@ -305,6 +315,8 @@ def _resolve_pixels_task(
         Of the supersampled frame, in pixels.
     supersampling : int
         Subpixels along each side of a pixel.
+    coverage : PixelCoverage, optional
+        Shares of pixels that the colors have, if they are not those of subpixels.
 
     Returns
     -------
@@ -326,12 +338,25 @@ def _resolve_pixels_task(
         band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
         block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
         block_rgba[:, 3] = alpha[block]
-        block_rgba[:, :3] = color[block] if s == 1 else color[block] * alpha[block, None]
-        scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-        if s == 1:
+        if s == 1 and coverage is None:
+            block_rgba[:, :3] = color[block]
+            scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
             band[...] = band_rgba.reshape(band.shape)
             continue
-        band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+        if coverage is not None:
+            block_rgba[:, 3] *= coverage.own[block]
+        block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
+        scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+        if coverage is None:
+            band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+        else:
+            first, stop = np.searchsorted(coverage.pixel, border.astype(np.int32)).tolist()
+            entry = coverage.entry[first:stop]
+            shared = np.empty((len(entry), 4), dtype=np.float32)
+            shared[:, 3] = alpha[entry] * np.float32(coverage.share)
+            shared[:, :3] = color[entry] * shared[:, 3:]
+            np.add.at(band_rgba, coverage.pixel[first:stop] - first_pixel, shared)
+            band[...] = band_rgba.reshape(band.shape)
         band_alpha = band[..., 3:]
         np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
     return rgba

@@ -31,6 +31,7 @@ from .filter_kernel import full_sample_count
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images_task, step_limits_task
 from .look import Look
+from .look_units import AntialiasedLook
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
 
@@ -61,6 +62,10 @@ MAX_UNCOVERED_FRACTION = 0.15
 
 #: Maximum number of rounds of seeding.
 MAX_ROUNDS = 8
+
+#: The spacing of seeds and the fraction of uncovered lines of antialiased pictures, and the factor
+#: of their contrast. The average of a neighbor would make streaks jagged.
+FINE_SEED_SPACING, FINE_UNCOVERED_FRACTION, FINE_CONTRAST_MATCH = 0.5, 0.0, 0.94
 
 #: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
@@ -167,7 +172,7 @@ def _write_averages(line_sums: np.ndarray, look: Look, member: np.ndarray) -> No
         sums, effective_samples = line_sums[block, :-1], line_sums[block, -1].copy()
         mean = member[block]
         np.divide(sums, effective_samples[:, None], out=mean)
-        mean *= np.float32(CONTRAST_MATCH)
+        mean *= np.float32(FINE_CONTRAST_MATCH if is_fine(look) else CONTRAST_MATCH)
         mean += np.float32(NOISE_MEAN)
         if effective_samples.min() < full_samples:
             mean[...] = normalize_variance(mean, effective_samples, look)
@@ -284,11 +289,12 @@ def _cover_all_lines_task(
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
     missing = averages.missing_lines()
     total = len(missing)
-    seeds = _grid_seeds(
-        covering, averages, max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
-    )
+    fine = is_fine(look)
+    spacing = FINE_SEED_SPACING if fine else SEED_SPACING_FACTOR
+    max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
+    seeds = _grid_seeds(covering, averages, max(int(spacing * half_window * look.step), 1))
     batch_size = _batch_size(half_window + look.length)
-    batch = StreamlineBatch(covering, look, step_limit, half_window, batch_size)
+    batch = StreamlineBatch(covering, look, step_limit, half_window, batch_size, fine)
     for _ in range(MAX_ROUNDS):
         covered_steps = 0
         for batch_seeds in _batches(seeds, batch_size):
@@ -296,7 +302,7 @@ def _cover_all_lines_task(
             covered_steps += batch.covered_steps
             yield Progress(1 - len(missing) / total, STEP_LABEL)
         missing = averages.missing_lines()
-        if len(missing) <= MAX_UNCOVERED_FRACTION * total:
+        if len(missing) <= max_uncovered * total:
             break
         # Streamlines that end early cover fewer lines, so the next round needs more seeds.
         lines_per_seed = covered_steps / max(len(seeds), 1) + 1
@@ -310,10 +316,15 @@ def _cover_all_lines_task(
         missing = averages.copy_from(missing, covering.neighbor_line(missing, forward, left))
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
     batch_size = min(_batch_size(look.length), len(missing))
-    batch = StreamlineBatch(covering, look, step_limit, 0, batch_size)
+    batch = StreamlineBatch(covering, look, step_limit, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
         averages.write(batch.trace(batch_seeds))
         yield Progress(0.95, STEP_LABEL)
+
+
+def is_fine(look: Look) -> bool:
+    """Whether streaks are drawn with more accuracy, for antialiased pictures."""
+    return isinstance(look, AntialiasedLook)
 
 
 def _batch_size(half_length: int) -> int:

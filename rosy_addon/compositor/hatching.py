@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..color import map_colors, to_linear
-from .even_lines import EvenLines, uneven_width
+from .even_lines import EvenLines, has_even_lines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
@@ -304,6 +304,18 @@ def has_outline(look: Look) -> bool:
 def has_paper_grain(look: Look) -> bool:
     """Whether the grain of the paper breaks up the ink."""
     return is_hatched(look) and look.paper_grain > 0
+
+
+def is_shaded_by_pixel(look: Look) -> bool:
+    """Whether a pixel with several samples is shaded once, not at every sample.
+
+    Ink that is drawn where streaks exceed a threshold, outlines and the grain of paper vary within a
+    pixel.
+    """
+    if not is_hatched(look):
+        return True
+    varies = has_outline(look) or has_breaks(look) or has_paper_grain(look)
+    return has_even_lines(look) and not varies
 
 
 def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:

@@ -18,6 +18,9 @@ COMPACT_INTERVAL = 8
 #: have with the method "brute".
 LATERAL_GAIN = 0.7
 
+#: The same if noise is interpolated, which leaves streaks as wide as they are.
+INTERPOLATED_GAIN = 1.0
+
 #: Distance from the center of a pixel within which the average of a streamline is preferred,
 #: pixels.
 MAX_LATERAL_OFFSET = 0.25
@@ -41,6 +44,9 @@ class StreamlineBatch:
         only contribute noise to these averages.
     max_streamlines : int
         Size of the batch.
+    interpolates : bool
+        Whether noise is interpolated across streamlines at every step. Otherwise it is that of the
+        nearest pixel.
     """
 
     def __init__(
@@ -50,13 +56,17 @@ class StreamlineBatch:
         step_limit: np.ndarray | None,
         half_window: int,
         max_streamlines: int,
+        interpolates: bool = False,
     ) -> None:
         self._covering = covering
         self._half_window, self._max_steps = half_window, half_window + look.length
         self._length, self._tapered = look.length, look.taper
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
-        self._lateral_gain = np.float32(LATERAL_GAIN * slope_scale / look.step * step_scale)
+        lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
+        self._lateral_gain = np.float32(lateral_gain / look.step * step_scale)
+        # The same, in the unit of the noise of states.
+        self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
         self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step_scale)
         self._step_limit = None if step_limit is None else np.tile(step_limit, covering.line_count)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
@@ -156,8 +166,15 @@ class StreamlineBatch:
             record = state_table.take(state, mode="clip").view(np.int16).astype(np.float32)
             record = record.view(np.complex64).reshape(len(cell), -1)
             direction = record[:, 0].copy()
+            lateral = None
+            if self._noise_gain is not None:
+                lateral = _lateral_offset(position, direction)
+                noise = record[:, 1:]
+                noise.real += (lateral * self._noise_gain)[:, None] * noise.imag
+            elif step <= self._half_window:
+                lateral = _lateral_offset(position, direction)
             total += record[:, 1:]
-            self._record_step(step, active, lanes, state, position, direction, total)
+            self._record_step(step, active, lanes, state, lateral, total)
             if step == self._max_steps:
                 break
             # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
@@ -230,8 +247,7 @@ class StreamlineBatch:
         active: np.ndarray | None,
         lanes: int,
         state: np.ndarray,
-        position: np.ndarray,
-        direction: np.ndarray,
+        lateral: np.ndarray | None,
         total: np.ndarray,
     ) -> None:
         """Write row `step` of the buffers, for all lanes or the active ones."""
@@ -241,8 +257,6 @@ class StreamlineBatch:
             self._sums[step, :lanes] += self._sums[step - 1, :lanes]
         if step > self._half_window:
             return
-        lateral = position.imag * direction.real
-        lateral -= position.real * direction.imag
         if active is None:
             self._states[step, :lanes] = state
             self._lateral_offset[step, :lanes] = lateral
@@ -318,6 +332,13 @@ class StreamlineBatch:
         row = np.where(same_side, step - 1, -step) * stride
         gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
         return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+
+def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
+    lateral = position.imag * direction.real
+    lateral -= position.real * direction.imag
+    return lateral
 
 
 def _r2_offsets(count: int) -> np.ndarray:

@@ -198,6 +198,18 @@ def pixel_rays(camera: Camera, pixel: np.ndarray) -> tuple[np.ndarray, np.ndarra
     )
 
 
+def z_at_depth(camera: Camera, x: np.ndarray, y: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Return z in camera space of points on pixel rays, given their depth z / w in clip space.
+
+    `x` and `y` are the rays from `pixel_rays`.
+    """
+    m_x, m_y, m_z, m_w = camera.projection[2]
+    if camera.is_perspective:
+        # Solves (-m_x x - m_y y + m_z) z + m_w = -z depth for z.
+        return -m_w / (depth + (m_z - m_x * x - m_y * y))
+    return (depth - m_w - m_x * x - m_y * y) / m_z
+
+
 def perspective_camera(
     view: np.ndarray,
     width: int,

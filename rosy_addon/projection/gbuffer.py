@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +44,27 @@ class MeshInstance:
     def face_points(self) -> np.ndarray:
         """Return the (n, 3) float64 vertices that have a face, in world space."""
         return self.world_points()[self.surface.used_vertices]
+
+
+class PixelCoverage(NamedTuple):
+    """How much of the pixels the surfaces of P entries of a G-buffer cover.
+
+    Attributes
+    ----------
+    own : (P,) float32 ndarray
+        Fraction of the pixel of the entry. It may be 0, if a triangle shows only at the center.
+    pixel : (E,) int32 ndarray
+        Other pixels, in ascending order, that show a part of the surface of an entry.
+    entry : (E,) int32 ndarray
+        The entry.
+    share : float
+        Fraction of the pixel.
+    """
+
+    own: np.ndarray
+    pixel: np.ndarray
+    entry: np.ndarray
+    share: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +112,9 @@ class GBuffer:
         plain RoSy field.
     instances : tuple of MeshInstance
         The mesh instances that were projected, in the order of `instance_id`. Empty if unknown.
+    coverage : PixelCoverage or None
+        How much of the pixels the entries cover, if pixels have several samples. None if each entry
+        covers its pixel.
     """
 
     camera: Camera
@@ -108,6 +133,7 @@ class GBuffer:
     front_facing: np.ndarray | None = None
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     instances: tuple[MeshInstance, ...] = ()
+    coverage: PixelCoverage | None = None
 
     def __post_init__(self) -> None:
         if self.geometric_normal is None:
@@ -116,11 +142,11 @@ class GBuffer:
             object.__setattr__(self, "front_facing", np.ones(len(self.pixel), dtype=bool))
 
     def part(self, extent: slice) -> GBuffer:
-        """Return the G-buffer of some of the pixels, without a copy."""
+        """Return the G-buffer of some of the pixels, without a copy and without their coverage."""
         arrays = {
             name: value[extent]
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray)
         }
         channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(self, **arrays, channels=channels)
+        return replace(self, **arrays, channels=channels, coverage=None)

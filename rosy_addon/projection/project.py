@@ -9,7 +9,7 @@ on which of the N members is stored.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,19 @@ from ..field.frames import dot_components, transform_components, transport_compo
 from ..field.representation import signed_power
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .camera import Camera, pixel_rays
+from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import CornerField, cached_corner_field_task
 from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
-from .rasterizer import Fragments, rasterize_task
+from .pixel_coverage import other_samples_task, pixel_coverage_task
+from .rasterizer import (
+    Fragments,
+    SampledTriangles,
+    barycentrics_task,
+    rasterize_samples_task,
+    rasterize_task,
+)
 
 #: Largest holonomy over a triangle, in radians, that is neglected in the interpolation of values.
 HOLONOMY_EPS = 3e-4
@@ -38,6 +45,7 @@ def project(
     camera: Camera,
     display: str = "smooth",
     cache: Cache | None = None,
+    samples: int = 1,
 ) -> GBuffer:
     """Return the G-buffer of mesh instances as seen by a camera; see `project_task`.
 
@@ -48,7 +56,7 @@ def project(
         camera = orbit_camera(surface, 30, 20, 640, 480)
         gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
     """
-    return run_to_completion(project_task(instances, camera, display, cache))
+    return run_to_completion(project_task(instances, camera, display, cache, samples))
 
 
 def project_task(
@@ -56,6 +64,7 @@ def project_task(
     camera: Camera,
     display: str = "smooth",
     cache: Cache | None = None,
+    samples: int = 1,
 ) -> Task[GBuffer]:
     """Compute the G-buffer: the visible pixels of all surfaces with a field, and the field there.
 
@@ -69,6 +78,9 @@ def project_task(
         face.
     cache : Cache, optional
         Stores corner fields, which do not depend on the camera.
+    samples : int
+        Samples along each side of a pixel. If there are several, the G-buffer has an entry for each
+        pixel where one of them shows a field, and a `coverage`.
 
     Yields
     ------
@@ -90,7 +102,13 @@ def project_task(
     check_instances(instances, camera, display)
     raise_mmap_threshold()
     yield Progress(0.0, "finding visible pixels")
-    visible = yield from subtask(_visible_pixels_task(instances, camera), 0.0, 0.3)
+    sampled = None
+    if samples > 1:
+        task = _visible_samples_task(instances, camera, samples)
+        visible, sampled, other_instance, other_triangle = yield from subtask(task, 0.0, 0.3)
+        other_normal = np.zeros((3, len(other_triangle)), dtype=np.float32)
+    else:
+        visible = yield from subtask(_visible_pixels_task(instances, camera), 0.0, 0.3)
     gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.4)
     count = len(gbuffer.pixel)
     pixels_done = 0
@@ -119,6 +137,11 @@ def project_task(
         )
         corner_field = corner_field.rotated(camera.view[:3, :3])
         _allocate_channels(gbuffer, corner_field)
+        if sampled is not None:
+            of_instance = np.flatnonzero(other_instance == instance_id)
+            other_normal[:, of_instance] = corner_field.geometric_normal.take(
+                other_triangle[of_instance], axis=1
+            )
         for block in pixel_blocks(len(triangle)):
             yield Progress(
                 midpoint + (stop - midpoint) * block.start / len(triangle),
@@ -133,21 +156,31 @@ def project_task(
                 instance.field.degree,
             )
         pixels_done += len(triangle)
-    return gbuffer
+    if sampled is None:
+        return gbuffer
+    task = other_samples_task(sampled, camera, samples, other_instance, other_normal)
+    others = yield from subtask(task, 1.0, 1.0)
+    coverage = yield from subtask(pixel_coverage_task(gbuffer, sampled, others, samples), 1.0, 1.0)
+    return replace(gbuffer, coverage=coverage)
 
 
 def cached_project_task(
-    instances: Sequence[MeshInstance], camera: Camera, display: str, cache: Cache
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    display: str,
+    cache: Cache,
+    samples: int = 1,
 ) -> Task[GBuffer]:
     """Do the same as `project_task`, with the G-buffer stored in a cache.
 
-    The key consists of the instances (by identity), the camera (by value) and the display.
+    The key consists of the instances (by identity), the camera (by value), the display and the
+    number of samples.
     """
     camera_key = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     return (
         yield from cache.get_or_create_task(
-            ("G-buffer", tuple(instances), camera_key, camera.name, display),
-            lambda: project_task(instances, camera, display, cache),
+            ("G-buffer", tuple(instances), camera_key, camera.name, display, samples),
+            lambda: project_task(instances, camera, display, cache, samples),
         )
     )
 
@@ -228,12 +261,8 @@ def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> T
             fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
         )
     instance_has_field = np.array([instance.field is not None for instance in instances])
-    instance_id, triangle = np.empty((2, len(fragments.pixel)), dtype=np.int32)
-    for block in pixel_blocks(len(instance_id)):
-        yield Progress(1.0, "finding visible pixels")
-        all_triangles = fragments.triangle[block]
-        instance_id[block] = np.searchsorted(first_triangle, all_triangles, side="right") - 1
-        triangle[block] = all_triangles - first_triangle[instance_id[block]]
+    task = _split_triangles_task(first_triangle, fragments.triangle)
+    instance_id, triangle = yield from subtask(task, 1.0, 1.0)
     has_field = instance_has_field[instance_id]
     if not has_field.any():
         raise_nothing_in_view(instances, camera)
@@ -247,6 +276,56 @@ def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> T
         fragments = Fragments(*collected)
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
     return _VisiblePixels(fragments, instance_id, triangle, visible_ids)
+
+
+def _visible_samples_task(
+    instances: Sequence[MeshInstance], camera: Camera, samples: int
+) -> Task[tuple[_VisiblePixels, SampledTriangles, np.ndarray, np.ndarray]]:
+    """Find the visible triangles at all samples, and what is visible at the center of each pixel.
+
+    Returns
+    -------
+    visible : _VisiblePixels
+    sampled : SampledTriangles
+        Triangles are counted over all instances.
+    other_instance, other_triangle : (E,) int32 ndarray
+        Instances of its other triangles, and the triangles counted within them.
+    """
+    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    has_field = np.concatenate(
+        [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
+    )
+    task = rasterize_samples_task(clip, triangles, has_field, camera.width, camera.height, samples)
+    sampled = yield from subtask(task, 0.0, 0.8)
+    if not len(sampled.pixel):
+        raise_nothing_in_view(instances, camera)
+    pixel = sampled.pixel
+    weights, front_facing = yield from subtask(
+        barycentrics_task(clip, triangles, pixel, sampled.triangle, camera.width, camera.height),
+        0.8,
+        1.0,
+    )
+    fragments = Fragments(pixel, sampled.triangle, weights, front_facing, sampled.depth)
+    instance_id, triangle = yield from _split_triangles_task(first_triangle, sampled.triangle)
+    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
+    other = yield from _split_triangles_task(first_triangle, sampled.other_triangle)
+    return _VisiblePixels(fragments, instance_id, triangle, visible_ids), sampled, *other
+
+
+def _split_triangles_task(
+    first_triangle: np.ndarray, triangle: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Return the instances of (n,) triangles, and the triangles counted within them, as int32.
+
+    `first_triangle` is that of `_all_triangles`.
+    """
+    if len(first_triangle) == 1:
+        return np.zeros(len(triangle), dtype=np.int32), triangle
+    instance_id = np.empty(len(triangle), dtype=np.int32)
+    for block in pixel_blocks(len(triangle)):
+        yield Progress(1.0, "finding visible pixels")
+        instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
+    return instance_id, triangle - first_triangle[instance_id]
 
 
 def rasterize_instances(
@@ -268,16 +347,31 @@ def rasterize_instances_task(
     first_triangle : (B,) int32 ndarray
         Index of the first triangle of each of the B instances in this count.
     """
+    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    fragments = yield from rasterize_task(clip, triangles, camera.width, camera.height)
+    return fragments, first_triangle
+
+
+def _all_triangles(
+    instances: Sequence[MeshInstance], camera: Camera
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the triangles of all instances, in their order.
+
+    Returns
+    -------
+    clip : (V, 4) float64 ndarray
+        Vertices in clip space.
+    triangles : (T, 3) int32 ndarray
+    first_triangle : (B,) int32 ndarray
+        Index of the first triangle of each instance.
+    """
     clip = np.concatenate([_to_clip_space(instance, camera) for instance in instances], axis=1)
     triangles, vertex_offset = [], 0
     for instance in instances:
         triangles.append(instance.surface.triangle_vertex + np.int32(vertex_offset))
         vertex_offset += len(instance.surface.vertices)
     first_triangle = np.cumsum([0, *map(len, triangles[:-1])]).astype(np.int32)
-    fragments = yield from rasterize_task(
-        clip.T, np.concatenate(triangles), camera.width, camera.height
-    )
-    return fragments, first_triangle
+    return clip.T, np.concatenate(triangles), first_triangle
 
 
 def _to_clip_space(instance: MeshInstance, camera: Camera) -> np.ndarray:
@@ -330,7 +424,7 @@ def _new_gbuffer_task(
         yield Progress(block.start / count, "finding visible pixels")
         face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
-        position[block, 2] = _z_at_depth(camera, x, y, fragments.depth[block])
+        position[block, 2] = z_at_depth(camera, x, y, fragments.depth[block])
         if camera.is_perspective:
             inverse_length = 1 / np.sqrt(x * x + y * y + 1)
             view_direction[block, 0], view_direction[block, 1] = (
@@ -362,18 +456,6 @@ def _new_gbuffer_task(
         front_facing=fragments.front_facing,
         instances=tuple(instances),
     )
-
-
-def _z_at_depth(camera: Camera, x: np.ndarray, y: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Return z in camera space of points on pixel rays, given their depth z / w in clip space.
-
-    `x` and `y` are the rays from `pixel_rays`.
-    """
-    m_x, m_y, m_z, m_w = camera.projection[2]
-    if camera.is_perspective:
-        # Solves (-m_x x - m_y y + m_z) z + m_w = -z depth for z.
-        return -m_w / (depth + (m_z - m_x * x - m_y * y))
-    return (depth - m_w - m_x * x - m_y * y) / m_z
 
 
 def _empty_vectors(count: int) -> np.ndarray:

@@ -54,6 +54,37 @@ class Fragments(NamedTuple):
     depth: np.ndarray
 
 
+class SampledTriangles(NamedTuple):
+    """The triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
+
+    Attributes
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat index, ``row * width + column`` from the lower left.
+    triangle : (P,) int32 ndarray
+        Triangle that is visible at the center, or else at the sample that is nearest to it.
+    depth : (P,) float64 ndarray
+        Its z / w there.
+    count : (P,) int32 ndarray
+        Number of samples that show this triangle.
+    other_entry : (E,) int32 ndarray
+        Index into `pixel`, for each sample that shows another triangle.
+    other_sample : (E,) int32 ndarray
+        Flat index of that sample in the frame of all samples.
+    other_triangle : (E,) int32 ndarray
+    other_depth : (E,) float64 ndarray
+    """
+
+    pixel: np.ndarray
+    triangle: np.ndarray
+    depth: np.ndarray
+    count: np.ndarray
+    other_entry: np.ndarray
+    other_sample: np.ndarray
+    other_triangle: np.ndarray
+    other_depth: np.ndarray
+
+
 class _ScreenVertices(NamedTuple):
     """Vertices on screen.
 
@@ -149,19 +180,127 @@ def rasterize_task(
     triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
     vertices, clipped = _clip_near(clip_vertices, triangles)
     screen = _to_screen(vertices, width, height)
-    pixel, triangle, depth = [], [], []
+    bands = []
     band_rows = max(1, MAX_BAND_PIXELS // width)
     for row_start in range(0, height, band_rows):
         row_stop = min(row_start + band_rows, height)
         rasterize_rows = _rasterize_rows_task(screen, clipped, width, row_start, row_stop)
-        band = yield from subtask(rasterize_rows, 0.7 * row_start / height, 0.7 * row_stop / height)
-        for values, collected in zip(band, (pixel, triangle, depth), strict=True):
-            collected.append(values)
-    pixel, triangle = np.concatenate(pixel), np.concatenate(triangle)
-    weights, front_facing = yield from subtask(
-        _barycentrics_task(clip_vertices, triangles, pixel, triangle, width, height), 0.7, 1.0
+        triangle, depth = yield from subtask(
+            rasterize_rows, 0.7 * row_start / height, 0.7 * row_stop / height
+        )
+        pixel = np.flatnonzero(triangle >= 0)
+        bands.append(((pixel + row_start * width).astype(np.int32), triangle[pixel], depth[pixel]))
+    pixel, triangle, depth = (np.concatenate(values) for values in zip(*bands, strict=True))
+    task = barycentrics_task(clip_vertices, triangles, pixel, triangle, width, height)
+    weights, front_facing = yield from subtask(task, 0.7, 1.0)
+    return Fragments(pixel, triangle, weights, front_facing, depth)
+
+
+def rasterize_samples_task(
+    clip_vertices: np.ndarray,
+    triangles: np.ndarray,
+    is_drawn: np.ndarray,
+    width: int,
+    height: int,
+    samples: int,
+) -> Task[SampledTriangles]:
+    """Find the nearest triangle at several samples of each pixel, on a square grid.
+
+    Parameters
+    ----------
+    clip_vertices, triangles, width, height
+        As of `rasterize_task`.
+    is_drawn : (T,) bool ndarray
+        Triangles that are not drawn only hide others.
+    samples : int
+        S, the samples along each side of a pixel.
+    """
+    clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
+    vertices, clipped = _clip_near(clip_vertices, triangles)
+    screens = [
+        (scale, _to_screen(vertices, width * scale, height * scale)) for scale in (1, samples)
+    ]
+    bands, entry_count = [], 0
+    band_rows = max(1, MAX_BAND_PIXELS // (width * samples * samples))
+    for row_start in range(0, height, band_rows):
+        row_stop = min(row_start + band_rows, height)
+        buffers = []
+        for scale, screen in screens:
+            task = _rasterize_rows_task(
+                screen, clipped, width * scale, row_start * scale, row_stop * scale
+            )
+            triangle, depth = yield from subtask(task, row_start / height, row_stop / height)
+            if not is_drawn.all():
+                triangle[~is_drawn.take(triangle, mode="clip")] = -1
+            buffers += (
+                triangle.reshape(-1, scale, width, scale),
+                depth.reshape(-1, scale, width, scale),
+            )
+        band = yield from subtask(_group_samples_task(*buffers, row_start), 1.0, 1.0)
+        bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
+        entry_count += len(band.pixel)
+    return SampledTriangles(*(np.concatenate(values) for values in zip(*bands, strict=True)))
+
+
+def _group_samples_task(
+    center_triangle: np.ndarray,
+    center_depth: np.ndarray,
+    triangle: np.ndarray,
+    depth: np.ndarray,
+    first_row: int,
+) -> Task[SampledTriangles]:
+    """Group the samples of some rows by pixels.
+
+    Parameters
+    ----------
+    center_triangle : (h, 1, w, 1) int32 ndarray
+        Triangle at the center of each pixel, -1 where there is none.
+    triangle : (h, S, w, S) int32 ndarray
+        The same at samples.
+    center_depth, depth : float64 ndarray
+        Of the same shapes.
+    first_row : int
+        The first of the rows.
+    """
+    samples, width = triangle.shape[1:3]
+    offset = np.arange(samples) - (samples - 1) / 2
+    order = np.argsort((offset[:, None] ** 2 + offset**2).ravel(), kind="stable").tolist()
+    sample_places = [divmod(sample, samples) for sample in order]
+    own_triangle, own_depth = center_triangle[:, 0, :, 0].copy(), center_depth[:, 0, :, 0].copy()
+    for row, column in sample_places:
+        yield Progress(1.0, STEP_LABEL)
+        empty = np.nonzero(own_triangle < 0)
+        own_triangle[empty] = triangle[:, row, :, column][empty]
+        own_depth[empty] = depth[:, row, :, column][empty]
+    pixel = np.flatnonzero(own_triangle >= 0)
+    own_triangle, own_depth = own_triangle.ravel()[pixel], own_depth.ravel()[pixel]
+    count = np.zeros(len(pixel), dtype=np.int32)
+    others = []
+    pixel_row, pixel_column = np.divmod(pixel.astype(np.int32), np.int32(width))
+    pixel_row += np.int32(first_row)
+    for row, column in sample_places:
+        yield Progress(1.0, STEP_LABEL)
+        sample_triangle = triangle[:, row, :, column].ravel()[pixel]
+        count += sample_triangle == own_triangle
+        entry = np.flatnonzero((sample_triangle >= 0) & (sample_triangle != own_triangle))
+        sample_row = pixel_row[entry] * np.int32(samples) + np.int32(row)
+        sample_column = pixel_column[entry] * np.int32(samples) + np.int32(column)
+        others.append(
+            (
+                entry.astype(np.int32),
+                sample_row * np.int32(width * samples) + sample_column,
+                sample_triangle[entry],
+                depth[:, row, :, column].ravel()[pixel[entry]],
+            )
+        )
+    return SampledTriangles(
+        pixel_row * np.int32(width) + pixel_column,
+        own_triangle,
+        own_depth,
+        count,
+        *(np.concatenate(values) for values in zip(*others, strict=True)),
     )
-    return Fragments(pixel, triangle, weights, front_facing, np.concatenate(depth))
 
 
 def _clip_near(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, _ClippedTriangles]:
@@ -268,15 +407,14 @@ def _to_screen(vertices: np.ndarray, width: int, height: int) -> _ScreenVertices
 
 def _rasterize_rows_task(
     screen: _ScreenVertices, clipped: _ClippedTriangles, width: int, row_start: int, row_stop: int
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Rasterize the rows from `row_start` up to, but not including, `row_stop`.
 
     Returns
     -------
-    pixel : (P,) int32 ndarray
-        Flat indices in the whole frame, ascending.
-    triangle : (P,) int32 ndarray
-    depth : (P,) float64 ndarray
+    triangle : (rows * width,) int32 ndarray
+        -1 where there is none.
+    depth : (rows * width,) float64 ndarray
     """
     screen = screen.clamped_to_rows(row_start, row_stop)
     depth_buffer = np.full(
@@ -293,8 +431,7 @@ def _rasterize_rows_task(
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
                 )
-    pixel = np.flatnonzero(triangle_buffer >= 0)
-    return (pixel + row_start * width).astype(np.int32), triangle_buffer[pixel], depth_buffer[pixel]
+    return triangle_buffer, depth_buffer
 
 
 def _scan_convert(
@@ -529,7 +666,7 @@ def _depth_plane(a: _ScreenCorner, b: _ScreenCorner, c: _ScreenCorner) -> tuple[
     return slope_x, slope_y, a.depth - slope_x * a.x - slope_y * a.y, min_depth, max_depth
 
 
-def _barycentrics_task(
+def barycentrics_task(
     vertices: np.ndarray,
     triangles: np.ndarray,
     pixel: np.ndarray,

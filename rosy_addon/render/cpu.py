@@ -60,7 +60,8 @@ class CpuRenderer:
 
     def _gbuffer_task(self, view: ViewInput) -> Task[GBuffer]:
         """Return the G-buffer from the cache, or project the meshes."""
-        instances, camera, display = view.instances, view.sample_camera, view.look.display
+        instances, camera, display = view.instances, view.shaded_camera, view.look.display
+        samples = view.samples_per_side
         if self._gbuffer_cache is None:
-            return project_task(instances, camera, display, self._cache)
-        return cached_project_task(instances, camera, display, self._gbuffer_cache)
+            return project_task(instances, camera, display, self._cache, samples)
+        return cached_project_task(instances, camera, display, self._gbuffer_cache, samples)

@@ -10,6 +10,7 @@ with what pictures take.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +73,9 @@ STATISTICS_BYTES = 100_000_000
 
 #: Bytes of a visible sample while its color is computed: gray; colored; by magnitude; hatched.
 GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 50
+
+#: Bytes of a sample that shows another triangle than the center of its pixel.
+OTHER_SAMPLE_BYTES = 40
 
 #: Bytes of a shadow map of a light, while it is made.
 SHADOW_MAP_BYTES = 110_000_000
@@ -156,12 +160,15 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
         Bytes at the peak, beyond those that are taken before, up to the writing of the picture to a
         file.
     """
-    camera = view.sample_camera
+    camera = view.shaded_camera
     frame = camera.width * camera.height
     pixels = view.camera.width * view.camera.height
     visible = frame * coverage.visible
     triangles = sum(len(instance.surface.triangles) for instance in view.instances)
-    look = supersampled_look(look_in_pixels(view.look, camera, view.instances))
+    look = view.look
+    if view.samples_per_side > 1:
+        look = replace(look, supersampling=1)
+    look = supersampled_look(look_in_pixels(look, camera, view.instances))
     lines, channels = _lines_and_channels(view.instances)
     noise_channels = 3 if look.noise == "colour" else 1
     image_bytes = 4 * (lines + 1) * noise_channels + 8
@@ -187,10 +194,12 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     # The rows without visible samples are never written to, so they take no memory.
     sample_rows = PICTURE_BYTES * frame * coverage.rows
     downsampled = PICTURE_BYTES * pixels if look.supersampling > 1 else 0
+    others = OTHER_SAMPLE_BYTES * _other_samples(view, visible, triangles)
+    samples = frame * view.samples_per_side**2
     return int(
         max(
-            DEPTH_BUFFER_BYTES * min(frame, MAX_BAND_PIXELS) + FRAGMENT_BYTES * visible,
-            gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles,
+            DEPTH_BUFFER_BYTES * min(samples, MAX_BAND_PIXELS) + FRAGMENT_BYTES * visible + others,
+            gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles + others,
             gbuffer + shadow_maps,
             lic,
             paper_grain,
@@ -200,6 +209,19 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
             (downsampled or sample_rows) + WRITING_BYTES * pixels,
         )
     )
+
+
+def _other_samples(view: ViewInput, visible: float, triangles: int) -> float:
+    """Return the number of samples that show another triangle than the center of their pixel.
+
+    Half of the triangles face the camera. The smaller they are in pixels, the more samples are
+    in others.
+    """
+    samples = view.samples_per_side
+    if samples == 1:
+        return 0.0
+    edges_per_pixel = float(np.sqrt(triangles / 2 / max(visible, 1.0)))
+    return min(edges_per_pixel, 1.0) * visible * samples**2
 
 
 def _lines_and_channels(instances: Sequence[MeshInstance]) -> tuple[int, int]:
@@ -222,7 +244,7 @@ def _lic_bytes(
     view: ViewInput, look: Look, coverage: Coverage, lines: int, noise_channels: int
 ) -> float:
     """Return the bytes that noise and LIC images take, beyond the fields of pixels."""
-    camera = view.sample_camera
+    camera = view.shaded_camera
     frame = camera.width * camera.height
     visible = frame * coverage.visible
     if look.anchor == "surface":
@@ -245,7 +267,7 @@ def _sheets_bytes(
     view: ViewInput, look: Look, coverage: Coverage, lines: int, noise_channels: int
 ) -> float:
     """Return the bytes that the method "sheets" takes; see `fast_lic`."""
-    camera = view.sample_camera
+    camera = view.shaded_camera
     visible = camera.width * camera.height * coverage.visible
     columns, rows = camera.width * coverage.columns, camera.height * coverage.rows
     line_bytes, cell_bytes = 25 + 16 * noise_channels, 11 + 8 * noise_channels

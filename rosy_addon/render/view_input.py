@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compositor.hatching import is_shaded_by_pixel
 from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..compositor.target_tone import ReferenceRender
@@ -60,3 +61,13 @@ class ViewInput:
     def sample_camera(self) -> Camera:
         """The camera of the frame that is sampled, larger by the look's supersampling."""
         return self.camera.scaled(self.look.supersampling)
+
+    @property
+    def samples_per_side(self) -> int:
+        """Samples along each side of a pixel that `CpuRenderer` shades once; 1 if it shades each."""
+        return self.look.supersampling if is_shaded_by_pixel(self.look) else 1
+
+    @property
+    def shaded_camera(self) -> Camera:
+        """The camera of the frame that `CpuRenderer` shades: of pixels, or of samples."""
+        return self.camera if self.samples_per_side > 1 else self.sample_camera

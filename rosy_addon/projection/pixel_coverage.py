@@ -1,0 +1,175 @@
+"""How much of a pixel each surface covers, from several samples of the pixel.
+
+Only the visible triangle is found at every sample. All else is computed once for a pixel, at its
+center. The samples show the surface that is there, as a rule. Where they do not, at silhouettes and
+creases, they show that of a pixel beside it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..progress import Progress, Task
+from .camera import Camera, pixel_rays, z_at_depth
+from .gbuffer import GBuffer, PixelCoverage
+from .pixel_blocks import pixel_blocks
+from .pixel_neighbors import depth_slopes
+from .rasterizer import SampledTriangles
+
+#: Smallest cosine between the normals of two triangles that show the same surface: that of 30 degrees.
+MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
+
+#: Label of all steps.
+STEP_LABEL = "finding visible pixels"
+
+
+class OtherSamples(NamedTuple):
+    """The E samples that show another triangle than the center of their pixel.
+
+    Attributes
+    ----------
+    entry : (E,) int32 ndarray
+        Entry of the G-buffer for the pixel.
+    x, y : (E,) float32 ndarray
+        Position in pixels.
+    depth : (E,) float32 ndarray
+        Linear on screen for planes, as of `pixel_neighbors.affine_depth`.
+    instance_id : (E,) int32 ndarray
+    normal : (3, E) float32 ndarray
+        Unit normals of the triangles in camera space, of either orientation.
+    """
+
+    entry: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    instance_id: np.ndarray
+    normal: np.ndarray
+
+    def part(self, index: np.ndarray | slice) -> OtherSamples:
+        """Return some of the samples."""
+        return OtherSamples(*(values[..., index] for values in self))
+
+
+class _Entries(NamedTuple):
+    """What is compared of the entries of a G-buffer: (P,) arrays as in `OtherSamples`."""
+
+    x: np.ndarray
+    y: np.ndarray
+    depth: np.ndarray
+    slope_x: np.ndarray
+    slope_y: np.ndarray
+    tolerance: np.ndarray
+    instance_id: np.ndarray
+    normal: np.ndarray
+
+    def shows(self, entry: np.ndarray, sample: OtherSamples) -> np.ndarray:
+        """Return (n,) bool: whether samples are on the surfaces of entries, near their pixels."""
+        x, y = sample.x - self.x.take(entry), sample.y - self.y.take(entry)
+        predicted = self.depth.take(entry)
+        predicted += x * self.slope_x.take(entry) + y * self.slope_y.take(entry)
+        is_near = np.abs(sample.depth - predicted) <= self.tolerance.take(entry)
+        is_near &= sample.instance_id == self.instance_id.take(entry)
+        cosine = (sample.normal * self.normal.take(entry, axis=1)).sum(axis=0)
+        return is_near & (np.abs(cosine) >= MIN_NORMAL_COSINE)
+
+
+def other_samples_task(
+    sampled: SampledTriangles,
+    camera: Camera,
+    samples: int,
+    instance_id: np.ndarray,
+    normal: np.ndarray,
+) -> Task[OtherSamples]:
+    """Return the samples that show another triangle than the center of their pixel.
+
+    Parameters
+    ----------
+    sampled : SampledTriangles
+    camera : Camera
+        Of the picture.
+    samples : int
+        Samples along each side of a pixel.
+    instance_id, normal
+        As in `OtherSamples`.
+    """
+    frame = camera.scaled(samples)
+    count = len(sampled.other_entry)
+    x, y, depth = np.empty((3, count), dtype=np.float32)
+    for block in pixel_blocks(count):
+        yield Progress(block.start / count, STEP_LABEL)
+        index = sampled.other_sample[block]
+        x[block], y[block] = _centers(index, frame.width, samples)
+        z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
+        depth[block] = -1 / z if camera.is_perspective else z
+    return OtherSamples(sampled.other_entry, x, y, depth, instance_id, normal)
+
+
+def pixel_coverage_task(
+    gbuffer: GBuffer, sampled: SampledTriangles, others: OtherSamples, samples: int
+) -> Task[PixelCoverage]:
+    """Find the entry of the G-buffer whose surface each sample shows.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        At the centers of pixels.
+    sampled : SampledTriangles
+    others : OtherSamples
+    samples : int
+        Samples along each side of a pixel.
+    """
+    camera = gbuffer.camera
+    count = len(gbuffer.pixel)
+    stride = np.int32(camera.width + 2)
+    entry_of_cell = np.full((camera.height + 2) * int(stride), -1, dtype=np.int32)
+    cell = np.empty(count, dtype=np.int32)
+    columns = np.empty((6, count), dtype=np.float32)
+    for block in pixel_blocks(count):
+        yield Progress(0.2 * block.start / count, STEP_LABEL)
+        row, column = np.divmod(gbuffer.pixel[block], np.int32(camera.width))
+        cell[block] = (row + 1) * stride + column + 1
+        entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
+        columns[:2, block] = _centers(gbuffer.pixel[block], camera.width, 1)
+        columns[2:, block] = depth_slopes(gbuffer, block)
+    entries = _Entries(*columns, gbuffer.instance_id, gbuffer.geometric_normal.T)
+    entry = others.entry.copy()
+    elsewhere = []
+    for block in pixel_blocks(len(entry)):
+        yield Progress(0.2 + 0.5 * block.start / len(entry), STEP_LABEL)
+        shown = entries.shows(entry[block], others.part(block))
+        elsewhere.append(block.start + np.flatnonzero(~shown))
+    elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])
+    for block in pixel_blocks(len(elsewhere)):
+        yield Progress(0.7 + 0.3 * block.start / len(elsewhere), STEP_LABEL)
+        part = elsewhere[block]
+        sample, home = others.part(part), cell.take(entry[part])
+        nearest = np.full(len(part), np.inf, dtype=np.float32)
+        for step in (1, -1, stride, -stride, stride + 1, stride - 1, 1 - stride, -1 - stride):
+            neighbor = entry_of_cell.take(home + step)
+            exists = np.flatnonzero(neighbor >= 0)
+            exists = exists[entries.shows(neighbor[exists], sample.part(exists))]
+            candidate = neighbor[exists]
+            x, y = entries.x[candidate] - sample.x[exists], entries.y[candidate] - sample.y[exists]
+            distance = x * x + y * y
+            closer = distance < nearest[exists]
+            nearest[exists[closer]] = distance[closer]
+            entry[part[exists[closer]]] = candidate[closer]
+    is_own = entry == others.entry
+    own = sampled.count + np.bincount(others.entry[is_own], minlength=len(sampled.count))
+    moved = np.flatnonzero(~is_own)
+    moved = moved[np.argsort(others.entry[moved], kind="stable")]
+    share = np.float32(1 / samples**2)
+    return PixelCoverage(
+        own.astype(np.float32) * share, gbuffer.pixel[others.entry[moved]], entry[moved], share
+    )
+
+
+def _centers(index: np.ndarray, width: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions of samples in pixels, (n,) float32 each, from their flat indices."""
+    row, column = np.divmod(index, np.int32(width))
+    scale = np.float32(1 / samples)
+    half = np.float32(0.5)
+    return (column + half) * scale, (row + half) * scale

@@ -1,0 +1,87 @@
+"""Pictures that are shaded once per pixel, against pictures that are shaded at 4 x 4 samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import icosphere, torus
+
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.presets.store import load_preset
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.render.view_input import ViewInput
+
+SIZE = 240
+CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fov=0.8)
+LOOKS = {
+    "default": Look(),
+    "color noise": Look(noise="colour"),
+    "tapered, on the surface": Look(taper=True, anchor="surface", grain=2.5),
+    "short": Look(length=12),
+}
+
+
+def torus_instance(degree=4):
+    surface = torus(96, 48)
+    return MeshInstance(surface, np.eye(4), generate(surface, "form", degree))
+
+
+def rendered(instance, look):
+    return run_to_completion(CpuRenderer().render_task(ViewInput((instance,), CAMERA, look))).rgba
+
+
+def sampled(instance, look, samples):
+    """The picture with streaks at every sample."""
+    gbuffer = project([instance], CAMERA.scaled(samples), look.display)
+    return compose(gbuffer, replace(look, supersampling=samples)).rgba
+
+
+def luminance(rgba, where):
+    return rgba[..., :3].mean(axis=-1)[where]
+
+
+@pytest.mark.parametrize("name", LOOKS)
+@pytest.mark.parametrize("degree", [3, 4])
+def test_streaks_are_those_of_many_samples(name, degree):
+    """Nearer to them than without samples, of the same contrast, and with the same silhouettes."""
+    instance, look = torus_instance(degree), LOOKS[name]
+    actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (2, 1))
+    expected = sampled(instance, look, 4)
+    inside = (single[..., 3] == 1) & (expected[..., 3] == 1)
+    target, value = luminance(expected, inside), luminance(actual, inside)
+    correlation = np.corrcoef(value, target)[0, 1]
+    single_correlation = np.corrcoef(luminance(single, inside), target)[0, 1]
+    assert 1 - correlation < 0.65 * (1 - single_correlation)
+    assert value.std() == pytest.approx(target.std(), rel=0.05)
+    np.testing.assert_allclose(actual[..., 3], sampled(instance, look, 2)[..., 3], atol=1e-6)
+
+
+def test_even_lines_are_those_of_many_samples():
+    look = replace(load_preset("engraving").look, supersampling=2)
+    instance = torus_instance()
+    actual, expected = rendered(instance, look), sampled(instance, look, 4)
+    inside = (actual[..., 3] == 1) & (expected[..., 3] == 1)
+    assert np.corrcoef(luminance(actual, inside), luminance(expected, inside))[0, 1] > 0.99
+
+
+def test_light_changes_within_a_pixel_at_a_crease():
+    """Where two faces meet, a pixel has a color between those of the faces, as with many samples."""
+    surface = icosphere(0)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0, 0, 1)))
+    look = Look(display="flat", gain=0.0, shading=1.0)
+    actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (4, 1))
+    expected = sampled(instance, look, 4)
+    inside = (single[..., 3] == 1) & (expected[..., 3] == 1)
+    error, single_error = (
+        np.abs(luminance(picture, inside) - luminance(expected, inside))
+        for picture in (actual, single)
+    )
+    assert error.mean() < 0.15 * single_error.mean()

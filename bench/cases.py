@@ -125,5 +125,6 @@ def frame(
 ) -> np.ndarray:
     """Draw a mesh with a field: the work after the camera has moved."""
     eye = camera(size, azimuth=azimuth)
-    gbuffer = project([instance(triangles, degree)], eye, look.display, CORNER_FIELDS)
+    instances = [instance(triangles, degree)]
+    gbuffer = project(instances, eye, look.display, CORNER_FIELDS, look.supersampling)
     return compose(gbuffer, look).rgba

@@ -15,10 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rosy_addon.compositor.compose import compose
 from rosy_addon.image_io.png import write_png
 from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.project import project
 from rosy_addon.render.cpu import CpuRenderer
 from rosy_addon.render.picture_memory import picture_memory, view_coverage
 from rosy_addon.render.view_input import ViewInput
@@ -51,6 +49,15 @@ ESTIMATED: dict[str, tuple[int, int, tuple[int, int], float, dict[str, object]]]
     "1024 x 1024, 300K triangles": (300_000, 4, (1024, 1024), 1, {}),
     "512 x 512, 3M triangles": (3_000_000, 4, (512, 512), 1, {}),
     "1024 x 1024, 2 x 2 samples a pixel": (12_000, 4, (1024, 1024), 1, {"supersampling": 2}),
+    "1024 x 1024, 300K triangles, 3 x 3 samples a pixel": (
+        300_000, 4, (1024, 1024), 1, {"supersampling": 3},
+    ),
+    "2048 x 2048, 3M triangles, 2 x 2 samples a pixel": (
+        3_000_000, 4, (2048, 2048), 1, {"supersampling": 2},
+    ),
+    "1024 x 1024, hatching, 2 x 2 samples a pixel": (
+        12_000, 4, (1024, 1024), 1, {"ink": "hatch", "supersampling": 2},
+    ),
     "2048 x 2048": (12_000, 4, (2048, 2048), 1, {}),
     "2048 x 2048, the picture is filled": (12_000, 4, (2048, 2048), 4, {}),
     "2048 x 2048, 2 x 2 samples a pixel": (12_000, 4, (2048, 2048), 1, {"supersampling": 2}),
@@ -144,11 +151,8 @@ def draw(name: str) -> float:
 
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
-    width, height = (size * look.supersampling for size in WIDE)
-    gbuffer = project(
-        [cases.instance(triangles, degree)], cases.camera(width, height), look.display
-    )
-    compose(gbuffer, look)
+    view = ViewInput((cases.instance(triangles, degree),), cases.camera(*WIDE), look)
+    run_to_completion(CpuRenderer().render_task(view))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e9
 

@@ -41,6 +41,17 @@ def measure(runs: int) -> Iterator[Case]:
             higher_is_better=False,
             runs=runs,
         )
+    for triangles in (12_000, 200_000):
+        yield compare(
+            f"2 x 2 samples / one, 1080 x 1080 pixels, frame, {triangles // 1000}K triangles",
+            lambda t=triangles: cases.frame(
+                t, DEGREE, replace(cases.LOOK, supersampling=2), size=1080
+            ),
+            lambda t=triangles: cases.frame(t, DEGREE, size=1080),
+            target=2.0,
+            higher_is_better=False,
+            runs=runs,
+        )
     for degree in (1, 3, 6, 8, 12):
         yield compare(
             f"N = {degree} / N = 2, LIC stage",

@@ -22,6 +22,11 @@ DEGREE = 4
 #: Look with 41 samples per streamline.
 LOOK = replace(cases.LOOK, length=20)
 
+#: Side of the large frame in pixels, and what its label says of its samples. VTK has one in each
+#: pixel.
+LARGE_SIZE = 1080
+SAMPLES_LABEL = {1: "", 2: ", 1080 x 1080, 2 x 2 samples a pixel"}
+
 #: Rotation of both cameras between frames, in radians.
 AZIMUTH_STEP = 0.01
 
@@ -36,28 +41,34 @@ def measure(runs: int) -> Iterator[Case]:
     except ImportError:
         print("surfaces of VTK: skipped, because vtk is not installed", file=sys.stderr)
         return
-    for triangles in (12_000, 200_000):
-        draw_next, read_pixels, name = vtk_renderer(vtk, triangles)
+    for triangles, size, samples, target in (
+        (12_000, cases.SIZE, 1, 0.5),
+        (200_000, cases.SIZE, 1, 0.5),
+        (12_000, LARGE_SIZE, 2, 0.6),
+    ):
+        look = replace(LOOK, supersampling=samples)
+        draw_next, read_pixels, name = vtk_renderer(vtk, triangles, size)
         vtk_coverage = float((read_pixels().min(axis=1) < 255).mean())
-        rosy_coverage = float((cases.frame(triangles, DEGREE, LOOK)[..., 3] > 0).mean())
+        rosy_coverage = float((cases.frame(triangles, DEGREE, look, size)[..., 3] > 0).mean())
         print(
             f"{name}; covered: {vtk_coverage:.1%} by VTK, {rosy_coverage:.1%} by RoSy", flush=True
         )
         azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
         yield compare(
-            f"N = 4 / VTK's one vector field, frame, {triangles // 1000}K triangles",
-            lambda t=triangles, azimuths=azimuths: cases.frame(
-                t, DEGREE, LOOK, azimuth=next(azimuths)
+            f"N = 4{SAMPLES_LABEL[samples]} / VTK's one vector field, frame, "
+            f"{triangles // 1000}K triangles",
+            lambda t=triangles, look=look, size=size, azimuths=azimuths: cases.frame(
+                t, DEGREE, look, size, azimuth=next(azimuths)
             ),
             lambda draw=draw_next, read=read_pixels: (draw(), read()),
-            target=0.5,
+            target=target,
             higher_is_better=False,
             runs=runs,
         )
 
 
 def vtk_renderer(
-    vtk: Any, triangles: int
+    vtk: Any, triangles: int, size: int = cases.SIZE
 ) -> tuple[Callable[[], None], Callable[[], np.ndarray], str]:
     """Set up VTK's surface LIC of the ball.
 
@@ -87,7 +98,7 @@ def vtk_renderer(
     window = vtk.vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetMultiSamples(0)
-    window.SetSize(cases.SIZE, cases.SIZE)
+    window.SetSize(size, size)
     window.AddRenderer(scene)
     rosy_camera = cases.camera()
     eye = -rosy_camera.view[:3, :3].T @ rosy_camera.view[:3, 3]
@@ -105,7 +116,7 @@ def vtk_renderer(
         window.WaitForCompletion()
 
     def read_pixels() -> np.ndarray:
-        last = cases.SIZE - 1
+        last = size - 1
         window.GetPixelData(0, 0, last, last, 0, pixels, 0)
         return vtk_to_numpy(pixels)
 

@@ -7,11 +7,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.compose import compose, compose_planar
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.field_io import read_field
@@ -19,6 +20,12 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.render.view_input import ViewInput
 
 from .page import ROOT
 from .plane import PlanarField, points, singularity
@@ -36,6 +43,9 @@ PLAIN = Look(length=40, gain=1.5, density=0.5, high_pass=0.0)
 METHODS = ("brute", "members", "sheets")
 SIDE, CLOSE = 400, 128
 
+#: Side of the pictures with several samples a pixel.
+SAMPLED_SIDE = 256
+
 
 def write() -> None:
     """Draw and save the pictures that need no files."""
@@ -47,6 +57,33 @@ def write() -> None:
         _surface_row(ring, around_field(ring, 4), (24, 44), "A torus, N = 4"),
     ]
     save(sheet(rows), IMAGES / "performance-surfaces.png")
+    _samples()
+
+
+def _samples() -> None:
+    """Draw and save pictures with one and four samples a pixel, at 100 % and at 400 %."""
+    ring = torus()
+    instance = MeshInstance(ring, np.eye(4), around_field(ring, 4))
+    camera = orbit_camera(ring, 24, 44, SAMPLED_SIDE, SAMPLED_SIDE)
+    pictures = {}
+    for label, samples in (("one sample", 1), ("2 x 2 samples", 2)):
+        look = replace(LOOK, supersampling=samples)
+        task = CpuRenderer().render_task(ViewInput((instance,), camera, look))
+        pictures[label] = display(run_to_completion(task).rgba)
+    gbuffer = project([instance], camera.scaled(4))
+    every_sample = compose(gbuffer, replace(LOOK, supersampling=4))
+    pictures["streaks at each of 4 x 4 samples"] = display(every_sample.rgba)
+    part = SAMPLED_SIDE // 4
+    top, left = round(0.12 * SAMPLED_SIDE), round(0.6 * SAMPLED_SIDE)
+    close = slice(top, top + part), slice(left, left + part)
+    rows = [
+        [Panel(picture, label) for label, picture in pictures.items()],
+        [
+            Panel(np.kron(picture[close], np.ones((4, 4, 1), np.uint8)))
+            for picture in pictures.values()
+        ],
+    ]
+    save(sheet(rows), IMAGES / "performance-samples.png")
 
 
 def write_others(folder: Path) -> None:

@@ -534,7 +534,9 @@ def edited_strokes_are_replaced_on_request():
     draw()
     yield from wait_until(lambda: obj.data != first and status().current is None)
     edited = obj.data
-    edited.layers[0].frames[0].drawing.attributes["position"].data[0].vector.x += 1
+    drawings = [layer.frames[0].drawing for layer in edited.layers]
+    drawing = next(drawing for drawing in drawings if len(drawing.strokes))
+    drawing.attributes["position"].data[0].vector.x += 1
     draw()
     yield 0.5
     assert obj.data == edited and status().current is None

@@ -28,7 +28,7 @@ from .image_noise import NOISE_MEAN
 from .lic import METHODS, lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
-from .look_units import antialiased_look, look_in_pixels, supersampled_look
+from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
 from .picture import DegreeLayer, Picture
 from .pixel_field import PixelField, planar_pixel_field
@@ -228,6 +228,8 @@ def _line_modulation_task(
 
 def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> Task[np.ndarray]:
     """(M, P) means of (P,) tones along lines, over the overshoot distance in each direction."""
+    if isinstance(look, AntialiasedLook):
+        look = look.without_antialiasing()
     overshoot_look = replace(look, length=max(round(look.overshoot / look.step), 1), taper=False)
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one

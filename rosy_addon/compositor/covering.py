@@ -21,6 +21,7 @@ of the cell plus a constant, and no table of neighbors is read.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,33 +122,39 @@ class Covering:
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
-    def neighbor_line(self, line: np.ndarray, forward: int, left: int) -> np.ndarray:
+    def neighbor_lines(
+        self, line: np.ndarray, offsets: Sequence[tuple[int, int]]
+    ) -> Iterator[np.ndarray]:
         """Find the lines of neighboring cells that match the given lines.
 
         Parameters
         ----------
         line : (n,) intp ndarray
             Indices of lines.
-        forward, left : int
-            Offset of the neighbor: pixels along the line, and to its left.
+        offsets : sequence of (int, int)
+            Offsets of neighbors: pixels along the line, and to its left.
 
-        Returns
-        -------
+        Yields
+        ------
         (n,) intp ndarray
-            Indices of lines, of the cell `SINK_CELL` where there is no linked neighbor.
+            Indices of lines for each offset, of the cell `SINK_CELL` where there is no linked
+            neighbor.
         """
         sheet, cell = np.divmod(line, self.cell_count)
         step = self.state_table.take(line, axis=0)[:, :2].astype(np.float32)
         x, y = step[:, 0], step[:, 1]
         norm = np.sqrt(x * x + y * y)
         norm[norm == 0] = 1
-        column = np.rint((forward * x - left * y) / norm).astype(np.intp)
-        row = np.rint((forward * y + left * x) / norm).astype(np.intp)
+        x, y = x / norm, y / norm
         phase_bits = self.packed_phase.take(cell)
-        linked = unpack_neighbor_mask(phase_bits) >> (column + 3 * row + 4).astype(np.uint32) & 1
-        neighbor = np.where(linked, cell + row * self.width + column, SINK_CELL)
-        matching = np.rint(phase_bits - self.packed_phase.take(neighbor)).astype(np.intp)
-        return (sheet + matching) % self.line_count * self.cell_count + neighbor
+        mask = unpack_neighbor_mask(phase_bits)
+        for forward, left in offsets:
+            column = np.rint(forward * x - left * y).astype(np.intp)
+            row = np.rint(forward * y + left * x).astype(np.intp)
+            linked = mask >> (column + 3 * row + 4).astype(np.uint32) & 1
+            neighbor = np.where(linked, cell + row * self.width + column, SINK_CELL)
+            matching = np.rint(phase_bits - self.packed_phase.take(neighbor)).astype(np.intp)
+            yield (sheet + matching) % self.line_count * self.cell_count + neighbor
 
 
 def member_lines(field: PixelField) -> np.ndarray:

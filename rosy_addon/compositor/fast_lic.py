@@ -30,7 +30,7 @@ from .covering import (
 from .filter_kernel import full_sample_count
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images_task, step_limits_task
-from .look import Look
+from .look import Look, is_hatched
 from .look_units import AntialiasedLook
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
@@ -63,9 +63,8 @@ MAX_UNCOVERED_FRACTION = 0.15
 #: Maximum number of rounds of seeding.
 MAX_ROUNDS = 8
 
-#: The spacing of seeds and the fraction of uncovered lines of antialiased pictures, and the factor
-#: of their contrast. The average of a neighbor would make streaks jagged.
-FINE_SEED_SPACING, FINE_UNCOVERED_FRACTION, FINE_CONTRAST_MATCH = 0.5, 0.0, 0.94
+#: The same for antialiased pictures, and the factor of their contrast.
+FINE_UNCOVERED_FRACTION, FINE_CONTRAST_MATCH = 0.05, 0.98
 
 #: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
@@ -96,6 +95,7 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     line = member_lines(field)
     members = np.empty((len(line), count, channels), dtype=np.float32)
     effective_samples = np.empty(count, dtype=np.float32)
+    slopes = np.empty(members.shape[:2], np.float32) if is_fine(look) and is_hatched(look) else None
     step_limit = yield from subtask(step_limits_task(field, look), 0.0, 0.0)
     overlap_sums = None
     for extent, core, overlap_stop in _strips(field, look):
@@ -118,7 +118,13 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
             covering, averages, look, _pixels_to_cells(step_limit, extent, covering)
         )
         yield from subtask(coverage_task, start, stop)
+        if is_fine(look):
+            smooth_task = averages.smooth_task(covering, cells[: overlap_stop - core.start])
+            yield from subtask(smooth_task, stop, stop)
         core_sums = averages.gather(core_cells, line)
+        if slopes is not None:
+            slopes_task = averages.slopes_task(covering, core_cells, line)
+            slopes[:, core] = yield from subtask(slopes_task, stop, stop)
         yield Progress(stop, STEP_LABEL)
         _blend_strips(
             core_sums, overlap_sums, strip_field.pixel[core.start - extent.start :] // field.width
@@ -129,7 +135,7 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
         yield Progress(stop, STEP_LABEL)
         effective_samples[core] = core_sums[:, :, -1].mean(axis=0)
         overlap_sums = averages.gather(overlap_cells, line)
-    return (yield from subtask(lic_images_task(members, effective_samples), 1.0, 1.0))
+    return (yield from subtask(lic_images_task(members, effective_samples, slopes), 1.0, 1.0))
 
 
 def _pixels_to_cells(
@@ -272,6 +278,50 @@ class _LineAverages:
         """The lines, among those given, that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
+    def smooth_task(self, covering: Covering, cells: np.ndarray) -> Task[None]:
+        """Average all lines of some cells with their neighbors along the line.
+
+        Pixels of a line take their averages from different streamlines, which differ a little.
+        """
+        smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
+        for line, out in enumerate(smooth):
+            for block in pixel_blocks(len(cells)):
+                yield Progress(1.0, STEP_LABEL)
+                entry = line * covering.cell_count + cells[block].astype(np.intp)
+                own = self._flat.take(entry, axis=0)
+                total = np.float32(2) * own
+                for neighbor in covering.neighbor_lines(entry, ((1, 0), (-1, 0))):
+                    total += self._or_own(self._flat.take(neighbor, axis=0), own)
+                np.multiply(total, np.float32(0.25), out=out[block])
+        for line, rows in enumerate(smooth):
+            yield Progress(1.0, STEP_LABEL)
+            scatter_rows(self._values[line], cells, rows)
+
+    def slopes_task(
+        self, covering: Covering, cells: np.ndarray, line: np.ndarray
+    ) -> Task[np.ndarray]:
+        """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
+        slopes = np.empty((len(line), len(cells)), dtype=np.float32)
+        for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
+            for block in pixel_blocks(len(cells)):
+                yield Progress(1.0, STEP_LABEL)
+                entry = first_entry + cells[block].astype(np.intp)
+                own = self._flat.take(entry, axis=0)
+                left, right = (
+                    self._or_own(self._flat.take(neighbor, axis=0), own)
+                    for neighbor in covering.neighbor_lines(entry, ((0, 1), (0, -1)))
+                )
+                difference = left[:, :-1] / left[:, -1:] - right[:, :-1] / right[:, -1:]
+                np.multiply(difference.mean(axis=1), np.float32(0.5), out=out[block])
+        return slopes
+
+    @staticmethod
+    def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Replace (n, K + 1) values of lines without an average, in place, by those of others."""
+        unknown = np.flatnonzero(values[:, -1] <= 0)
+        values[unknown] = own[unknown]
+        return values
+
     def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
         """(M, n, K + 1) sums and effective samples of the lines of some cells."""
         result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
@@ -290,9 +340,9 @@ def _cover_all_lines_task(
     missing = averages.missing_lines()
     total = len(missing)
     fine = is_fine(look)
-    spacing = FINE_SEED_SPACING if fine else SEED_SPACING_FACTOR
     max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
-    seeds = _grid_seeds(covering, averages, max(int(spacing * half_window * look.step), 1))
+    spacing = max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
+    seeds = _grid_seeds(covering, averages, spacing)
     batch_size = _batch_size(half_window + look.length)
     batch = StreamlineBatch(covering, look, step_limit, half_window, batch_size, fine)
     for _ in range(MAX_ROUNDS):
@@ -313,7 +363,8 @@ def _cover_all_lines_task(
         ]
     for forward, left in FILL_OFFSETS:
         yield Progress(0.9, STEP_LABEL)
-        missing = averages.copy_from(missing, covering.neighbor_line(missing, forward, left))
+        (source,) = covering.neighbor_lines(missing, [(forward, left)])
+        missing = averages.copy_from(missing, source)
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
     batch_size = min(_batch_size(look.length), len(missing))
     batch = StreamlineBatch(covering, look, step_limit, 0, batch_size, fine)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..color import map_colors, to_linear
-from .even_lines import EvenLines, has_even_lines, uneven_width
+from .even_lines import EvenLines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
@@ -45,6 +45,10 @@ ONSET_LEAD = 0.15
 
 #: Half the width of the blend between two ranks, in ranks.
 RANK_BLEND = 0.4
+
+#: Half the width of the step from paper to ink of antialiased streaks, in multiples of their slope per
+#: pixel.
+PIXEL_SOFTNESS = 1.0
 
 #: Coverage, as a fraction of a pixel, below which ink is not visible.
 MIN_COVERAGE = 1e-3
@@ -236,15 +240,24 @@ def _streak_coverage(
 ) -> np.ndarray:
     """`line_coverage` of the streaks of LIC images."""
     statistics = look_streak_statistics(look)
-    streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / statistics.std
+    streak, slope = _standard_streak(images, line, statistics.std)
     if modulation.break_images is not None:
-        break_streak = (
-            modulation.break_images.members[line].mean(axis=1) - NOISE_MEAN
-        ) / statistics.break_std
-        streak += break_amount(target_coverage, look.breaks, look.wobble) * (break_streak - streak)
+        amount = break_amount(target_coverage, look.breaks, look.wobble)
+        broken = _standard_streak(modulation.break_images, line, statistics.break_std)
+        streak += amount * (broken[0] - streak)
+        if slope is not None:
+            slope += amount * (broken[1] - slope)
     if modulation.paper_grain is not None:
         streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
-    return _above_threshold(streak, target_coverage, statistics.threshold, look)
+    return _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
+
+
+def _standard_streak(
+    images: LicImages, line: int, std: float
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Streaks of a line with mean 0 and standard deviation 1, and their slopes if these are known."""
+    streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / std
+    return streak, None if images.slopes is None else images.slopes[line] / std
 
 
 def _undirected_coverage(
@@ -264,11 +277,22 @@ def _undirected_coverage(
 
 
 def _above_threshold(
-    streak: np.ndarray, target_coverage: np.ndarray, thresholds: np.ndarray, look: Look
+    streak: np.ndarray,
+    target_coverage: np.ndarray,
+    thresholds: np.ndarray,
+    look: Look,
+    slope: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Coverage where streaks exceed the threshold of the target coverage, with soft edges."""
+    """Coverage where streaks exceed the threshold of the target coverage, with soft edges.
+
+    With slopes, edges are at least as soft as the mean over a pixel.
+    """
     threshold = np.interp(target_coverage, np.linspace(0, 1, COVERAGE_STEPS), thresholds)
-    return smoothstep((streak - threshold) / (2 * softness(look.crispness)) + 0.5)
+    half_width = np.float32(softness(look.crispness))
+    if slope is not None:
+        slope = np.float32(PIXEL_SOFTNESS) * slope
+        half_width = np.sqrt(half_width * half_width + slope * slope)
+    return smoothstep((streak - threshold) / (2 * half_width) + 0.5)
 
 
 def _even_line_coverage(
@@ -309,13 +333,9 @@ def has_paper_grain(look: Look) -> bool:
 def is_shaded_by_pixel(look: Look) -> bool:
     """Whether a pixel with several samples is shaded once, not at every sample.
 
-    Ink that is drawn where streaks exceed a threshold, outlines and the grain of paper vary within a
-    pixel.
+    The streaks of other methods do not have the slopes that smooth the edges of the ink.
     """
-    if not is_hatched(look):
-        return True
-    varies = has_outline(look) or has_breaks(look) or has_paper_grain(look)
-    return has_even_lines(look) and not varies
+    return not is_hatched(look) or look.method == "sheets"
 
 
 def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:

@@ -36,12 +36,16 @@ class LicImages:
         over the members.
     first_set_weight : (P,) float32 ndarray
         Weight of `members` in `blend`. The rest is a second set of images.
+    slopes : (M, P) float32 ndarray or None
+        Derivatives of the members, mean over their channels, to the left of the lines, per pixel. None
+        if they were not asked for.
     """
 
     members: np.ndarray
     blend: np.ndarray
     effective_samples: np.ndarray
     first_set_weight: np.ndarray
+    slopes: np.ndarray | None = None
 
     def part(self, extent: slice) -> LicImages:
         """Return the images at some of the pixels."""
@@ -50,17 +54,20 @@ class LicImages:
             self.blend[extent],
             self.effective_samples[extent],
             self.first_set_weight[extent],
+            None if self.slopes is None else self.slopes[:, extent],
         )
 
 
-def lic_images_task(members: np.ndarray, effective_samples: np.ndarray) -> Task[LicImages]:
+def lic_images_task(
+    members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
+) -> Task[LicImages]:
     """Blend member images. Parameters as in `LicImages`."""
     blend = np.empty(members.shape[1:], dtype=np.float32)
     for block in pixel_blocks(len(blend)):
         yield Progress(block.start / len(blend), "blending lines")
         blend[block] = members[:, block].mean(axis=0)
     return LicImages(
-        members, blend, effective_samples, np.ones(len(effective_samples), dtype=np.float32)
+        members, blend, effective_samples, np.ones(len(effective_samples), dtype=np.float32), slopes
     )
 
 

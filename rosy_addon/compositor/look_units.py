@@ -51,6 +51,10 @@ class AntialiasedLook(Look):
     Streaks are drawn more accurately than without supersampling.
     """
 
+    def without_antialiasing(self) -> Look:
+        """Return the same look for streaks that need not be accurate."""
+        return Look(**{name: getattr(self, name) for name in settings_of(Look)})
+
 
 def antialiased_look(look: Look) -> AntialiasedLook:
     """Return the look for a frame of pixels that have several samples."""

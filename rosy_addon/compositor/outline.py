@@ -8,6 +8,7 @@ are visible. Marks that are too short are not drawn, unless they are the border 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,9 @@ from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh_task
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.pixel_neighbors import affine_depth, neighbor_masks_task
+from ..projection.project import project_samples_task
 from .look import Look
+from .look_units import supersampled_look
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.affine_depth`).
@@ -39,7 +42,7 @@ MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
 PART_BORDER, EMPTY_BORDER = 1, 2
 
 #: The settings of a look that an outline depends on.
-OUTLINE_SETTINGS = ("outline", "crease_angle", "cross_creases", "supersampling")
+OUTLINE_SETTINGS = ("outline", "crease_angle", "cross_creases", "supersampling", "display")
 
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
@@ -59,10 +62,11 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
     Parameters
     ----------
     gbuffer : GBuffer
-        Creases are drawn if its instances are known.
+        Creases are drawn if its instances are known. If its pixels have several samples, outlines are
+        drawn at the samples near them.
     look : Look
-        In pixels of the frame. Its `outline`, `crease_angle`, `cross_creases` and `supersampling`
-        are used.
+        In pixels of the frame. Its `outline`, `crease_angle`, `cross_creases`, `supersampling` and
+        `display` are used.
     cache : Cache, optional
         Stores what does not depend on the view.
 
@@ -71,6 +75,44 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
     (P,) float32 ndarray
         0 to 1.
     """
+    if gbuffer.samples is None:
+        edges = yield from subtask(_find_edges_task(gbuffer, look, cache), 0.0, 0.8)
+        return (yield from subtask(_draw_edges_task(gbuffer, look, edges), 0.8, 1.0))
+    edges = yield from subtask(_find_edges_task(gbuffer, look, cache), 0.0, 0.3)
+    is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
+    reach = int(np.ceil(look.outline)) + 1
+    yield Progress(0.3, STEP_LABEL)
+    is_near = _dilated(gbuffer, is_start, reach)
+    # The samples at the border of this part do not know their neighbors.
+    entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
+    coverage = np.zeros(len(gbuffer.pixel), dtype=np.float32)
+    if not len(entries):
+        return coverage
+    task = project_samples_task(gbuffer, entries, look.display, cache)
+    samples, home, shown = yield from subtask(task, 0.3, 0.6, STEP_LABEL)
+    look = supersampled_look(replace(look, supersampling=gbuffer.samples.side))
+    edges = yield from subtask(_find_edges_task(samples, look, cache), 0.6, 0.8)
+    edges.line_width[~is_near[home]] = 0
+    sample_coverage = yield from subtask(_draw_edges_task(samples, look, edges), 0.8, 1.0)
+    sums = np.bincount(shown, sample_coverage, minlength=len(coverage))
+    np.divide(sums, np.bincount(shown), out=coverage, where=np.bincount(shown) > 0)
+    return coverage
+
+
+def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
+    """(P,) bool: whether a marked pixel is in the square of this radius, in pixels, around a pixel."""
+    width, height = gbuffer.camera.width, gbuffer.camera.height
+    padded = np.zeros((height + 2 * radius, width + 2 * radius), dtype=bool)
+    row, column = np.divmod(gbuffer.pixel, np.int32(width))
+    padded[row[is_marked] + radius, column[is_marked] + radius] = True
+    for axis in (0, 1):
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=axis)
+        padded = windows.any(axis=-1)
+    return padded[row, column]
+
+
+def _find_edges_task(gbuffer: GBuffer, look: Look, cache: Cache | None) -> Task[_Edges]:
+    """Find the pixels at silhouettes, borders and creases, and how wide lines may be there."""
     width, height = gbuffer.camera.width, gbuffer.camera.height
     radius = int(np.ceil(look.outline))
     # The frame has an empty margin that is wider than the lines.
@@ -89,7 +131,7 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
         yield Progress(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
         depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
     task = neighbor_masks_task(gbuffer, look.crease_angle, True)
-    mask = yield from subtask(task, 0.2, 0.5, STEP_LABEL)
+    mask = yield from subtask(task, 0.2, 0.6, STEP_LABEL)
     line_width = np.zeros(len(cell), dtype=np.float32)
     border = np.zeros(len(cell), dtype=np.uint8)
     instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
@@ -98,30 +140,39 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
             _creases_and_parts_task(
                 gbuffer, int(instance_id), look, cache, grid, mask, line_width, border
             ),
-            0.5,
             0.6,
+            0.7,
             STEP_LABEL,
         )
     task = _occlusions_task(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
-    yield from subtask(task, 0.6, 0.75, STEP_LABEL)
+    yield from subtask(task, 0.7, 0.9, STEP_LABEL)
     task = _steps_task(gbuffer, look, grid, mask, depth, tolerance, line_width)
-    yield from subtask(task, 0.75, 0.8, STEP_LABEL)
+    yield from subtask(task, 0.9, 1.0, STEP_LABEL)
+    return _Edges(grid, depth, tolerance, line_width, border)
+
+
+def _draw_edges_task(gbuffer: GBuffer, look: Look, edges: _Edges) -> Task[np.ndarray]:
+    """(P,) float32 coverage of each pixel by the lines of edges."""
+    grid, depth, tolerance, line_width, border = edges
     edge_pixels = np.flatnonzero(line_width)
     strength = yield from subtask(
         _mark_strength_task(
-            gbuffer.pixel[edge_pixels], border[edge_pixels], width, look.supersampling
+            gbuffer.pixel[edge_pixels],
+            border[edge_pixels],
+            gbuffer.camera.width,
+            look.supersampling,
         ),
-        0.8,
-        0.9,
+        0.0,
+        0.5,
         STEP_LABEL,
     )
     edge_pixels, strength = edge_pixels[strength > 0], strength[strength > 0]
     line_width = np.minimum(line_width[edge_pixels], np.float32(look.outline) * strength)
     depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
-    coverage = np.zeros(len(cell), dtype=np.float32)
-    for distance, dx, dy in _disc_offsets(radius):
-        yield Progress(0.9, STEP_LABEL)
-        neighbor = entry_of_cell.take(cell[edge_pixels] + (dy * stride + dx))
+    coverage = np.zeros(len(depth), dtype=np.float32)
+    for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
+        yield Progress(0.5, STEP_LABEL)
+        neighbor = grid.entry.take(grid.cell[edge_pixels] + (dy * grid.stride + dx))
         paintable = (neighbor >= 0) & (
             gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge_pixels]
         )
@@ -153,6 +204,27 @@ class _CellGrid(NamedTuple):
     cell: np.ndarray
     stride: int
     origin: int
+
+
+class _Edges(NamedTuple):
+    """The edges in a G-buffer.
+
+    Attributes
+    ----------
+    grid : _CellGrid
+    depth, tolerance : (P,) float32 ndarray
+        From `pixel_neighbors.affine_depth`.
+    line_width : (P,) float32 ndarray
+        Largest width of lines that begin at a pixel; 0 where there is no edge.
+    border : (P,) uint8 ndarray
+        Bits `PART_BORDER` and `EMPTY_BORDER`.
+    """
+
+    grid: _CellGrid
+    depth: np.ndarray
+    tolerance: np.ndarray
+    line_width: np.ndarray
+    border: np.ndarray
 
 
 def _creases_and_parts_task(

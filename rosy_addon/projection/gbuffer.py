@@ -67,6 +67,31 @@ class PixelCoverage(NamedTuple):
     share: float
 
 
+class PixelSamples(NamedTuple):
+    """What is visible at S x S samples of each of the P pixels of a G-buffer.
+
+    Attributes
+    ----------
+    side : int
+        S.
+    own : (P,) uint16 ndarray
+        The samples that show the triangle of the entry: bit ``row * S + column``.
+    other : (E,) int32 ndarray
+        The samples that show another triangle, as flat indices into the frame of all samples.
+    other_instance, other_triangle : (E,) int32 ndarray
+        That triangle, and its mesh instance.
+    other_entry : (E,) int32 ndarray
+        The entry whose surface they show: that of their own pixel, or of one beside it.
+    """
+
+    side: int
+    own: np.ndarray
+    other: np.ndarray
+    other_instance: np.ndarray
+    other_triangle: np.ndarray
+    other_entry: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class GBuffer:
     """The P visible pixels of all surfaces with a field, in ascending order of pixel index.
@@ -115,6 +140,8 @@ class GBuffer:
     coverage : PixelCoverage or None
         How much of the pixels the entries cover, if pixels have several samples. None if each entry
         covers its pixel.
+    samples : PixelSamples or None
+        What is visible at these samples.
     """
 
     camera: Camera
@@ -134,6 +161,7 @@ class GBuffer:
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     instances: tuple[MeshInstance, ...] = ()
     coverage: PixelCoverage | None = None
+    samples: PixelSamples | None = None
 
     def __post_init__(self) -> None:
         if self.geometric_normal is None:
@@ -142,11 +170,11 @@ class GBuffer:
             object.__setattr__(self, "front_facing", np.ones(len(self.pixel), dtype=bool))
 
     def part(self, extent: slice) -> GBuffer:
-        """Return the G-buffer of some of the pixels, without a copy and without their coverage."""
+        """Return the G-buffer of some of the pixels, without a copy and without their samples."""
         arrays = {
             name: value[extent]
             for name, value in vars(self).items()
             if isinstance(value, np.ndarray)
         }
         channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(self, **arrays, channels=channels, coverage=None)
+        return replace(self, **arrays, channels=channels, coverage=None, samples=None)

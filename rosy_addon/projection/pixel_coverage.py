@@ -13,7 +13,7 @@ import numpy as np
 
 from ..progress import Progress, Task
 from .camera import Camera, pixel_rays, z_at_depth
-from .gbuffer import GBuffer, PixelCoverage
+from .gbuffer import GBuffer, PixelCoverage, PixelSamples
 from .pixel_blocks import pixel_blocks
 from .pixel_neighbors import depth_slopes
 from .rasterizer import SampledTriangles
@@ -36,7 +36,8 @@ class OtherSamples(NamedTuple):
         Position in pixels.
     depth : (E,) float32 ndarray
         Linear on screen for planes, as of `pixel_neighbors.affine_depth`.
-    instance_id : (E,) int32 ndarray
+    instance_id, triangle : (E,) int32 ndarray
+        Visible triangle, and its mesh instance.
     normal : (3, E) float32 ndarray
         Unit normals of the triangles in camera space, of either orientation.
     """
@@ -46,6 +47,7 @@ class OtherSamples(NamedTuple):
     y: np.ndarray
     depth: np.ndarray
     instance_id: np.ndarray
+    triangle: np.ndarray
     normal: np.ndarray
 
     def part(self, index: np.ndarray | slice) -> OtherSamples:
@@ -81,6 +83,7 @@ def other_samples_task(
     camera: Camera,
     samples: int,
     instance_id: np.ndarray,
+    triangle: np.ndarray,
     normal: np.ndarray,
 ) -> Task[OtherSamples]:
     """Return the samples that show another triangle than the center of their pixel.
@@ -92,7 +95,7 @@ def other_samples_task(
         Of the picture.
     samples : int
         Samples along each side of a pixel.
-    instance_id, normal
+    instance_id, triangle, normal
         As in `OtherSamples`.
     """
     frame = camera.scaled(samples)
@@ -104,12 +107,12 @@ def other_samples_task(
         x[block], y[block] = _centers(index, frame.width, samples)
         z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
         depth[block] = -1 / z if camera.is_perspective else z
-    return OtherSamples(sampled.other_entry, x, y, depth, instance_id, normal)
+    return OtherSamples(sampled.other_entry, x, y, depth, instance_id, triangle, normal)
 
 
 def pixel_coverage_task(
     gbuffer: GBuffer, sampled: SampledTriangles, others: OtherSamples, samples: int
-) -> Task[PixelCoverage]:
+) -> Task[tuple[PixelCoverage, PixelSamples]]:
     """Find the entry of the G-buffer whose surface each sample shows.
 
     Parameters
@@ -158,12 +161,22 @@ def pixel_coverage_task(
             nearest[exists[closer]] = distance[closer]
             entry[part[exists[closer]]] = candidate[closer]
     is_own = entry == others.entry
-    own = sampled.count + np.bincount(others.entry[is_own], minlength=len(sampled.count))
+    own = np.bincount(others.entry[is_own], minlength=count)
+    for bit in range(samples * samples):
+        own += sampled.own_samples >> np.uint16(bit) & np.uint16(1)
     moved = np.flatnonzero(~is_own)
     moved = moved[np.argsort(others.entry[moved], kind="stable")]
     share = np.float32(1 / samples**2)
-    return PixelCoverage(
+    coverage = PixelCoverage(
         own.astype(np.float32) * share, gbuffer.pixel[others.entry[moved]], entry[moved], share
+    )
+    return coverage, PixelSamples(
+        samples,
+        sampled.own_samples,
+        sampled.other_sample,
+        others.instance_id,
+        others.triangle,
+        entry,
     )
 
 

@@ -106,62 +106,94 @@ def project_task(
     if samples > 1:
         task = _visible_samples_task(instances, camera, samples)
         visible, sampled, other_instance, other_triangle = yield from subtask(task, 0.0, 0.3)
-        other_normal = np.zeros((3, len(other_triangle)), dtype=np.float32)
     else:
         visible = yield from subtask(_visible_pixels_task(instances, camera), 0.0, 0.3)
     gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.4)
-    count = len(gbuffer.pixel)
-    pixels_done = 0
-    for instance_id in visible.visible_ids:
-        pixels = (
-            slice(0, count)
-            if visible.is_single_instance
-            else np.flatnonzero(visible.instance_id == instance_id)
-        )
-        triangle = visible.triangle[pixels]
-        instance = instances[instance_id]
-        start, midpoint, stop = (
-            0.4 + 0.6 * pixels_before / count
-            for pixels_before in (
-                pixels_done,
-                pixels_done + 0.5 * len(triangle),
-                pixels_done + len(triangle),
-            )
-        )
-        corner_field = yield from subtask(
-            cached_corner_field_task(
-                instance.surface, instance.matrix, instance.field, display, cache
-            ),
-            start,
-            midpoint,
-        )
-        corner_field = corner_field.rotated(camera.view[:3, :3])
-        _allocate_channels(gbuffer, corner_field)
-        if sampled is not None:
-            of_instance = np.flatnonzero(other_instance == instance_id)
-            other_normal[:, of_instance] = corner_field.geometric_normal.take(
-                other_triangle[of_instance], axis=1
-            )
-        for block in pixel_blocks(len(triangle)):
-            yield Progress(
-                midpoint + (stop - midpoint) * block.start / len(triangle),
-                "rotating the field into the view plane",
-            )
-            target_pixels = block if visible.is_single_instance else pixels[block]
-            _fill_pixels(
-                gbuffer,
-                target_pixels,
-                triangle[block],
-                corner_field,
-                instance.field.degree,
-            )
-        pixels_done += len(triangle)
+    geometric_normals = yield from subtask(
+        _fill_instances_task(gbuffer, visible, display, cache), 0.4, 1.0
+    )
     if sampled is None:
         return gbuffer
-    task = other_samples_task(sampled, camera, samples, other_instance, other_normal)
+    other_normal = np.zeros((3, len(other_triangle)), dtype=np.float32)
+    for instance_id, normal in geometric_normals.items():
+        of_instance = np.flatnonzero(other_instance == instance_id)
+        other_normal[:, of_instance] = normal.take(other_triangle[of_instance], axis=1)
+    task = other_samples_task(
+        sampled, camera, samples, other_instance, other_triangle, other_normal
+    )
     others = yield from subtask(task, 1.0, 1.0)
-    coverage = yield from subtask(pixel_coverage_task(gbuffer, sampled, others, samples), 1.0, 1.0)
-    return replace(gbuffer, coverage=coverage)
+    coverage, pixel_samples = yield from subtask(
+        pixel_coverage_task(gbuffer, sampled, others, samples), 1.0, 1.0
+    )
+    return replace(gbuffer, coverage=coverage, samples=pixel_samples)
+
+
+def project_samples_task(
+    gbuffer: GBuffer, entries: np.ndarray, display: str, cache: Cache | None = None
+) -> Task[tuple[GBuffer, np.ndarray, np.ndarray]]:
+    """Compute the G-buffer of all samples of some pixels.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        Of `project_task` with several samples, and with its instances.
+    entries : (n,) intp ndarray
+        The pixels, as indices into the G-buffer.
+    display, cache
+        As for `project_task`.
+
+    Returns
+    -------
+    samples : GBuffer
+        Of the frame of all samples.
+    home, shown : (Q,) int32 ndarray
+        Entries of `gbuffer` for each sample: that of its pixel, and that whose surface it shows.
+    """
+    yield Progress(0.0, "finding visible pixels")
+    pixel_samples, instances = gbuffer.samples, gbuffer.instances
+    side = pixel_samples.side
+    camera = gbuffer.camera.scaled(side)
+    width = np.int32(gbuffer.camera.width)
+    # The entries of `gbuffer`, the samples, and what is visible at them.
+    columns = []
+    row, column = np.divmod(gbuffer.pixel[entries], width)
+    for bit in range(side * side):
+        is_own = (pixel_samples.own[entries] >> np.uint16(bit) & 1).astype(bool)
+        home = entries[is_own].astype(np.int32)
+        sample = (row[is_own] * np.int32(side) + np.int32(bit // side)) * (width * np.int32(side))
+        sample += column[is_own] * np.int32(side) + np.int32(bit % side)
+        columns.append((sample, home, home, gbuffer.instance_id[home], gbuffer.triangle[home]))
+    row, column = np.divmod(pixel_samples.other, width * np.int32(side))
+    pixel = row // np.int32(side) * width + column // np.int32(side)
+    place = np.minimum(np.searchsorted(gbuffer.pixel[entries], pixel), len(entries) - 1)
+    others = np.flatnonzero(gbuffer.pixel[entries].take(place) == pixel)
+    columns.append(
+        (
+            pixel_samples.other[others],
+            entries[place[others]].astype(np.int32),
+            pixel_samples.other_entry[others],
+            pixel_samples.other_instance[others],
+            pixel_samples.other_triangle[others],
+        )
+    )
+    columns = [np.concatenate(values) for values in zip(*columns, strict=True)]
+    order = np.argsort(columns[0], kind="stable")
+    sample, home, shown, instance_id, triangle = (values[order] for values in columns)
+    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    global_triangle = triangle + first_triangle[instance_id]
+    weights, front_facing = yield from subtask(
+        barycentrics_task(clip, triangles, sample, global_triangle, camera.width, camera.height),
+        0.1,
+        0.3,
+    )
+    corner_clip = clip[triangles[global_triangle], 2:]
+    z, w = np.einsum("nc,nck->kn", weights, corner_clip)
+    fragments = Fragments(sample, global_triangle, weights, front_facing, z / w)
+    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
+    visible = _VisiblePixels(fragments, instance_id, triangle, visible_ids)
+    samples = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.5)
+    yield from subtask(_fill_instances_task(samples, visible, display, cache), 0.5, 1.0)
+    return samples, home, shown
 
 
 def cached_project_task(
@@ -464,6 +496,62 @@ def _empty_vectors(count: int) -> np.ndarray:
 
 
 # --- pixels --------------------------------------------------------------------------------------
+
+
+def _fill_instances_task(
+    gbuffer: GBuffer, visible: _VisiblePixels, display: str, cache: Cache | None
+) -> Task[dict[int, np.ndarray]]:
+    """Write the normals, the representation and the channels of a new G-buffer.
+
+    Returns
+    -------
+    dict of int to (3, T) float32 ndarray
+        Normals of the triangles of each visible instance, in camera space.
+    """
+    camera, count = gbuffer.camera, len(gbuffer.pixel)
+    pixels_done = 0
+    geometric_normals = {}
+    for instance_id in visible.visible_ids:
+        pixels = (
+            slice(0, count)
+            if visible.is_single_instance
+            else np.flatnonzero(visible.instance_id == instance_id)
+        )
+        triangle = visible.triangle[pixels]
+        instance = gbuffer.instances[instance_id]
+        start, midpoint, stop = (
+            pixels_before / count
+            for pixels_before in (
+                pixels_done,
+                pixels_done + 0.5 * len(triangle),
+                pixels_done + len(triangle),
+            )
+        )
+        corner_field = yield from subtask(
+            cached_corner_field_task(
+                instance.surface, instance.matrix, instance.field, display, cache
+            ),
+            start,
+            midpoint,
+        )
+        corner_field = corner_field.rotated(camera.view[:3, :3])
+        geometric_normals[instance_id] = corner_field.geometric_normal
+        _allocate_channels(gbuffer, corner_field)
+        for block in pixel_blocks(len(triangle)):
+            yield Progress(
+                midpoint + (stop - midpoint) * block.start / len(triangle),
+                "rotating the field into the view plane",
+            )
+            target_pixels = block if visible.is_single_instance else pixels[block]
+            _fill_pixels(
+                gbuffer,
+                target_pixels,
+                triangle[block],
+                corner_field,
+                instance.field.degree,
+            )
+        pixels_done += len(triangle)
+    return geometric_normals
 
 
 def _allocate_channels(gbuffer: GBuffer, corner_field: CornerField) -> None:

@@ -65,8 +65,8 @@ class SampledTriangles(NamedTuple):
         Triangle that is visible at the center, or else at the sample that is nearest to it.
     depth : (P,) float64 ndarray
         Its z / w there.
-    count : (P,) int32 ndarray
-        Number of samples that show this triangle.
+    own_samples : (P,) uint16 ndarray
+        The samples that show this triangle: bit ``row * S + column``.
     other_entry : (E,) int32 ndarray
         Index into `pixel`, for each sample that shows another triangle.
     other_sample : (E,) int32 ndarray
@@ -78,7 +78,7 @@ class SampledTriangles(NamedTuple):
     pixel: np.ndarray
     triangle: np.ndarray
     depth: np.ndarray
-    count: np.ndarray
+    own_samples: np.ndarray
     other_entry: np.ndarray
     other_sample: np.ndarray
     other_triangle: np.ndarray
@@ -275,15 +275,16 @@ def _group_samples_task(
         own_depth[empty] = depth[:, row, :, column][empty]
     pixel = np.flatnonzero(own_triangle >= 0)
     own_triangle, own_depth = own_triangle.ravel()[pixel], own_depth.ravel()[pixel]
-    count = np.zeros(len(pixel), dtype=np.int32)
+    own_samples = np.zeros(len(pixel), dtype=np.uint16)
     others = []
     pixel_row, pixel_column = np.divmod(pixel.astype(np.int32), np.int32(width))
     pixel_row += np.int32(first_row)
     for row, column in sample_places:
         yield Progress(1.0, STEP_LABEL)
         sample_triangle = triangle[:, row, :, column].ravel()[pixel]
-        count += sample_triangle == own_triangle
-        entry = np.flatnonzero((sample_triangle >= 0) & (sample_triangle != own_triangle))
+        is_own = sample_triangle == own_triangle
+        own_samples |= is_own.astype(np.uint16) << np.uint16(row * samples + column)
+        entry = np.flatnonzero((sample_triangle >= 0) & ~is_own)
         sample_row = pixel_row[entry] * np.int32(samples) + np.int32(row)
         sample_column = pixel_column[entry] * np.int32(samples) + np.int32(column)
         others.append(
@@ -298,7 +299,7 @@ def _group_samples_task(
         pixel_row * np.int32(width) + pixel_column,
         own_triangle,
         own_depth,
-        count,
+        own_samples,
         *(np.concatenate(values) for values in zip(*others, strict=True)),
     )
 

@@ -10,6 +10,8 @@ from shapes import icosphere, torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import antialiased_look, supersampled_look
+from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
@@ -62,6 +64,40 @@ def test_streaks_are_those_of_many_samples(name, degree):
     assert 1 - correlation < 0.65 * (1 - single_correlation)
     assert value.std() == pytest.approx(target.std(), rel=0.05)
     np.testing.assert_allclose(actual[..., 3], sampled(instance, look, 2)[..., 3], atol=1e-6)
+
+
+@pytest.mark.parametrize("preset", ["cross-hatch", "pencil", "woodcut"])
+def test_hatching_is_that_of_many_samples(preset):
+    """Nearer to it than without samples, of the same tone and contrast.
+
+    The noise is sampled at pixels, so the lines are not the same ones throughout.
+    """
+    instance, look = torus_instance(), load_preset(preset).look
+    actual, single = (rendered(instance, replace(look, supersampling=s)) for s in (2, 1))
+    expected = sampled(instance, look, 4)
+    inside = (actual[..., 3] == 1) & (single[..., 3] == 1) & (expected[..., 3] == 1)
+    target, value = luminance(expected, inside), luminance(actual, inside)
+    correlation = np.corrcoef(value, target)[0, 1]
+    single_correlation = np.corrcoef(luminance(single, inside), target)[0, 1]
+    assert 1 - correlation < 0.75 * (1 - single_correlation)
+    assert value.mean() == pytest.approx(target.mean(), abs=0.01)
+    assert value.std() == pytest.approx(target.std(), rel=0.1)
+
+
+@pytest.mark.parametrize("width", [1.0, 2.6])
+def test_outlines_are_those_of_samples(width):
+    instance, look = torus_instance(), Look(outline=width)
+    pixels, samples = project([instance], CAMERA, samples=2), project([instance], CAMERA.scaled(2))
+    coverage = outline_coverage(pixels, antialiased_look(look))
+    actual = np.zeros(SIZE * SIZE)
+    actual[pixels.pixel] = coverage * pixels.coverage.own
+    shown = coverage[pixels.coverage.entry] * pixels.coverage.share
+    np.add.at(actual, pixels.coverage.pixel, shown)
+    sample_look = supersampled_look(replace(look, supersampling=2))
+    expected = np.zeros(4 * SIZE * SIZE)
+    expected[samples.pixel] = outline_coverage(samples, sample_look)
+    expected = expected.reshape(SIZE, 2, SIZE, 2).mean(axis=(1, 3)).ravel()
+    assert np.abs(actual - expected).sum() < 0.01 * expected.sum()
 
 
 def test_even_lines_are_those_of_many_samples():

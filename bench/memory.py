@@ -40,6 +40,8 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
 }
 
+#: Settings of lines on the surface.
+HATCHED = {"ink": "hatch", "supersampling": 2, "anchor": "surface", "detail": 0.5}
 
 #: Triangles, N, size, enlargement of the ball in the frame, and settings of the look, of the
 #: pictures whose estimates are compared with what they take.
@@ -57,6 +59,12 @@ ESTIMATED: dict[str, tuple[int, int, tuple[int, int], float, dict[str, object]]]
     ),
     "1024 x 1024, hatching, 2 x 2 samples a pixel": (
         12_000, 4, (1024, 1024), 1, {"ink": "hatch", "supersampling": 2},
+    ),
+    "2048 x 2048, pen and ink, 2 x 2 samples a pixel": (
+        12_000, 4, (2048, 2048), 1, {**HATCHED, "outline": 1.3, "breaks": 0.7, "overshoot": 8.0},
+    ),
+    "1400 x 1400, pencil, 2 x 2 samples a pixel": (
+        12_000, 4, (1400, 1400), 1, {**HATCHED, "breaks": 0.4, "wobble": 0.5, "paper_grain": 0.4},
     ),
     "2048 x 2048": (12_000, 4, (2048, 2048), 1, {}),
     "2048 x 2048, the picture is filled": (12_000, 4, (2048, 2048), 4, {}),

@@ -74,8 +74,9 @@ STATISTICS_BYTES = 100_000_000
 #: Bytes of a visible sample while its color is computed: gray; colored; by magnitude; hatched.
 GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 50
 
-#: Bytes of a sample that shows another triangle than the center of its pixel.
-OTHER_SAMPLE_BYTES = 40
+#: Bytes of a sample that shows another triangle than the center of its pixel: while such samples are
+#: found, and kept.
+OTHER_SAMPLE_BYTES, KEPT_OTHER_SAMPLE_BYTES = 40, 16
 
 #: Bytes of a shadow map of a light, while it is made.
 SHADOW_MAP_BYTES = 110_000_000
@@ -173,7 +174,9 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     noise_channels = 3 if look.noise == "colour" else 1
     image_bytes = 4 * (lines + 1) * noise_channels + 8
 
+    other_samples = _other_samples(view, visible, triangles)
     gbuffer = (GBUFFER_BYTES + CHANNEL_BYTES * channels) * visible + KEPT_TRIANGLE_BYTES * triangles
+    gbuffer += KEPT_OTHER_SAMPLE_BYTES * other_samples
     shadow_maps = SHADOW_MAP_BYTES if look.shadows and look.light != "headlight" else 0
     base = gbuffer + FIELD_BYTES * visible
     images = base + image_bytes * visible
@@ -188,18 +191,20 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
         tones = 4 * (lines + 6) * visible
         lic = max(lic, images + tones + _sheets_bytes(view, look, coverage, lines, 3))
     has_surface_grain = has_paper_grain(look) and look.anchor == "surface"
-    paper_grain = images + SURFACE_NOISE_BYTES * visible if has_surface_grain else 0
+    paper_grain = 0
+    if has_surface_grain:
+        paper_grain = images + (SURFACE_NOISE_BYTES + _modulation_bytes(look, lines)) * visible
     # What LIC has freed is used again, if its arrays are small.
     kept = KEPT_FRACTION * lic if 8 * visible < MMAP_THRESHOLD_BYTES else 0
     # The rows without visible samples are never written to, so they take no memory.
     sample_rows = PICTURE_BYTES * frame * coverage.rows
     downsampled = PICTURE_BYTES * pixels if look.supersampling > 1 else 0
-    others = OTHER_SAMPLE_BYTES * _other_samples(view, visible, triangles)
+    others = OTHER_SAMPLE_BYTES * other_samples
     samples = frame * view.samples_per_side**2
     return int(
         max(
             DEPTH_BUFFER_BYTES * min(samples, MAX_BAND_PIXELS) + FRAGMENT_BYTES * visible + others,
-            gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles + others,
+            gbuffer + PROJECTION_BYTES * visible + TRIANGLE_BYTES * triangles,
             gbuffer + shadow_maps,
             lic,
             paper_grain,
@@ -293,8 +298,12 @@ def _color_bytes(look: Look, lines: int, noise_channels: int) -> float:
             return MAGNITUDE_BYTES
         colored = noise_channels > 1 or look.hue == "families"
         return COLOR_BYTES if colored else GRAY_BYTES
-    extra = 4 * lines + 8 if has_breaks(look) else 0
-    extra += 35 if look.wobble > 0 else 0
+    extra = _modulation_bytes(look, lines)
     extra += 4 * lines + 8 if has_paper_grain(look) else 0
     extra += 4 * lines if has_overshoot(look) else 0
     return HATCHING_BYTES + extra + (4 if has_outline(look) else 0)
+
+
+def _modulation_bytes(look: Look, lines: int) -> float:
+    """Return the bytes of a visible sample that breaks and wobble take beside its LIC images."""
+    return (4 * lines + 8 if has_breaks(look) else 0) + (35 if look.wobble > 0 else 0)

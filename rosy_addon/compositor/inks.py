@@ -88,8 +88,14 @@ class Inks:
         Returns
         -------
         (P, 3) float32 ndarray
-            Linear color.
+            Linear color. Read-only if there is only one.
         """
+        if (
+            len(self.dark) == 1
+            and (self.dark == self.middle).all()
+            and (self.dark == self.light).all()
+        ):
+            return np.broadcast_to(self.dark, (len(tone), 3))
         lower = np.minimum(index.astype(np.intp), len(self.dark) - 1)
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]

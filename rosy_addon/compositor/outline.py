@@ -8,6 +8,7 @@ are visible. Marks that are too short are not drawn, unless they are the border 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -37,6 +38,9 @@ MIN_STEP, STEP_RATIO = 6.0, 2.0
 #: Length in pixels of the finished picture below which a mark is not drawn, and from which on it has
 #: its full width: it grows and shrinks when something moves, but it does not flicker.
 MIN_MARK_LENGTH, FULL_MARK_LENGTH = 6, 12
+
+#: Samples of pixels that are looked at together.
+MAX_OUTLINE_SAMPLES = 1 << 20
 
 #: Bits of what begins next to a pixel at an edge.
 PART_BORDER, EMPTY_BORDER = 1, 2
@@ -85,18 +89,69 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
     is_near = _dilated(gbuffer, is_start, reach)
     # The samples at the border of this part do not know their neighbors.
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
-    coverage = np.zeros(len(gbuffer.pixel), dtype=np.float32)
-    if not len(entries):
-        return coverage
+    sums, counts = np.zeros((2, len(gbuffer.pixel)))
+    for band, core in _bands(gbuffer, entries, reach + FULL_MARK_LENGTH):
+        start = 0.3 + 0.7 * core.start / len(entries)
+        stop = 0.3 + 0.7 * core.stop / len(entries)
+        task = _sample_outline_task(gbuffer, look, entries[band], is_near, cache)
+        home, shown, coverage = yield from subtask(task, start, stop, STEP_LABEL)
+        first, last = entries[core.start], entries[core.stop - 1]
+        is_core = (home >= first) & (home <= last)
+        sums += np.bincount(shown[is_core], coverage[is_core], minlength=len(sums))
+        counts += np.bincount(shown[is_core], minlength=len(sums))
+    return (sums / np.maximum(counts, 1)).astype(np.float32)
+
+
+def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> Iterator[tuple[slice, slice]]:
+    """Divide entries of a G-buffer into bands of rows with at most `MAX_OUTLINE_SAMPLES` or so.
+
+    Yields
+    ------
+    band, core : slice
+        Ranges of `entries`: the rows of the band, and the same without a margin of so many pixels
+        that it shares with the other bands.
+    """
+    row = gbuffer.pixel[entries] // np.int32(gbuffer.camera.width)
+    limit = max(MAX_OUTLINE_SAMPLES // gbuffer.samples.side**2, 1)
+    start = 0
+    while start < len(row):
+        last_row = row[min(start + limit, len(row)) - 1]
+        ends = np.array([row[start] - margin, last_row + 1, last_row + 1 + margin], row.dtype)
+        first, stop, band_stop = np.searchsorted(row, ends).tolist()
+        yield slice(first, band_stop), slice(start, stop)
+        start = stop
+
+
+def _sample_outline_task(
+    gbuffer: GBuffer, look: Look, entries: np.ndarray, is_near: np.ndarray, cache: Cache | None
+) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Compute the coverage of samples by outlines.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        Its pixels have several samples.
+    look : Look
+        In its pixels.
+    entries : (n,) intp ndarray
+        The pixels whose samples are looked at.
+    is_near : (P,) bool ndarray
+        Pixels where lines may begin.
+    cache : Cache, optional
+
+    Returns
+    -------
+    home, shown : (Q,) int32 ndarray
+        Entries of the samples; see `project_samples_task`.
+    coverage : (Q,) float32 ndarray
+    """
     task = project_samples_task(gbuffer, entries, look.display, cache)
-    samples, home, shown = yield from subtask(task, 0.3, 0.6, STEP_LABEL)
+    samples, home, shown = yield from subtask(task, 0.0, 0.4)
     look = supersampled_look(replace(look, supersampling=gbuffer.samples.side))
-    edges = yield from subtask(_find_edges_task(samples, look, cache), 0.6, 0.8)
+    edges = yield from subtask(_find_edges_task(samples, look, cache), 0.4, 0.8)
     edges.line_width[~is_near[home]] = 0
-    sample_coverage = yield from subtask(_draw_edges_task(samples, look, edges), 0.8, 1.0)
-    sums = np.bincount(shown, sample_coverage, minlength=len(coverage))
-    np.divide(sums, np.bincount(shown), out=coverage, where=np.bincount(shown) > 0)
-    return coverage
+    coverage = yield from subtask(_draw_edges_task(samples, look, edges), 0.8, 1.0)
+    return home, shown, coverage
 
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:

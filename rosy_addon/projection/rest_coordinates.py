@@ -12,6 +12,7 @@ import numpy as np
 from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
 from ..progress import Progress, Task, run_to_completion
+from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
 
@@ -102,14 +103,20 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
         pixel_size=np.empty(count, dtype=np.float32),
     )
     done = 0
-    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
-        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
+    present = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
+    for instance_id in present:
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
-        for block in pixel_blocks(len(pixels)):
+        screen = _screen_vertices(gbuffer.camera, instance)
+        pixels = None
+        if len(present) > 1:
+            pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
+        instance_count = count if pixels is None else len(pixels)
+        for block in pixel_blocks(instance_count):
             yield Progress((done + block.start) / count, STEP_LABEL)
-            _fill_pixels(coordinates, gbuffer, instance, rest, pixels[block])
-        done += len(pixels)
+            part = block if pixels is None else pixels[block]
+            _fill_pixels(coordinates, gbuffer, instance, rest, screen, part)
+        done += instance_count
     return coordinates
 
 
@@ -134,37 +141,58 @@ def rest_positions(surface: Surface) -> np.ndarray:
     return rest - np.round(corners.mean(axis=0) / spacing) * spacing
 
 
+def _screen_vertices(camera: Camera, instance: MeshInstance) -> np.ndarray:
+    """Return the (3, V) float64 vertices of an instance: x and y in pixels times w, and w."""
+    clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+    points = np.ascontiguousarray(instance.surface.vertices.T)
+    x, y, _, w = transform_components(points, clip[:, :3], clip[:, 3])
+    return np.stack([(x + w) * (0.5 * camera.width), (y + w) * (0.5 * camera.height), w])
+
+
 def _fill_pixels(
     coordinates: RestCoordinates,
     gbuffer: GBuffer,
     instance: MeshInstance,
     rest: np.ndarray,
-    pixels: np.ndarray,
+    screen: np.ndarray,
+    pixels: slice | np.ndarray,
 ) -> None:
     """Compute the coordinates at some pixels of one mesh instance, in place.
 
-    (V, 3) `rest` are the `rest_positions` of its surface.
+    (V, 3) `rest` are the `rest_positions` of its surface, (3, V) `screen` its `_screen_vertices`.
     """
     camera, surface = gbuffer.camera, instance.surface
     vertices = surface.triangle_vertex.take(gbuffer.triangle[pixels], axis=0).T
-    clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    row, column = np.divmod(gbuffer.pixel[pixels], camera.width)
+    row, column = np.divmod(gbuffer.pixel[pixels], np.int32(camera.width))
+    row, column = row + 0.5, column + 0.5
     offsets = []
     for corner, out in zip(vertices, coordinates.rest_corners, strict=True):
-        point = surface.vertices.take(corner, axis=0).T
-        x, y, _, w = transform_components(point, clip[:, :3], clip[:, 3])
         # Homogeneous offset from the pixel center, in pixels times w.
-        x = (x + w) * (0.5 * camera.width) - (column + 0.5) * w
-        y = (y + w) * (0.5 * camera.height) - (row + 0.5) * w
+        x, y, w = (values.take(corner) for values in screen)
+        x -= column * w
+        y -= row * w
         offsets.append((x, y, w))
         out[:, pixels] = rest.take(corner, axis=0).T
+    # Homogeneous edge functions are linear on screen, so their derivatives are constant.
+    weights, weights_dx, weights_dy = [], [], []
     for edge in range(3):
         (bx, by, bw), (cx, cy, cw) = offsets[(edge + 1) % 3], offsets[(edge + 2) % 3]
-        # Homogeneous edge functions are linear on screen, so their derivatives are constant.
-        coordinates.weights[edge, pixels] = bx * cy - cx * by
-        coordinates.weights_dx[edge, pixels] = cw * by - bw * cy
-        coordinates.weights_dy[edge, pixels] = bw * cx - cw * bx
-    _normalize_weights(coordinates, pixels)
+        weights.append(bx * cy - cx * by)
+        weights_dx.append(cw * by - bw * cy)
+        weights_dy.append(bw * cx - cw * bx)
+    # Their sum is 1 at the pixel center, for single precision.
+    total = weights[0] + weights[1]
+    total += weights[2]
+    total[total == 0] = 1
+    np.divide(1, total, out=total)
+    for target, values in (
+        (coordinates.weights, weights),
+        (coordinates.weights_dx, weights_dx),
+        (coordinates.weights_dy, weights_dy),
+    ):
+        for edge, value in enumerate(values):
+            value *= total
+            target[edge, pixels] = value
     depth = -gbuffer.position[pixels, 2] if camera.is_perspective else 1.0
     coordinates.pixel_size[pixels] = depth / (
         camera.pixels_per_unit * matrix_scale(instance.matrix)
@@ -178,11 +206,3 @@ def matrix_scale(matrix: np.ndarray) -> float:
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     return float(np.cbrt(abs(np.cross(linear[0], linear[1]) @ linear[2]))) or 1.0
-
-
-def _normalize_weights(coordinates: RestCoordinates, pixels: np.ndarray) -> None:
-    """Scale the weights to a sum of 1 at the pixel center, in place, for single precision."""
-    total = coordinates.weights[:, pixels].sum(axis=0)
-    total[total == 0] = 1
-    for weights in (coordinates.weights, coordinates.weights_dx, coordinates.weights_dy):
-        weights[:, pixels] /= total

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shapes import icosphere, torus
 
+from rosy_addon.compositor import outline
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import antialiased_look, supersampled_look
@@ -84,8 +85,9 @@ def test_hatching_is_that_of_many_samples(preset):
     assert value.std() == pytest.approx(target.std(), rel=0.1)
 
 
-@pytest.mark.parametrize("width", [1.0, 2.6])
-def test_outlines_are_those_of_samples(width):
+@pytest.mark.parametrize(("width", "max_samples"), [(1.0, 1 << 20), (2.6, 1 << 11)])
+def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
+    monkeypatch.setattr(outline, "MAX_OUTLINE_SAMPLES", max_samples)
     instance, look = torus_instance(), Look(outline=width)
     pixels, samples = project([instance], CAMERA, samples=2), project([instance], CAMERA.scaled(2))
     coverage = outline_coverage(pixels, antialiased_look(look))

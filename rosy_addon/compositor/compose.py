@@ -99,13 +99,21 @@ def compose_task(
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
         yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
-        even_lines = None
+        even_lines = break_images = None
+        break_look = replace(pixel_look, length=break_steps(pixel_look))
         if has_even_lines(pixel_look):
             task = stages.even_lines_task(field, pixel_look)
             even_lines = yield from subtask(task, start, stop)
             images = yield from subtask(even_line_images_task(even_lines), stop, stop)
+            if has_breaks(look):
+                (break_images,) = yield from subtask(
+                    stages.lic_task(field, [break_look]), stop, stop
+                )
+        elif has_breaks(look):
+            task = stages.lic_task(field, [pixel_look, break_look])
+            images, break_images = yield from subtask(task, start, stop)
         else:
-            images = yield from subtask(stages.lic_task(field, pixel_look), start, stop)
+            (images,) = yield from subtask(stages.lic_task(field, [pixel_look]), start, stop)
         layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
         part_look = (
             with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
@@ -114,7 +122,9 @@ def compose_task(
         if is_hatched(look):
             tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
             modulation = yield from subtask(
-                _line_modulation_task(stages, field, pixel_look, tone, even_lines), stop, stop
+                _line_modulation_task(stages, field, pixel_look, tone, break_images, even_lines),
+                stop,
+                stop,
             )
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
@@ -208,6 +218,7 @@ def _line_modulation_task(
     field: PixelField,
     look: Look,
     tone: np.ndarray,
+    break_images: LicImages | None,
     even_lines: EvenLines | None,
 ) -> Task[LineModulation]:
     """Compute the parts of the `LineModulation` that a look uses."""
@@ -215,9 +226,7 @@ def _line_modulation_task(
     uses_streaks = even_lines is None or has_breaks(look) or has_paper_grain(look)
     if uses_streaks or undirected is not None:
         yield from look_streak_statistics_task(look)  # `line_coverage` finds them in their cache
-    break_images = paper_grain = line_tones = None
-    if has_breaks(look):
-        break_images = yield from stages.lic_task(field, replace(look, length=break_steps(look)))
+    paper_grain = line_tones = None
     if has_paper_grain(look):
         paper_grain = yield from _paper_grain_task(stages, field, look)
     if has_overshoot(look):

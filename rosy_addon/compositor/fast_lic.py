@@ -10,8 +10,9 @@ steps, whatever the length of the streamlines.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,22 +57,20 @@ SEED_SPACING_FACTOR = 1.1
 #: remaining lines.
 RESEED_FACTOR = 1.75
 
-#: Maximum fraction of the lines that remain without a streamline after the last round. They take
-#: the average of a neighbor.
-MAX_UNCOVERED_FRACTION = 0.15
+#: Maximum fraction of the lines that remain without a streamline after the last round, and that of
+#: antialiased pictures. They take the average of a neighbor.
+MAX_UNCOVERED_FRACTION, FINE_UNCOVERED_FRACTION = 0.15, 0.05
 
 #: Maximum number of rounds of seeding.
 MAX_ROUNDS = 8
 
-#: The same for antialiased pictures, and the factor of their contrast.
-FINE_UNCOVERED_FRACTION, FINE_CONTRAST_MATCH = 0.05, 0.98
-
 #: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
-#: Factor of the contrast. Directions are not interpolated here, so streaks are a little sharper
-#: than those of the method "brute"; this gives them the same standard deviation.
-CONTRAST_MATCH = 0.99
+#: Factor of the contrast, and that of antialiased pictures. Directions are not interpolated here, so
+#: streaks are a little sharper than those of the method "brute"; this gives them the same standard
+#: deviation.
+CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
 #: Maximum number of states in a strip of the picture. Bounds the memory.
 MAX_STATES_PER_STRIP = 1 << 23
@@ -91,13 +90,35 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     -------
     LicImages
     """
+    (images,) = yield from fast_lic_lengths_task(field, [look], noise)
+    return images
+
+
+def fast_lic_lengths_task(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray
+) -> Task[list[LicImages]]:
+    """Compute LIC images of several lengths, with the same streamlines.
+
+    Parameters
+    ----------
+    field, noise
+        As for `fast_lic_task`.
+    looks : sequence of Look
+        In pixels of the frame. They differ in the `length` of streamlines. The first is the longest.
+
+    Returns
+    -------
+    list of LicImages
+        Of each look.
+    """
     count, channels = noise.shape
+    look = looks[0]
     line = member_lines(field)
-    members = np.empty((len(line), count, channels), dtype=np.float32)
-    effective_samples = np.empty(count, dtype=np.float32)
-    slopes = np.empty(members.shape[:2], np.float32) if is_fine(look) and is_hatched(look) else None
-    step_limit = yield from subtask(step_limits_task(field, look), 0.0, 0.0)
-    overlap_sums = None
+    images = [_NewImages.empty(len(line), count, channels, look) for _ in looks]
+    step_limits = []
+    for each in looks:
+        step_limits.append((yield from subtask(step_limits_task(field, each), 0.0, 0.0)))
+    overlap_sums: list[np.ndarray | None] = [None] * len(looks)
     for extent, core, overlap_stop in _strips(field, look):
         start, stop = core.start / count, core.stop / count
         yield Progress(start, STEP_LABEL)
@@ -106,36 +127,56 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
         covering = yield from subtask(
             build_covering_task(strip_field, look, strip_noise), start, start
         )
-        cells = covering.cell_of_pixel[core.start - extent.start :]
-        core_cells, overlap_cells = np.split(
-            cells[: overlap_stop - core.start], [core.stop - core.start]
-        )
-        averages = _LineAverages(covering, cells[: overlap_stop - core.start])
+        cells = covering.cell_of_pixel[core.start - extent.start :][: overlap_stop - core.start]
+        core_cells, overlap_cells = np.split(cells, [core.stop - core.start])
         undefined = strip_field.representation == 0
-        averages.init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
-        yield Progress(start, STEP_LABEL)
-        coverage_task = _cover_all_lines_task(
-            covering, averages, look, _pixels_to_cells(step_limit, extent, covering)
-        )
+        averages = []
+        for _ in looks:
+            averages.append(_LineAverages(covering, cells))
+            averages[-1].init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
+            yield Progress(start, STEP_LABEL)
+        cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
+        coverage_task = _cover_all_lines_task(covering, averages, looks, cell_limits)
         yield from subtask(coverage_task, start, stop)
-        if is_fine(look):
-            smooth_task = averages.smooth_task(covering, cells[: overlap_stop - core.start])
-            yield from subtask(smooth_task, stop, stop)
-        core_sums = averages.gather(core_cells, line)
-        if slopes is not None:
-            slopes_task = averages.slopes_task(covering, core_cells, line)
-            slopes[:, core] = yield from subtask(slopes_task, stop, stop)
-        yield Progress(stop, STEP_LABEL)
-        _blend_strips(
-            core_sums, overlap_sums, strip_field.pixel[core.start - extent.start :] // field.width
-        )
-        for line_sums, member in zip(core_sums, members, strict=True):
+        row = strip_field.pixel[core.start - extent.start :] // field.width
+        for index, (each, out) in enumerate(zip(looks, images, strict=True)):
+            table = averages[index]
+            if is_fine(look):
+                yield from subtask(table.smooth_task(covering, cells), stop, stop)
+            core_sums = table.gather(core_cells, line)
+            if out.slopes is not None:
+                slopes_task = table.slopes_task(covering, core_cells, line)
+                out.slopes[:, core] = yield from subtask(slopes_task, stop, stop)
             yield Progress(stop, STEP_LABEL)
-            _write_averages(line_sums, look, member[core])
-        yield Progress(stop, STEP_LABEL)
-        effective_samples[core] = core_sums[:, :, -1].mean(axis=0)
-        overlap_sums = averages.gather(overlap_cells, line)
-    return (yield from subtask(lic_images_task(members, effective_samples, slopes), 1.0, 1.0))
+            _blend_strips(core_sums, overlap_sums[index], row)
+            for line_sums, member in zip(core_sums, out.members, strict=True):
+                yield Progress(stop, STEP_LABEL)
+                _write_averages(line_sums, each, member[core])
+            yield Progress(stop, STEP_LABEL)
+            out.effective_samples[core] = core_sums[:, :, -1].mean(axis=0)
+            overlap_sums[index] = table.gather(overlap_cells, line)
+    blended = []
+    for out in images:
+        blended.append((yield from subtask(lic_images_task(*out), 1.0, 1.0)))
+    return blended
+
+
+class _NewImages(NamedTuple):
+    """The parts of `LicImages` that are filled strip by strip."""
+
+    members: np.ndarray
+    effective_samples: np.ndarray
+    slopes: np.ndarray | None
+
+    @classmethod
+    def empty(cls, lines: int, count: int, channels: int, look: Look) -> _NewImages:
+        """Return uninitialized images of (lines, count, channels)."""
+        has_slopes = is_fine(look) and is_hatched(look)
+        return cls(
+            np.empty((lines, count, channels), dtype=np.float32),
+            np.empty(count, dtype=np.float32),
+            np.empty((lines, count), dtype=np.float32) if has_slopes else None,
+        )
 
 
 def _pixels_to_cells(
@@ -249,18 +290,12 @@ class _LineAverages:
         self._values[:, cell, :-1] = noise
         self._values[:, cell, -1] = 1
 
-    def write(self, steps: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-        """Write the averages that `StreamlineBatch.trace` yields.
+    def write(self, line: np.ndarray, values: np.ndarray) -> None:
+        """Write (n, K + 1) averages of lines, as `StreamlineBatch.trace` yields them."""
+        scatter_rows(self._flat, line, values)
 
-        If several streamlines pass a line, one that passes near the center of the cell wins.
-        """
-        centered_lines, centered_values = [], []
-        for line, values, centered in steps:
-            scatter_rows(self._flat, line, values)
-            centered_lines.append(line.take(centered))
-            centered_values.append(values.take(centered, axis=0))
-        scatter_rows(self._flat, np.concatenate(centered_lines), np.concatenate(centered_values))
-        # Streamlines that have ended stay in this cell.
+    def clear_sink(self) -> None:
+        """Remove the averages of streamlines that have ended, which stay in one cell."""
         self._values[:, SINK_CELL, -1] = -1
 
     def copy_from(self, line: np.ndarray, source: np.ndarray) -> np.ndarray:
@@ -333,25 +368,30 @@ class _LineAverages:
 
 
 def _cover_all_lines_task(
-    covering: Covering, averages: _LineAverages, look: Look, step_limit: np.ndarray | None
+    covering: Covering,
+    averages: Sequence[_LineAverages],
+    looks: Sequence[Look],
+    step_limits: Sequence[np.ndarray | None],
 ) -> Task[None]:
-    """Trace streamlines until every line has the average that it needs."""
+    """Trace streamlines until every line has the averages that it needs, one for each look."""
+    look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
-    missing = averages.missing_lines()
+    # All lines that have one of the averages have the others, too.
+    missing = averages[0].missing_lines()
     total = len(missing)
     fine = is_fine(look)
     max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
     spacing = max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
-    seeds = _grid_seeds(covering, averages, spacing)
+    seeds = _grid_seeds(covering, averages[0], spacing)
     batch_size = _batch_size(half_window + look.length)
-    batch = StreamlineBatch(covering, look, step_limit, half_window, batch_size, fine)
+    batch = StreamlineBatch(covering, looks, step_limits, half_window, batch_size, fine)
     for _ in range(MAX_ROUNDS):
         covered_steps = 0
         for batch_seeds in _batches(seeds, batch_size):
-            averages.write(batch.trace(batch_seeds))
+            _write_streamlines(averages, batch.trace(batch_seeds))
             covered_steps += batch.covered_steps
             yield Progress(1 - len(missing) / total, STEP_LABEL)
-        missing = averages.missing_lines()
+        missing = averages[0].missing_lines()
         if len(missing) <= max_uncovered * total:
             break
         # Streamlines that end early cover fewer lines, so the next round needs more seeds.
@@ -364,13 +404,35 @@ def _cover_all_lines_task(
     for forward, left in FILL_OFFSETS:
         yield Progress(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
-        missing = averages.copy_from(missing, source)
+        remaining = [table.copy_from(missing, source) for table in averages]
+        missing = remaining[0]
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
     batch_size = min(_batch_size(look.length), len(missing))
-    batch = StreamlineBatch(covering, look, step_limit, 0, batch_size, fine)
+    batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
-        averages.write(batch.trace(batch_seeds))
+        _write_streamlines(averages, batch.trace(batch_seeds))
         yield Progress(0.95, STEP_LABEL)
+
+
+def _write_streamlines(
+    averages: Sequence[_LineAverages],
+    steps: Iterable[tuple[np.ndarray, list[np.ndarray], np.ndarray]],
+) -> None:
+    """Write the averages that `StreamlineBatch.trace` yields.
+
+    If several streamlines pass a line, one that passes near the center of the cell wins.
+    """
+    centered_lines: list[np.ndarray] = []
+    centered_values: list[list[np.ndarray]] = [[] for _ in averages]
+    for line, values, centered in steps:
+        centered_lines.append(line.take(centered))
+        for table, rows, collected in zip(averages, values, centered_values, strict=True):
+            table.write(line, rows)
+            collected.append(rows.take(centered, axis=0))
+    line = np.concatenate(centered_lines)
+    for table, collected in zip(averages, centered_values, strict=True):
+        table.write(line, np.concatenate(collected))
+        table.clear_sink()
 
 
 def is_fine(look: Look) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from ..memory import raise_mmap_threshold
 from ..progress import Task, run_to_completion, subtask
 from .brute_force import brute_force_task
-from .fast_lic import fast_lic_task
+from .fast_lic import fast_lic_lengths_task, fast_lic_task
 from .image_noise import image_noise_task
 from .lic_images import LicImages
 from .look import Look
@@ -40,10 +40,24 @@ def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> 
     -------
     LicImages
     """
+    (images,) = yield from lic_lengths_task(field, [look], noise)
+    return images
+
+
+def lic_lengths_task(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray | None = None
+) -> Task[list[LicImages]]:
+    """Do the same as `lic_task` for looks that differ in the length of streamlines, longest first."""
     raise_mmap_threshold()
+    look = looks[0]
     if noise is None:
         noise = yield from subtask(look_noise_task(field, look), 0.0, 0.0)
-    return (yield from METHODS[look.method](field, look, noise))
+    if look.method == "sheets":
+        return (yield from fast_lic_lengths_task(field, looks, noise))
+    images = []
+    for each in looks:
+        images.append((yield from METHODS[look.method](field, each, noise)))
+    return images
 
 
 def look_noise(field: PixelField, look: Look) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..progress import Task, subtask
 from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
 from .even_lines import EvenLines, even_lines_task
-from .lic import lic_task, look_noise_task, noise_args
+from .lic import lic_lengths_task, look_noise_task, noise_args
 from .lic_images import LicImages
 from .look import Look, lic_key
 from .look_units import cell_size_args
@@ -58,14 +59,17 @@ class ComposeStages:
         angle = (yield from self._wobble_angle_task(look))[field.gbuffer_index]
         return (yield from rotate_pixel_field_task(field, np.float32(look.wobble) * angle))
 
-    def lic_task(self, field: PixelField, look: Look) -> Task[LicImages]:
-        """Compute the LIC images of the members of a field, or find them in the cache."""
+    def lic_task(self, field: PixelField, looks: Sequence[Look]) -> Task[list[LicImages]]:
+        """Compute the LIC images of a field, or find them in the cache.
 
-        def compute_task() -> Task[LicImages]:
-            noise = yield from subtask(self._noise_task(field, look), 0.0, NOISE_SHARE)
-            return (yield from subtask(lic_task(field, look, noise), NOISE_SHARE, 1.0))
+        The looks differ in the length of streamlines. The first is the longest.
+        """
 
-        key = "LIC images", self._gbuffer, field.degree, lic_key(look)
+        def compute_task() -> Task[list[LicImages]]:
+            noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
+            return (yield from subtask(lic_lengths_task(field, looks, noise), NOISE_SHARE, 1.0))
+
+        key = "LIC images", self._gbuffer, field.degree, *map(lic_key, looks)
         return (yield from self._cache.get_or_create_task(key, compute_task))
 
     def undirected_texture_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:

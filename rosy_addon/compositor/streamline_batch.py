@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -27,7 +27,7 @@ MAX_LATERAL_OFFSET = 0.25
 
 
 class StreamlineBatch:
-    """A batch of streamlines of equal length, traced together, with preallocated buffers.
+    """A batch of streamlines, traced together, with preallocated buffers.
 
     A *lane* of the buffers is one half of a streamline: n seeds have n forward lanes, followed by n
     backward lanes.
@@ -35,10 +35,12 @@ class StreamlineBatch:
     Parameters
     ----------
     covering : Covering
-    look : Look
-        In pixels of the frame. Its `length`, `taper` and `step` are used.
-    step_limit : (C,) intp ndarray or None
-        Steps in each direction that the average of a cell covers. None for `look.length`.
+    looks : sequence of Look
+        In pixels of the frame. Their `length`, `taper` and `step` are used. Averages are taken over
+        each of the lengths; all else is the same.
+    step_limits : sequence of (C,) intp ndarray or None
+        Steps in each direction that the average of a cell covers, for each look. None for its
+        `length`.
     half_window : int
         Steps in each direction whose states take their average from the streamline. Further steps
         only contribute noise to these averages.
@@ -52,15 +54,16 @@ class StreamlineBatch:
     def __init__(
         self,
         covering: Covering,
-        look: Look,
-        step_limit: np.ndarray | None,
+        looks: Sequence[Look],
+        step_limits: Sequence[np.ndarray | None],
         half_window: int,
         max_streamlines: int,
         interpolates: bool = False,
     ) -> None:
         self._covering = covering
-        self._half_window, self._max_steps = half_window, half_window + look.length
-        self._length, self._tapered = look.length, look.taper
+        look = looks[0]
+        self._lengths, self._tapered = [look.length for look in looks], look.taper
+        self._half_window, self._max_steps = half_window, half_window + max(self._lengths)
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
@@ -68,7 +71,9 @@ class StreamlineBatch:
         # The same, in the unit of the noise of states.
         self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
         self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step_scale)
-        self._step_limit = None if step_limit is None else np.tile(step_limit, covering.line_count)
+        self._step_limits = [
+            None if limit is None else np.tile(limit, covering.line_count) for limit in step_limits
+        ]
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
         self._totals = np.empty((lanes, channels), dtype=np.complex64)
@@ -77,7 +82,7 @@ class StreamlineBatch:
         #: Steps of the last traced streamlines before their end, within the half window.
         self.covered_steps = 0
 
-    def trace(self, seeds: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def trace(self, seeds: np.ndarray) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
         """Trace streamlines and yield, step by step, the averages of the lines that they pass.
 
         Parameters
@@ -89,9 +94,9 @@ class StreamlineBatch:
         ------
         line : (2 n,) int32 ndarray
             Indices of lines, of the cell `SINK_CELL` where streamlines have ended.
-        values : (2 n, K + 1) float32 ndarray
-            The average of each noise channel times the effective samples, then the effective
-            samples. Overwritten by the next step.
+        values : list of (2 n, K + 1) float32 ndarray
+            For each look, the average of each noise channel times the effective samples, then the
+            effective samples. Overwritten by the next step.
         centered : (m,) intp ndarray
             Indices of the streamlines that pass close to the center of the pixel.
         """
@@ -100,28 +105,32 @@ class StreamlineBatch:
         lanes, channels = 2 * len(seeds), self._covering.noise_channels
         step_counts = step_counts.astype(np.float32)
         opposite_counts = np.roll(step_counts, lanes // 2)
-        values = np.empty((lanes, channels + 1), dtype=np.float32)
+        values = [np.empty((lanes, channels + 1), dtype=np.float32) for _ in self._lengths]
         for step in range(min(last_step, self._half_window) + 1):
             line = self._covering.fold_to_line(self._states[step, :lanes])
-            length = self._length if self._step_limit is None else self._step_limit.take(line)
-            forward = np.clip(step_counts - np.float32(step), 0, length)
-            backward = np.minimum(opposite_counts + np.float32(step), length)
-            weights = kernel_weights(forward, backward, length, self._tapered)
-            if self._tapered:
-                noise_sum = self._tapered_sums(step, length, lanes)
-                noise_sum *= (weights.effective_samples / weights.total)[:, None]
-            else:
-                last = np.minimum(step + length, last_step)
-                first = np.maximum(step - length, -last_step)
-                noise_sum = self._prefix_sums_through(last, lanes) - self._prefix_sums_before(
-                    first, lanes
-                )
             # A streamline passes the center of a pixel at up to half a pixel. The sum is corrected
             # to the center by its derivative across the streamline.
             lateral = self._lateral_offset[step, :lanes]
-            np.multiply(noise_sum.real, self._noise_scale, out=values[:, :-1])
-            values[:, :-1] -= (lateral * self._lateral_gain)[:, None] * noise_sum.imag
-            values[:, -1] = weights.effective_samples
+            correction = (lateral * self._lateral_gain)[:, None]
+            forward, backward = step_counts - np.float32(step), opposite_counts + np.float32(step)
+            for full_length, limit, out in zip(
+                self._lengths, self._step_limits, values, strict=True
+            ):
+                length = full_length if limit is None else limit.take(line)
+                weights = kernel_weights(
+                    np.clip(forward, 0, length), np.minimum(backward, length), length, self._tapered
+                )
+                if self._tapered:
+                    noise_sum = self._tapered_sums(step, length, lanes)
+                    noise_sum *= (weights.effective_samples / weights.total)[:, None]
+                else:
+                    last = np.minimum(step + length, last_step)
+                    first = np.maximum(step - length, -last_step)
+                    noise_sum = self._prefix_sums_through(last, lanes)
+                    noise_sum = noise_sum - self._prefix_sums_before(first, lanes)
+                np.multiply(noise_sum.real, self._noise_scale, out=out[:, :-1])
+                out[:, :-1] -= correction * noise_sum.imag
+                out[:, -1] = weights.effective_samples
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
     def _trace_steps(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import json
 import multiprocessing
 import shlex
 import shutil
@@ -48,13 +50,18 @@ def main() -> int:
     parser.add_argument(
         "--keep", type=Path, default=Path("dist/fuzz"), help="folder for the cases with faults"
     )
+    parser.add_argument(
+        "--log",
+        type=Path,
+        help="file that gets the outcome of every case; cases that it has do not run again",
+    )
     parser.add_argument("--verbose", action="store_true", help="print the outcome of every case")
     options = parser.parse_args()
     if options.cases is None and options.seconds is None:
         parser.error("give --cases, --seconds, or both")
     counts: Counter[tuple[str, Verdict]] = Counter()
     slowest, largest, start = None, None, time.monotonic()
-    for outcome in _outcomes(options, start):
+    for outcome in _logged_outcomes(options, start):
         counts[outcome.category, outcome.verdict] += 1
         slowest = max(slowest or outcome, outcome, key=lambda o: o.seconds)
         largest = max(largest or outcome, outcome, key=lambda o: o.peak_bytes)
@@ -75,8 +82,31 @@ def main() -> int:
     return int(faults > 0)
 
 
-def _outcomes(options: argparse.Namespace, start: float) -> Iterator[Outcome]:
-    """Yield the outcomes of the cases, which run in several processes."""
+def _logged_outcomes(options: argparse.Namespace, start: float) -> Iterator[Outcome]:
+    """Yield the outcomes of the cases, from the log where it has them, and append the others."""
+    past: dict[tuple[str, int], Outcome] = {}
+    if options.log is None:
+        yield from _outcomes(options, start, past)
+        return
+    text = options.log.read_text() if options.log.exists() else ""
+    for line in text.splitlines():
+        # A line may be cut, where a run was stopped.
+        with contextlib.suppress(ValueError):
+            category, seed, verdict, *others = json.loads(line)
+            past[category, seed] = Outcome(category, seed, Verdict(verdict), *others)
+    with options.log.open("a") as log:
+        print(file=log, end="" if text.endswith("\n") else "\n")
+        for outcome in _outcomes(options, start, past):
+            if (outcome.category, outcome.seed) not in past:
+                row = outcome._replace(verdict=outcome.verdict.value)
+                print(json.dumps(row), file=log, flush=True)
+            yield outcome
+
+
+def _outcomes(
+    options: argparse.Namespace, start: float, past: dict[tuple[str, int], Outcome]
+) -> Iterator[Outcome]:
+    """Yield the outcomes of the cases, which run in several processes where not in ``past``."""
     categories = options.category or list(CATEGORIES)
 
     def numbered() -> Iterator[tuple[str, int, Path]]:
@@ -93,12 +123,16 @@ def _outcomes(options: argparse.Namespace, start: float) -> Iterator[Outcome]:
             done[name] += 1
 
     if options.jobs == 1:
-        yield from map(_run_case, numbered())
+        for case in numbered():
+            yield past.get(case[:2]) or _run_case(case)
         return
     # The processes are new, not forked, so that each case forks from the same state.
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
         pending = set()
         for case in numbered():
+            if case[:2] in past:
+                yield past[case[:2]]
+                continue
             pending.add(pool.submit(_run_case, case))
             if len(pending) >= 4 * options.jobs:
                 done, pending = wait(pending, return_when=FIRST_COMPLETED)

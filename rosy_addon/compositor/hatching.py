@@ -291,7 +291,11 @@ def _above_threshold(
     half_width = np.float32(softness(look.crispness))
     if slope is not None:
         slope = np.float32(PIXEL_SOFTNESS) * slope
-        half_width = np.sqrt(half_width * half_width + slope * slope)
+        slope *= slope
+        # The wider edges add slope**2 / 5 to the variance of the streaks, which is 1. The
+        # threshold moves by as much, so that the mean coverage stays.
+        threshold = threshold * np.sqrt(1 + slope / 5)
+        half_width = np.sqrt(half_width * half_width + slope)
     return smoothstep((streak - threshold) / (2 * half_width) + 0.5)
 
 

@@ -94,6 +94,7 @@ def test_unknown_memory_is_none(monkeypatch, tmp_path):
     assert memory.available_memory() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit holds on Linux")
 def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
     """Before memory is taken: in less time than the picture takes, and no file is written."""
@@ -203,6 +204,7 @@ def test_pictures_are_refused_before_they_are_drawn(monkeypatch, error_of):
     )
 
 
+@pytest.mark.slow
 def test_the_cache_gives_its_memory_back(monkeypatch):
     """It is emptied only if there is not enough without."""
     view, cache = ball_view(), Cache()

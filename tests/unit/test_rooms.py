@@ -170,6 +170,7 @@ def import_cycle(folder: Path) -> list[str]:
     return []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["rosy_addon", "operators"])
 def test_there_are_no_import_cycles(folder):
     """Neither between rooms nor inside a room, nor by an import in a function."""
@@ -195,6 +196,7 @@ def test_import_cycle_finds_cycles(tmp_path, back):
     assert {"first.py", "second.py"} <= set(import_cycle(tmp_path))
 
 
+@pytest.mark.slow
 def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)

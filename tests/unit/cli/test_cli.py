@@ -124,6 +124,7 @@ def test_y_is_up_in_off_files_by_default(tmp_path):
     assert covered["y"].any(axis=1).mean() > 0.8 and not covered["y"][32, 32]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["vase-7", "cheburashka", *long("vase-2", "vase-4", "dome-6")])
 def test_render_fields_of_others(name, shared_data, tmp_path):
     mesh = shared_data / "meshes" / f"{name.partition('-')[0]}.off"
@@ -134,6 +135,7 @@ def test_render_fields_of_others(name, shared_data, tmp_path):
     assert ink[ink[..., 3] == 255][:, :3].std() > 15
 
 
+@pytest.mark.slow
 def test_fields_that_are_no_rosy_are_drawn_but_not_written_as_one(shared_data, tmp_path):
     mesh = shared_data / "meshes" / "cheburashka.off"
     field = shared_data / "fields" / "cheburashka-cf.rawfield"
@@ -162,6 +164,7 @@ def test_field_makes_converts_and_info_reads(sphere, tmp_path):
     assert "degree 6" in words.stdout and "1,280 faces" in words.stdout
 
 
+@pytest.mark.slow
 def test_the_torus_has_no_singularities_in_sum(ring):
     facts = json.loads(rosy("info", ring, "--degree", 4, "--generate", "axis", "--json").stdout)
     assert facts["euler_characteristic"] == 0
@@ -249,6 +252,7 @@ def test_bad_input_is_one_line_and_status_2(case, sphere, tmp_path, capsys, monk
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
     done = rosy("render", sphere, "-o", tmp_path / "a.png", "--degree", 0)
     assert_refused(done, "degree 0 is not a whole number from 1 to 12")
@@ -256,12 +260,14 @@ def test_bad_input_in_a_process_of_its_own(sphere, tmp_path):
     assert_refused(rosy("info", sphere, tmp_path / "a.rosy"), "a.rosy: declares 2 rows")
 
 
+@pytest.mark.slow
 def test_conflicting_degrees(sphere, tmp_path):
     assert main(["field", str(sphere), "-o", str(tmp_path / "a.rosy"), "--degree", "6"]) == 0
     done = rosy("info", sphere, tmp_path / "a.rosy", "--degree", 4)
     assert_refused(done, "a.rosy: the field has degree 6, but degree 4 was requested")
 
 
+@pytest.mark.slow
 def test_undefined_vectors_on_request(sphere, tmp_path):
     path = tmp_path / "a.rosy"
     assert main(["field", str(sphere), "-o", str(path)]) == 0
@@ -275,6 +281,7 @@ def test_undefined_vectors_on_request(sphere, tmp_path):
         assert rosy("info", sphere, option, path, "--undefined").returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [
@@ -366,6 +373,7 @@ def facts_of(*arguments) -> dict:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_field_converts(sphere, tmp_path):
     made = tmp_path / "a.rosy"
     assert rosy("field", sphere, "-o", made, "--generate", "smoothest").returncode == 0
@@ -394,6 +402,7 @@ def test_info_compares(sphere, tmp_path):
     assert "off by 5 degrees on average" in done.stdout
 
 
+@pytest.mark.slow
 def test_strokes_and_guides(sphere, tmp_path):
     angle = np.linspace(0, 1.0, 30)
     arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
@@ -484,6 +493,7 @@ def test_tones_of_vertices(painted, tmp_path):
     assert done == 0
 
 
+@pytest.mark.slow
 def test_tones_of_pictures_and_images(sphere, tmp_path):
     picture = np.ones((64, 64, 4), dtype=np.float32)
     picture[:, :32, :3], picture[:, 32:, :3] = 0.2, 0.85
@@ -542,6 +552,7 @@ def write_cube(path):
     return path
 
 
+@pytest.mark.slow
 def test_unused_vertices_change_nothing(tmp_path):
     """Neither the frame nor what is relative to the size of the mesh."""
     (tmp_path / "stray").mkdir()

@@ -51,6 +51,7 @@ def luminance(rgba, where):
     return rgba[..., :3].mean(axis=-1)[where]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOKS)
 @pytest.mark.parametrize("degree", [3, 4])
 def test_streaks_are_those_of_many_samples(name, degree):
@@ -67,6 +68,7 @@ def test_streaks_are_those_of_many_samples(name, degree):
     np.testing.assert_allclose(actual[..., 3], sampled(instance, look, 2)[..., 3], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["cross-hatch", "pencil", "woodcut"])
 def test_hatching_is_that_of_many_samples(preset):
     """Nearer to it than without samples, of the same tone and contrast.
@@ -102,6 +104,7 @@ def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
     assert np.abs(actual - expected).sum() < 0.01 * expected.sum()
 
 
+@pytest.mark.slow
 def test_even_lines_are_those_of_many_samples():
     look = replace(load_preset("engraving").look, supersampling=2)
     instance = torus_instance()
@@ -110,6 +113,7 @@ def test_even_lines_are_those_of_many_samples():
     assert np.corrcoef(luminance(actual, inside), luminance(expected, inside))[0, 1] > 0.99
 
 
+@pytest.mark.slow
 def test_light_changes_within_a_pixel_at_a_crease():
     """Where two faces meet, a pixel has a color between those of the faces, as with many samples."""
     surface = icosphere(0)

@@ -74,6 +74,7 @@ def lines_at_pixels(instance, camera, look=LOOK, cache=None):
 # --- lines in pictures -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grain", [2.0, 3.5, 8.0])
 @pytest.mark.parametrize("supersampling", [1, 2])
 def test_the_distance_between_lines_is_twice_the_line_width(grain, supersampling):
@@ -107,6 +108,7 @@ def test_spacings_in_pixels_come_in_steps():
     assert len(spacings) == 9
 
 
+@pytest.mark.slow
 def test_lines_at_a_larger_distance_replace_crowded_ones():
     """On a wall that is seen at a small angle, all lines along the horizon would run together."""
     cosine = 0.2
@@ -152,6 +154,7 @@ def test_undefined_pixels_have_the_mean_tone():
     np.testing.assert_allclose(lines.coverage(0, width, LOOK)[undefined], 0.3, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect", ["plain", *long("paper_grain", "overshoot"), "breaks", *long("wobble")]
 )
@@ -246,6 +249,7 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
     assert (np.diff(table) > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shading", [0.1, 0.3, 0.5, 0.8, 0.95])
 @pytest.mark.parametrize("degree", [4, 6])
 def test_flat_tones(shading, degree):
@@ -262,6 +266,7 @@ def test_flat_tones(shading, degree):
 # --- perspective -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_lines_grow_between_lines_that_are_too_far_apart():
     """A floor that runs from near the eye to far away."""
     surface = plane(2, 2, 40.0)

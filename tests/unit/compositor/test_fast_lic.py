@@ -71,6 +71,7 @@ def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(tape
     np.testing.assert_allclose(contrast, expected.members - 0.5, atol=5e-4)
 
 
+@pytest.mark.slow
 @given(
     degree=st.integers(1, 12),
     first_angle=st.floats(-np.pi, np.pi),
@@ -153,6 +154,7 @@ def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
     assert actual.std() == pytest.approx(expected.std(), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_the_surroundings_of_singularities_are_not_grainy(degree):
     # Grain is the change from pixel to pixel. Breaking points would increase it as well.
@@ -169,6 +171,7 @@ def test_the_surroundings_of_singularities_are_not_grainy(degree):
     assert grain(fast_images(field)) < 1.15 * grain(brute_force_images(field))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taper", [False, True])
 def test_streamlines_end_where_brute_force_ends_them(taper):
     look = replace(LOOK, taper=taper)
@@ -197,6 +200,7 @@ def test_magnitude_determines_the_samples_of_a_pixel(taper):
     np.testing.assert_allclose(samples, expected, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_three_channels_are_three_pictures():
     field = singular_field(3)
     noise = make_noise(field, channels=3)

@@ -107,6 +107,7 @@ def hills() -> Surface:
     return build_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads.ravel(), start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["torus", "noisy torus", "tube", "boxes", "hills"])
 def test_silhouettes_are_covered(name):
     """At least 0.995 of the silhouettes that a search over all edges finds."""
@@ -166,6 +167,7 @@ def test_all_edges_of_a_cube_are_drawn(sharp, side):
         assert line_is_covered(coverage, camera, corner, end)
 
 
+@pytest.mark.slow
 def test_creases_of_dense_meshes_have_no_gaps():
     """A ridge whose triangles are smaller than a pixel."""
     axis = np.linspace(-1, 1, 301)

@@ -46,6 +46,7 @@ def steps_by_label(look: Look, side: int) -> Counter[str]:
     return Counter(progress.label for progress in CpuRenderer().render_task(view))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("look", "more"),
     [

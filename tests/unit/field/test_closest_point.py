@@ -18,6 +18,7 @@ def distances_to_all_triangles(surface, points):
     return point_triangle_distances(*pairs).reshape(len(points), -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("surface", [icosphere(3), torus(24, 12)], ids=["sphere", "torus"])
 @pytest.mark.parametrize("far", [0.02, 0.5, 8.0])
 def test_the_result_matches_an_exhaustive_search(surface, far):
@@ -30,6 +31,7 @@ def test_the_result_matches_an_exhaustive_search(surface, far):
     )
 
 
+@pytest.mark.slow
 def test_a_maximum_distance_changes_only_the_points_beyond_it():
     ball = icosphere(3)
     points = np.random.default_rng(1).standard_normal((400, 3))

@@ -76,6 +76,7 @@ def test_harmonics_do_not_depend_on_the_first_direction(degree, seed, shift):
         assert np.allclose(a, b, atol=2e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.integers(1, 7), st.integers(0, 10**6))
 def test_directions_are_restored_from_the_field(degree, seed):
@@ -181,6 +182,7 @@ def project_from_above(surface, field, size, display="smooth"):
     return project([MeshInstance(surface, np.eye(4), field)], camera, display)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", list(METHODS))
 @pytest.mark.parametrize(
     "angles",

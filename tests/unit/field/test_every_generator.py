@@ -29,6 +29,7 @@ def meshes(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 3, 4, 12])
 @pytest.mark.parametrize("name", AWKWARD)
 @pytest.mark.parametrize("kind", GENERATORS)

@@ -74,6 +74,7 @@ def test_free_directions_round_trip_exactly(ending, degree, tmp_path):
     assert np.array_equal(again.direction_ratios, field.direction_ratios)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka-cf"])
 @pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
 def test_files_of_other_programs_round_trip_exactly(name, ending, shared_data, tmp_path):
@@ -193,6 +194,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     assert expected in message and str(tmp_path / name) in message and "\n" not in message
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([".obj", ".txt", ".npy"]))
 def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):

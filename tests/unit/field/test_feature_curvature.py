@@ -45,6 +45,7 @@ def test_sharp_edges_have_none(make):
     assert feature_curvature(surface).max() <= 1.05 * round_curvature
 
 
+@pytest.mark.slow
 def test_noise_is_no_feature():
     """The curvature of a noisy sphere is about that of the sphere, or less."""
     for share in (0.0005, 0.002):

@@ -74,6 +74,7 @@ def test_rows_for_vertices_are_averaged_onto_faces(tmp_path):
 component = st.just(0.0) | st.floats(1e-29, 1e29) | st.floats(-1e29, -1e-29)
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.integers(1, 12),
@@ -209,6 +210,7 @@ def test_missing_file_and_conflicting_degree(tmp_path, error_of):
     assert "the field has degree 4, but degree 6 was requested" in message
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, offset, ending):
     path = tmp_path_factory.getbasetemp() / f"damaged{ending}"

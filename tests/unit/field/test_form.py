@@ -69,6 +69,7 @@ def salient(surface: Surface) -> np.ndarray:
     return run_to_completion(salient_edges_task(surface, edges, *filtered))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "bound"), [(0.0, 0.5), (0.0005, 2.0), (0.002, 4.0)])
 @pytest.mark.parametrize("form", ["torus", "ellipsoid"])
 def test_principal_directions_with_noise(form, share, bound):
@@ -99,6 +100,7 @@ def test_noise_is_measured():
         assert np.sqrt(dot(sample, sample).mean()) == pytest.approx(expected, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_ball_has_no_clear_direction():
     ball = icosphere(4)
     np.testing.assert_array_equal(
@@ -153,6 +155,7 @@ def test_rotated_and_scaled_meshes_have_the_same_field():
     assert np.median(errors) < 0.5
 
 
+@pytest.mark.slow
 def test_disconnected_parts_and_stray_faces():
     ring, ball = torus(48, 24), icosphere(3)
     offset = len(ring.vertices)

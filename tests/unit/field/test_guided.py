@@ -70,6 +70,7 @@ def test_soft_guides_match_a_direct_solver(degree):
     assert np.abs(angle).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_a_field_follows_strokes_within_two_degrees():
     surface = icosphere(5)
     center = normalize(surface.face_center)

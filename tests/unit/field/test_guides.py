@@ -42,6 +42,7 @@ def stroke_error(surface, field, stroke):
     return abs(np.degrees(np.angle((z * target.conj()).sum())) / field.degree)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
 def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
@@ -83,6 +84,7 @@ def test_jitter_of_strokes_is_smoothed():
     assert both.sum() > 5 and np.median(off) < 8
 
 
+@pytest.mark.slow
 def test_components_without_a_guide_get_the_smoothest_field():
     points = np.concatenate([BALL.vertices, BALL.vertices + 5])
     triangles = np.concatenate([BALL.triangle_vertex, BALL.triangle_vertex + len(BALL.vertices)])

@@ -263,6 +263,7 @@ def test_missing_files_and_folders(tmp_path, error_of):
     assert "is a directory" in error_of(read_mesh, tmp_path / "folder.obj")
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
     from rosy_addon.errors import RosyError
@@ -276,6 +277,7 @@ def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, 
         assert "\n" not in str(error) and str(path) in str(error)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-1e12, 1e12), min_size=9, max_size=9))
 def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     assume(not 0 < np.ptp(np.reshape(numbers, (3, 3)), axis=0).max() < MIN_EXTENT)

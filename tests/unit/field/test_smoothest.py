@@ -75,6 +75,7 @@ def test_the_adjoint():
     np.testing.assert_allclose(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [4, *long(1, 6)])
 def test_multigrid_cycles_converge(degree):
     connection = build_connection(bumpy(icosphere(5)))
@@ -91,6 +92,7 @@ def test_multigrid_cycles_converge(degree):
     assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()
 
 
+@pytest.mark.slow
 def test_multigrid_cycles_ignore_rows_of_rounding():
     """The row of a component of tiny area can be all rounding, with 0 on the diagonal."""
     matrix = laplacian(build_connection(bumpy(icosphere(4))), 4, 0.1)
@@ -249,6 +251,7 @@ def test_the_field_matches_another_library(degree):
     assert np.degrees(np.abs(np.angle(z_ratio[clear]))).max() / degree < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", range(1, 13))
 def test_indices_sum_to_the_euler_characteristic(degree):
     for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
@@ -263,6 +266,7 @@ def test_a_sphere_has_the_fewest_possible_singularities(degree):
     assert len(index) == 2 * degree
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 4, 5])
 def test_the_field_does_not_depend_on_numbering_or_position(degree):
     surface = bumpy(icosphere(3))
@@ -299,6 +303,7 @@ def test_each_component_has_its_own_field():
     np.testing.assert_allclose(energy, [separately[0], separately[1] / 0.09], rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 3, 4, 12])
 @pytest.mark.parametrize("name", AWKWARD)
 def test_meshes_that_are_not_closed_smooth_manifolds(name, degree):

@@ -89,6 +89,7 @@ MINE = Preset("My Ink", "Long lines", Look(ink="hatch", length=90, ink_colour="#
 # --- files -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=NAMES, description=LINES.map(lambda line: line[:MAX_DESCRIPTION_LENGTH]), look=LOOKS)
 def test_a_preset_is_read_as_it_was_written(tmp_path, name, description, look):

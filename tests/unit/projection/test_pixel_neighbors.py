@@ -85,6 +85,7 @@ def test_spheres_are_continuous(perspective, radius):
     assert unlinked_fraction(gbuffer, 1.3, False) < 0.002
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("perspective", "height"), [(False, 1.0), (True, 0.4)])
 def test_an_uneven_surface_is_continuous(perspective, height):
     """Waves of up to 80 degrees, seen from above: inflections do not count as silhouettes.

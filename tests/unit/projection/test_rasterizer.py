@@ -69,6 +69,7 @@ def cast_rays(points, triangles, camera):
     return owner, weights, depth, doubtful
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(seeds, st.booleans())
 def test_visible_triangles_match_a_ray_caster(seed, perspective):
@@ -138,6 +139,7 @@ def test_each_pixel_belongs_to_exactly_one_triangle(seed, cells, snap):
     assert (count == expected).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(seeds)
 def test_no_cracks_where_the_near_plane_cuts(seed):
@@ -252,6 +254,7 @@ def test_vertices_far_outside_the_frame():
     assert (fragments.pixel % WIDTH >= 18).all()
 
 
+@pytest.mark.slow
 def test_two_million_tiny_triangles_leave_no_hole():
     side = np.linspace(-1, 1, 1001)
     x, y = (values.ravel() for values in np.meshgrid(side, side))

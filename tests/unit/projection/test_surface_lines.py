@@ -67,6 +67,7 @@ def test_lines_on_a_plane_are_straight_and_exactly_spaced(degree, display):
         assert min(errors) < 1e-3 / spacing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rounds", [7, 7.4, 30.5])
 def test_lines_along_a_cylinder(rounds):
     """Lines parallel to the axis can only be evenly spaced if a whole number of them fits around."""
@@ -80,6 +81,7 @@ def test_lines_along_a_cylinder(rounds):
     np.testing.assert_allclose(ratio, ratio.mean(), atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [2, 4])
 def test_rings_on_a_torus(degree):
     surface = torus()
@@ -88,6 +90,7 @@ def test_rings_on_a_torus(degree):
     assert share_within(lines, 0.06, TOLERANCE, AWAY) >= SHARE
 
 
+@pytest.mark.slow
 def test_distances_are_measured_after_the_stretch():
     surface = plane()
     stretch = np.diag([1.0, 3.0, 1.0])
@@ -99,6 +102,7 @@ def test_distances_are_measured_after_the_stretch():
 # --- curved surfaces -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
 def test_distances_on_a_sphere(degree):
     """There are singularities, and lines end because they converge."""
@@ -140,6 +144,7 @@ def test_phases_are_continuous_where_lines_end():
     assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) > 1e-3) < 0.005
 
 
+@pytest.mark.slow
 def test_lines_continue_over_a_coarse_cube():
     """Eight vertices. Form follows the edges, and lines of faces meet there."""
     points, faces = AWKWARD["cube"]()
@@ -150,6 +155,7 @@ def test_lines_continue_over_a_coarse_cube():
     assert not lines.pattern.index.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_the_size_of_a_mesh_does_not_matter(factor):
     surface = torus()
@@ -158,6 +164,7 @@ def test_the_size_of_a_mesh_does_not_matter(factor):
     assert share_within(lines, 0.06 * factor, TOLERANCE, AWAY) >= SHARE
 
 
+@pytest.mark.slow
 def test_directions_that_are_not_evenly_distributed():
     """The lines of two directions at 60 degrees have the distance that was asked for."""
     surface = plane()
@@ -175,6 +182,7 @@ def test_directions_that_are_not_evenly_distributed():
 # --- awkward meshes ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", AWKWARD)
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, *long(5, 6)])
 def test_awkward_meshes(name, degree):
@@ -189,6 +197,7 @@ def test_awkward_meshes(name, degree):
     assert lines.pattern.index.tobytes() == again.pattern.index.tobytes()
 
 
+@pytest.mark.slow
 def test_two_triangles():
     surface = from_triangles([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)])
     lines = lines_of(surface, axis_field(surface, 2, (1, 0.3, 0)), 0.05)
@@ -196,6 +205,7 @@ def test_two_triangles():
     np.testing.assert_allclose(ratio, 1, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_hole_unused_vertices_and_two_parts():
     """A plane without one face, and another that is not connected to it."""
     surface = plane(8, 8)
@@ -242,6 +252,7 @@ def test_too_little_memory_is_an_error(monkeypatch, error_of):
 # --- reuse ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_deformations_and_rotations_keep_the_lines():
     surface = icosphere(2)
     field = axis_field(surface, 4)
@@ -275,6 +286,7 @@ def test_rest_matrices_measure_lengths():
     np.testing.assert_allclose(rest_matrix(matrix), 2 * np.eye(3), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", [3, 4])
 def test_steps_are_short(degree):
     """No step does more than a small part of the work."""

@@ -29,6 +29,7 @@ def sharp_cube():
     return MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0.2, 1.0, 0.1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tone", [False, True])
 def test_spacing_and_width_are_even_up_to_creases(tone):
     """A flat face under a sun has one tone and, without perspective, one spacing."""
@@ -45,6 +46,7 @@ def test_spacing_and_width_are_even_up_to_creases(tone):
     assert len(spacings) == 3
 
 
+@pytest.mark.slow
 def test_strokes_reach_creases_at_full_width():
     """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
     strokes = draw_instances([sharp_cube()], CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
@@ -55,6 +57,7 @@ def test_strokes_reach_creases_at_full_width():
     assert strokes.width[ends][~at_crease].min() < 0.5
 
 
+@pytest.mark.slow
 def test_strokes_do_not_crowd_at_silhouettes():
     """Lines along a tube keep a distance in the picture, also where the tube turns away."""
     tube = cylinder(128, 8)
@@ -71,6 +74,7 @@ def test_strokes_do_not_crowd_at_silhouettes():
     assert x[0] < 42 and x[-1] > 358
 
 
+@pytest.mark.slow
 def test_strokes_are_smooth_across_the_edges_of_faces():
     """The coarse torus bends by 30 degrees at its edges; lines cross them without such corners."""
     surface = torus(24, 12, 1.0, 0.4)

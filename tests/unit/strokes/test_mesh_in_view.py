@@ -107,6 +107,7 @@ def test_a_mesh_in_the_frame_is_not_changed():
     assert run_to_completion(mesh_in_view_task(mesh, camera)).mesh is mesh
 
 
+@pytest.mark.slow
 def test_ground_up_to_the_horizon():
     """Strokes keep their distance in the picture on a ground of any number of faces, and end."""
     spacing, counts = 9.0, []

@@ -75,6 +75,7 @@ def closed_cylinder(columns):
     return build_surface(tube.vertices, corners, start, name="cylinder", sharp_angle=np.pi / 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", [(-26, 8), (40, 30), (100, -15)])
 @pytest.mark.parametrize(
     ("coarse", "dense"),
@@ -94,6 +95,7 @@ def test_silhouettes_of_coarse_meshes_are_those_of_the_smooth_surface(coarse, de
     assert coverage(lines, dense, camera, tolerance=2.5) >= 0.98
 
 
+@pytest.mark.slow
 def test_silhouettes_of_flat_faces_are_edges():
     smooth = icosphere(3)
     flat = build_surface(
@@ -109,6 +111,7 @@ def test_silhouettes_of_flat_faces_are_edges():
     assert coverage(lines, flat, camera, tolerance=1.0) >= 0.98
 
 
+@pytest.mark.slow
 def test_a_silhouette_on_the_far_side_is_hidden():
     """Inside the hole of a torus, only one of two silhouettes is visible where they run in parallel."""
     surface = torus(96, 48, 1, 0.4)

@@ -73,6 +73,7 @@ def test_extensions_at_borders_are_straight_and_of_different_lengths():
     assert (np.diff(extended.points[:, 0])[np.diff(extended.stroke) == 0] != 0).all()
 
 
+@pytest.mark.slow
 def test_overshoot_of_zero_changes_nothing():
     a, b = (
         draw_instances([SPHERE], FRONT_CAMERA, StrokeStyle(spacing=9, **options)).strokes
@@ -133,6 +134,7 @@ def test_extensions_have_the_direction_of_their_strokes():
     assert np.median(cosines) > np.cos(np.radians(4)) and np.min(cosines) > np.cos(np.radians(30))
 
 
+@pytest.mark.slow
 def test_extensions_lie_on_occluders_in_front():
     occluder = MeshInstance(plane(), moved(x=1.2, z=0.7))
     plain, extended = draw_both([SQUARE, occluder], TOP_CAMERA, spacing=6.0)
@@ -171,6 +173,7 @@ def test_extensions_into_the_light_follow_the_surface():
     assert ratio.min() > 1 and ratio.max() < 1.1
 
 
+@pytest.mark.slow
 def test_ends_at_gaps_and_at_neighbors_are_not_extended():
     crossed = MeshInstance(SQUARE.surface, IDENTITY, axis_field(SQUARE.surface, 4, (1, 0, 0)))
     plain, extended = draw_both([crossed], TOP_CAMERA, spacing=20.0, gaps=0.3)
@@ -217,6 +220,7 @@ def test_ends_at_creases_are_extended():
     assert (pixel_growth(plain, extended, camera) > 1).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_extensions_are_clipped_to_the_frame():
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 206, 206, scale=2.06)
     for options in ({}, {"hidden": True}):
@@ -228,6 +232,7 @@ def test_extensions_are_clipped_to_the_frame():
         assert np.abs(ends_of(strokes)[:, :, 0]).min() > 1.015
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taper", [0.0, 1.0])
 def test_extensions_are_tapered(taper):
     strokes = draw_instances(
@@ -240,6 +245,7 @@ def test_extensions_are_tapered(taper):
     assert not taper or strokes.width[from_tip < 0.03].max() < 0.7
 
 
+@pytest.mark.slow
 def test_with_hidden_strokes_extensions_are_straight_in_space():
     """On a slanted plane, extensions are in the plane. Their length is along the plane."""
     slope = np.eye(4)
@@ -258,6 +264,7 @@ def test_with_hidden_strokes_extensions_are_straight_in_space():
     assert growth.max() <= 0.01 * MAX_PIXELS + 1e-6
 
 
+@pytest.mark.slow
 def test_points_beside_and_behind_the_camera_are_finite():
     surface = plane(20, 20, size=40.0)
     floor = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
@@ -289,6 +296,7 @@ def test_extensions_of_short_strokes_and_for_plotters():
     assert np.allclose(growth, 100 * short.length)
 
 
+@pytest.mark.slow
 def test_ends_of_traced_strokes_are_not_free():
     traced = draw_instances([SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=0)).strokes
     assert (

@@ -143,6 +143,7 @@ def test_simplified_strokes_are_within_the_tolerance():
     assert max_distance < 0.11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ortho", [False, True])
 def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho):
     camera = CAMERA
@@ -196,6 +197,7 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     assert 30 < done.value.value.length.sum() < 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", [separation, visibility])
 def test_blocks_divide_the_work_and_do_not_change_strokes(module, monkeypatch):
     style = StrokeStyle(spacing=10, outline=True)
@@ -253,6 +255,7 @@ def test_errors(error_of):
     assert "pen" in error_of(Pen, width=0.0)
 
 
+@pytest.mark.slow
 def test_swelling_strokes_are_evenly_spaced():
     """They are where strokes without a tone are, and their width is the darkness."""
     style = StrokeStyle(spacing=9, taper=0.0, hidden=True)

@@ -18,6 +18,7 @@ def spread_points(count, octaves):
     return distance[:, None] * direction, 0.05 * distance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("octaves", [0, 4, 16])
 def test_all_pairs_are_found(octaves):
     points, radius = spread_points(3000, octaves)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from shapes import torus
 
 from rosy_addon.field.generate import axis_field
@@ -28,6 +29,7 @@ def traced(monkeypatch, batch_size):
             return end.value, steps
 
 
+@pytest.mark.slow
 def test_small_batches_of_seeds_change_nothing(monkeypatch):
     strokes, few_steps = traced(monkeypatch, 1 << 12)
     again, many_steps = traced(monkeypatch, 1 << 6)

@@ -214,6 +214,7 @@ def test_on_a_torus_strokes_wind_at_the_angle_of_the_field():
     assert np.abs(error[is_long]).max() < 1.0
 
 
+@pytest.mark.slow
 def test_segments_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
     instance = instance_of(icosphere(2), 4, kind="smoothest")
     mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.2)
@@ -418,6 +419,7 @@ def test_strokes_that_are_too_close_are_cut():
     assert np.allclose(np.unique(np.linalg.norm(remaining.points, axis=1).round(9)), radius[1:])
 
 
+@pytest.mark.slow
 def test_circles_of_latitude_close():
     surface = icosphere(4)
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 4, (0, 0, 1)))
@@ -511,6 +513,7 @@ def test_darker_is_denser():
     assert 1.9 < dark_length / light_length < 3.2
 
 
+@pytest.mark.slow
 def test_ink_coverage_follows_a_ramp_of_tone():
     """Coverage is the length of strokes per area, times the width that is solid at the minimum."""
     surface = plane(40, 40)
@@ -611,6 +614,7 @@ def test_families_are_consistent_on_a_torus():
     assert len(np.unique(is_around[strokes.family == 1])) == 1
 
 
+@pytest.mark.slow
 def test_no_global_families_around_singularities():
     instance = instance_of(icosphere(3), 4, kind="smoothest")
     assert global_labels(build_tangent_mesh(instance)) is None
@@ -691,6 +695,7 @@ def test_cut_intervals_remove_their_length(low, size):
 # --- visibility --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_sphere_shows_its_near_side():
     instance = instance_of(icosphere(4), 2, kind="smoothest")
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
@@ -705,6 +710,7 @@ def test_a_sphere_shows_its_near_side():
     assert np.isclose(unclipped.length.sum(), strokes.length.sum())
 
 
+@pytest.mark.slow
 def test_strokes_are_clipped_by_occluders_and_by_the_frame():
     instance = instance_of(plane(), 2)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 200, scale=1.0)

@@ -12,6 +12,7 @@ from ..color import map_colors, to_linear
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from .band import Band
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images_task, has_even_lines
@@ -25,7 +26,7 @@ from .hatching import (
     render_hatching,
 )
 from .image_noise import NOISE_MEAN
-from .lic import METHODS, lic_task
+from .lic import lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
 from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
@@ -48,6 +49,7 @@ def compose_task(
     reference: ReferenceRender | None = None,
     cache: Cache | None = None,
     mesh_cache: Cache | None = None,
+    band: Band | None = None,
 ) -> Task[Picture]:
     """Draw the fields of a G-buffer.
 
@@ -67,10 +69,13 @@ def compose_task(
         depend on the changed settings are reused.
     mesh_cache : Cache, optional
         Stores what does not depend on the camera, by default `cache`.
+    band : Band, optional
+        The rows that are drawn, if not all. The G-buffer has them and their context.
 
     Returns
     -------
     Picture
+        Of these rows.
 
     Raises
     ------
@@ -86,10 +91,10 @@ def compose_task(
         look = replace(look, supersampling=1)
     look = look_in_pixels(look, camera, gbuffer.instances)
     pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
-    color = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
+    color = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
-    stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
+    stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache, band)
     tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
     tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
     layers = []
@@ -114,11 +119,11 @@ def compose_task(
             images, break_images = yield from subtask(task, start, stop)
         else:
             (images,) = yield from subtask(stages.lic_task(field, [pixel_look]), start, stop)
-        layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
         part_look = (
             with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
         )
         tone = modulation = None
+        drawn = stages.drawn(field)
         if is_hatched(look):
             tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
             modulation = yield from subtask(
@@ -126,6 +131,9 @@ def compose_task(
                 stop,
                 stop,
             )
+            tone = tone[drawn]
+        field = field.part(drawn)
+        layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
             part, part_images = field.part(block), images.part(block)
@@ -145,7 +153,7 @@ def compose_task(
             color,
             alpha,
             camera.width,
-            camera.height,
+            (0, camera.height) if band is None else (band.start, band.stop),
             look.supersampling,
             gbuffer.coverage,
         ),
@@ -200,7 +208,7 @@ def compose_planar(
     layer = run_to_completion(_layer_task(field, look, images))
     color = _colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
-    rgba_task = _resolve_pixels_task(field.pixel, color, opaque, field.width, field.height, 1)
+    rgba_task = _resolve_pixels_task(field.pixel, color, opaque, field.width, (0, field.height), 1)
     return Picture(run_to_completion(rgba_task), (layer,))
 
 
@@ -221,7 +229,7 @@ def _line_modulation_task(
     break_images: LicImages | None,
     even_lines: EvenLines | None,
 ) -> Task[LineModulation]:
-    """Compute the parts of the `LineModulation` that a look uses."""
+    """Compute the parts of the `LineModulation` that a look uses, at the pixels that are drawn."""
     undirected = yield from stages.undirected_texture_task(field, look)
     uses_streaks = even_lines is None or has_breaks(look) or has_paper_grain(look)
     if uses_streaks or undirected is not None:
@@ -230,13 +238,23 @@ def _line_modulation_task(
     if has_paper_grain(look):
         paper_grain = yield from _paper_grain_task(stages, field, look)
     if has_overshoot(look):
-        line_tones = yield from _tone_along_lines_task(field, look, tone)
+        line_tones = yield from _tone_along_lines_task(stages, field, look, tone)
     outline = (yield from stages.outline_task(field, look)) if has_outline(look) else None
-    return LineModulation(break_images, paper_grain, line_tones, outline, undirected, even_lines)
+    drawn = stages.drawn(field)
+    return LineModulation(
+        break_images,
+        None if paper_grain is None else paper_grain[:, drawn],
+        line_tones,
+        None if outline is None else outline[drawn],
+        None if undirected is None else undirected[drawn],
+        even_lines,
+    )
 
 
-def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> Task[np.ndarray]:
-    """(M, P) means of (P,) tones along lines, over the overshoot distance in each direction."""
+def _tone_along_lines_task(
+    stages: ComposeStages, field: PixelField, look: Look, tone: np.ndarray
+) -> Task[np.ndarray]:
+    """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
     overshoot_look = replace(look, length=max(round(look.overshoot / look.step), 1), taper=False)
@@ -245,9 +263,9 @@ def _tone_along_lines_task(field: PixelField, look: Look, tone: np.ndarray) -> T
     # or three channels.
     channels = np.ones((len(tone), 3), dtype=np.float32)
     channels[:, 0] = tone
-    images = yield from METHODS[look.method](field, overshoot_look, channels)
+    images = yield from stages.line_means_task(field, overshoot_look, channels)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
-    for block in pixel_blocks(len(tone)):
+    for block in pixel_blocks(means.shape[1]):
         yield Progress(1.0, "finding tones")
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
         means[:, block] = (
@@ -309,7 +327,7 @@ def _resolve_pixels_task(
     color: np.ndarray,
     alpha: np.ndarray,
     width: int,
-    height: int,
+    rows: tuple[int, int],
     supersampling: int,
     coverage: PixelCoverage | None = None,
 ) -> Task[np.ndarray]:
@@ -322,8 +340,10 @@ def _resolve_pixels_task(
     color : (P, 3) or (P, 1) float32 ndarray
         Linear, not premultiplied.
     alpha : (P,) float32 ndarray
-    width, height : int
+    width : int
         Of the supersampled frame, in pixels.
+    rows : (int, int)
+        Of that frame: the first row of the image, and the row after its last one.
     supersampling : int
         Subpixels along each side of a pixel.
     coverage : PixelCoverage, optional
@@ -331,16 +351,17 @@ def _resolve_pixels_task(
 
     Returns
     -------
-    (height / supersampling, width / supersampling, 4) float32 ndarray
+    (H / supersampling, width / supersampling, 4) float32 ndarray
         Linear RGBA, not premultiplied.
     """
     s = supersampling
-    rgba = np.zeros((height // s, width // s, 4), dtype=np.float32)
+    height = (rows[1] - rows[0]) // s
+    rgba = np.zeros((height, width // s, 4), dtype=np.float32)
     band_rows = max(BLOCK_PIXELS // (width * s), 1)
-    for start in range(0, height // s, band_rows):
-        yield Progress(start * s / height, "drawing the ink")
+    for start in range(0, height, band_rows):
+        yield Progress(start / height, "drawing the ink")
         band = rgba[start : start + band_rows]
-        first_pixel = start * s * width
+        first_pixel = (rows[0] + start * s) * width
         border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)
         block = slice(*np.searchsorted(pixel, border.astype(pixel.dtype)).tolist())
         if block.start == block.stop:  # rows that are not written to take no memory

@@ -10,14 +10,16 @@ steps, whatever the length of the streamlines.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
+from .band import BORDER_ROWS, Band
 from .contrast import normalize_variance
 from .covering import (
     ALL_NEIGHBORS,
@@ -72,11 +74,20 @@ FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 
 #: deviation.
 CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
-#: Maximum number of states in a strip of the picture. Bounds the memory.
-MAX_STATES_PER_STRIP = 1 << 23
+#: Number of states in a strip of the picture, at least; larger pictures are divided. Bounds the
+#: memory.
+STRIP_STATES = 1 << 21
+
+#: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
+MIN_STRIP_MARGINS = 6
+
+#: Rows at the border of two strips in which their averages are blended, so that no seam is visible.
+OVERLAP_ROWS = 12
 
 
-def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+def fast_lic_task(
+    field: PixelField, look: Look, noise: np.ndarray, band: Band | None = None, name: str = ""
+) -> Task[LicImages]:
     """Compute one LIC image for each of the M lines.
 
     Parameters
@@ -85,23 +96,32 @@ def fast_lic_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicI
     look : Look
         In pixels of the frame.
     noise : (P, K) float32 ndarray
+    band : Band, optional
+        The rows of the images, if not all.
+    name : str
+        Of the images, in the exchange of the band.
 
     Returns
     -------
     LicImages
+        At the pixels ``band.drawn(field.pixel, field.width)``, by default all.
     """
-    (images,) = yield from fast_lic_lengths_task(field, [look], noise)
+    (images,) = yield from fast_lic_lengths_task(field, [look], noise, band, name)
     return images
 
 
 def fast_lic_lengths_task(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray
+    field: PixelField,
+    looks: Sequence[Look],
+    noise: np.ndarray,
+    band: Band | None = None,
+    name: str = "",
 ) -> Task[list[LicImages]]:
     """Compute LIC images of several lengths, with the same streamlines.
 
     Parameters
     ----------
-    field, noise
+    field, noise, band, name
         As for `fast_lic_task`.
     looks : sequence of Look
         In pixels of the frame. They differ in the `length` of streamlines. The first is the longest.
@@ -111,72 +131,252 @@ def fast_lic_lengths_task(
     list of LicImages
         Of each look.
     """
-    count, channels = noise.shape
-    look = looks[0]
-    line = member_lines(field)
-    images = [_NewImages.empty(len(line), count, channels, look) for _ in looks]
     step_limits = []
-    for each in looks:
-        step_limits.append((yield from subtask(step_limits_task(field, each), 0.0, 0.0)))
-    overlap_sums: list[np.ndarray | None] = [None] * len(looks)
-    for extent, core, overlap_stop in _strips(field, look):
-        start, stop = core.start / count, core.stop / count
+    for look in looks:
+        step_limits.append((yield from subtask(step_limits_task(field, look), 0.0, 0.0)))
+    drawn = slice(0, len(field.pixel)) if band is None else band.drawn(field.pixel, field.width)
+    images = [_NewImages.empty(field, look, drawn, noise.shape[1]) for look in looks]
+    strips = _strips(field, looks[0], band)
+    # The first rows of the strip above, which are blended with the values of this one.
+    upper_head, upper_values = slice(0, 0), []
+    # From the top, because the band above needs the values of the uppermost strip.
+    for place, strip in enumerate(reversed(strips)):
+        start, stop = place / len(strips), (place + 1) / len(strips)
         yield Progress(start, STEP_LABEL)
-        strip_field = _crop_rows(field, extent)
-        strip_noise = noise[extent] - np.float32(NOISE_MEAN)
-        covering = yield from subtask(
-            build_covering_task(strip_field, look, strip_noise), start, start
+        values = yield from subtask(
+            _strip_values_task(field, strip, looks, noise, step_limits), start, stop
         )
-        cells = covering.cell_of_pixel[core.start - extent.start :][: overlap_stop - core.start]
-        core_cells, overlap_cells = np.split(cells, [core.stop - core.start])
-        undefined = strip_field.representation == 0
-        averages = []
-        for _ in looks:
-            averages.append(_LineAverages(covering, cells))
-            averages[-1].init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
-            yield Progress(start, STEP_LABEL)
-        cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
-        coverage_task = _cover_all_lines_task(covering, averages, looks, cell_limits)
-        yield from subtask(coverage_task, start, stop)
-        row = strip_field.pixel[core.start - extent.start :] // field.width
-        for index, (each, out) in enumerate(zip(looks, images, strict=True)):
-            table = averages[index]
-            if is_fine(look):
-                yield from subtask(table.smooth_task(covering, cells), stop, stop)
-            core_sums = table.gather(core_cells, line)
-            if out.slopes is not None:
-                slopes_task = table.slopes_task(covering, core_cells, line)
-                out.slopes[:, core] = yield from subtask(slopes_task, stop, stop)
-            yield Progress(stop, STEP_LABEL)
-            _blend_strips(core_sums, overlap_sums[index], row)
-            for line_sums, member in zip(core_sums, out.members, strict=True):
-                yield Progress(stop, STEP_LABEL)
-                _write_averages(line_sums, each, member[core])
-            yield Progress(stop, STEP_LABEL)
-            out.effective_samples[core] = core_sums[:, :, -1].mean(axis=0)
-            overlap_sums[index] = table.gather(overlap_cells, line)
+        if place:
+            rows = field.pixel[upper_head] // np.int32(field.width) - np.int32(strip.stop_row)
+            _blend_rows(upper_values, _at(values, strip, upper_head), rows)
+            yield from subtask(_write_task(images, upper_head, upper_values), stop, stop)
+        elif strip.stop_row < field.height:
+            border = slice(strip.core.stop, drawn.stop)
+            yield from subtask(_write_task(images, border, _at(values, strip, border)), stop, stop)
+            for index, rows in enumerate(_at(values, strip, strip.tail)):
+                band.exchange.put((name, index, strip.stop_row), rows)
+        body = slice(strip.head.stop, strip.core.stop)
+        yield from subtask(_write_task(images, body, _at(values, strip, body)), stop, stop)
+        upper_head = strip.head
+        upper_values = [rows.copy() for rows in _at(values, strip, strip.head)]
+    if strips[0].start_row:
+        border = slice(drawn.start, strips[0].core.start)
+        below = []
+        for index, rows in enumerate(upper_values):
+            task = band.exchange.get_task((name, index, strips[0].start_row))
+            lower = yield from subtask(task, 1.0, 1.0)
+            below.append(rows[:, :0] if lower is None else lower)
+        count = border.stop - border.start
+        rows = field.pixel[upper_head] // np.int32(field.width) - np.int32(strips[0].start_row)
+        _blend_rows(upper_values, [part[:, count:] for part in below], rows)
+        yield from subtask(_write_task(images, border, [part[:, :count] for part in below]), 1, 1)
+    yield from subtask(_write_task(images, upper_head, upper_values), 1.0, 1.0)
     blended = []
     for out in images:
-        blended.append((yield from subtask(lic_images_task(*out), 1.0, 1.0)))
+        task = lic_images_task(out.members, out.effective_samples, out.slopes)
+        blended.append((yield from subtask(task, 1.0, 1.0)))
     return blended
 
 
 class _NewImages(NamedTuple):
-    """The parts of `LicImages` that are filled strip by strip."""
+    """The parts of the `LicImages` of a look that are filled strip by strip.
 
+    They begin at the pixel `first` of the field.
+    """
+
+    look: Look
+    first: int
     members: np.ndarray
     effective_samples: np.ndarray
     slopes: np.ndarray | None
 
     @classmethod
-    def empty(cls, lines: int, count: int, channels: int, look: Look) -> _NewImages:
-        """Return uninitialized images of (lines, count, channels)."""
-        has_slopes = is_fine(look) and is_hatched(look)
+    def empty(cls, field: PixelField, look: Look, drawn: slice, channels: int) -> _NewImages:
+        """Return uninitialized images of a range of the pixels of a field."""
+        lines, count = field.line_count, drawn.stop - drawn.start
         return cls(
+            look,
+            drawn.start,
             np.empty((lines, count, channels), dtype=np.float32),
             np.empty(count, dtype=np.float32),
-            np.empty((lines, count), dtype=np.float32) if has_slopes else None,
+            np.empty((lines, count), dtype=np.float32) if has_slopes(look) else None,
         )
+
+
+class _Strip(NamedTuple):
+    """A strip of rows of the picture. Slices are ranges of the pixels of the field.
+
+    Attributes
+    ----------
+    start_row, stop_row : int
+    extent : slice
+        The pixels that streamlines may pass.
+    core : slice
+        The pixels of the strip.
+    head : slice
+        Those of its pixels that are blended with the strip below.
+    tail : slice
+        The pixels that the strip above takes from this one: its last row, and those that are blended.
+    """
+
+    start_row: int
+    stop_row: int
+    extent: slice
+    core: slice
+    head: slice
+    tail: slice
+
+    @property
+    def averaged(self) -> slice:
+        """The pixels that get averages."""
+        return slice(self.core.start, max(self.core.stop, self.tail.stop))
+
+
+def strip_count(width: int, height: int, lines: int, margin: int) -> int:
+    """Return into how many strips a picture is divided: a power of two.
+
+    Parameters
+    ----------
+    width, height : int
+        Of the picture, in pixels.
+    lines : int
+        Through each pixel.
+    margin : int
+        From `streamline_margin`.
+    """
+    rows = max(STRIP_STATES / (2 * lines * width), MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS)
+    return 1 << max(int(np.log2(height / rows)), 0)
+
+
+def streamline_margin(look: Look) -> int:
+    """Return how many rows streamlines may leave a strip."""
+    return int(look.length * look.step) + 2
+
+
+def _strips(field: PixelField, look: Look, band: Band | None) -> list[_Strip]:
+    """Divide a picture, or a band of it, into strips of rows, from the bottom."""
+    height, margin = field.height, streamline_margin(look)
+    count = strip_count(field.width, height, field.line_count, margin)
+    borders = [height * number // count for number in range(count + 1)]
+    strips = []
+    for start, stop in pairwise(borders):
+        if band is not None and not band.start <= start < band.stop:
+            continue
+        below, above = OVERLAP_ROWS * (start > 0), OVERLAP_ROWS * (stop < height)
+        rows = [
+            start - margin,
+            start,
+            start + below,
+            stop - min(BORDER_ROWS, above),
+            stop,
+            stop + above,
+            stop + above + margin,
+        ]
+        first_pixels = np.clip(rows, 0, height) * field.width
+        pixels = np.searchsorted(field.pixel, first_pixels.astype(field.pixel.dtype))
+        first, core_start, head_stop, tail_start, core_stop, tail_stop, last = pixels.tolist()
+        strips.append(
+            _Strip(
+                start,
+                stop,
+                slice(first, last),
+                slice(core_start, core_stop),
+                slice(core_start, head_stop),
+                slice(tail_start, tail_stop),
+            )
+        )
+    return strips
+
+
+def _strip_values_task(
+    field: PixelField,
+    strip: _Strip,
+    looks: Sequence[Look],
+    noise: np.ndarray,
+    step_limits: Sequence[np.ndarray | None],
+) -> Task[list[np.ndarray]]:
+    """Compute the averages of the lines of a strip, for each look.
+
+    Returns
+    -------
+    list of (M, n, K + 2) float32 ndarray
+        The average of each noise channel times the effective samples, the effective samples, and the
+        slope (see `LicImages`) if it is needed. n is 0 for a strip without pixels.
+    """
+    channels, extent, averaged = noise.shape[1], strip.extent, strip.averaged
+    has_pixels = strip.core.start < strip.core.stop
+    shape = field.line_count, (averaged.stop - averaged.start) * has_pixels
+    values = [
+        np.empty((*shape, channels + 2 if has_slopes(look) else channels + 1), dtype=np.float32)
+        for look in looks
+    ]
+    if not has_pixels:
+        return values
+    strip_field = _crop_rows(field, extent)
+    strip_noise = noise[extent] - np.float32(NOISE_MEAN)
+    covering = yield from subtask(build_covering_task(strip_field, looks[0], strip_noise), 0.0, 0.1)
+    cells = covering.cell_of_pixel[averaged.start - extent.start : averaged.stop - extent.start]
+    undefined = strip_field.representation == 0
+    tables = []
+    for _ in looks:
+        yield Progress(0.1, STEP_LABEL)
+        tables.append(_LineAverages(covering, cells))
+        tables[-1].init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
+    cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
+    yield from subtask(_cover_all_lines_task(covering, tables, looks, cell_limits), 0.1, 0.9)
+    line = member_lines(field)
+    for look, table, rows in zip(looks, tables, values, strict=True):
+        if is_fine(look):
+            yield from subtask(table.smooth_task(covering, cells), 0.9, 0.9)
+        if has_slopes(look):
+            slopes_task = table.slopes_task(covering, cells, line)
+            rows[:, :, -1] = yield from subtask(slopes_task, 0.9, 0.9)
+        yield Progress(0.9, STEP_LABEL)
+        table.gather(cells, line, rows[:, :, : channels + 1])
+    return values
+
+
+def _at(values: Sequence[np.ndarray], strip: _Strip, pixels: slice) -> list[np.ndarray]:
+    """The values of a strip at a range of the pixels of the field."""
+    first = strip.averaged.start
+    return [rows[:, max(pixels.start - first, 0) : pixels.stop - first] for rows in values]
+
+
+def _blend_rows(upper: Sequence[np.ndarray], lower: Sequence[np.ndarray], row: np.ndarray) -> None:
+    """Blend the values of two strips at the first rows of the upper one, in place.
+
+    The first row is that of the lower strip. A lower strip without pixels has no values.
+
+    Parameters
+    ----------
+    upper, lower : sequence of (M, n, K) float32 ndarray
+    row : (n,) ndarray of int
+        Rows of the pixels, counted from the first one of the upper strip.
+    """
+    weight = (1 - row.astype(np.float32) / np.float32(OVERLAP_ROWS))[:, None]
+    for upper_values, lower_values in zip(upper, lower, strict=True):
+        if lower_values.shape[1]:
+            upper_values += weight * (lower_values - upper_values)
+
+
+def _write_task(
+    images: Sequence[_NewImages], pixels: slice, values: Sequence[np.ndarray]
+) -> Task[None]:
+    """Write the values of strips at a range of the pixels of the field."""
+    for out, rows in zip(images, values, strict=True):
+        target = slice(pixels.start - out.first, pixels.stop - out.first)
+        channels = out.members.shape[2]
+        if not rows.shape[1]:
+            # A strip without pixels, whose neighbors are not drawn.
+            out.members[:, target], out.effective_samples[target] = NOISE_MEAN, 1
+            continue
+        for line_values, member in zip(rows, out.members, strict=True):
+            yield Progress(1.0, STEP_LABEL)
+            _write_averages(line_values[:, : channels + 1], out.look, member[target])
+        yield Progress(1.0, STEP_LABEL)
+        out.effective_samples[target] = rows[:, :, channels].mean(axis=0)
+        if out.slopes is not None:
+            out.slopes[:, target] = rows[:, :, channels + 1]
 
 
 def _pixels_to_cells(
@@ -190,28 +390,6 @@ def _pixels_to_cells(
     return cell_limit
 
 
-def _blend_strips(core_sums: np.ndarray, overlap_sums: np.ndarray | None, row: np.ndarray) -> None:
-    """Blend the first rows of a strip with those of the strip below, so that no seam is visible.
-
-    Parameters
-    ----------
-    core_sums : (M, n, K + 1) float32 ndarray
-        Sums and effective samples of the strip. Modified in place.
-    overlap_sums : (M, m, K + 1) float32 ndarray or None
-        Sums and effective samples from the strip below, for the first m pixels of this strip.
-    row : (n,) int ndarray
-        Row of each pixel.
-    """
-    if overlap_sums is None or not overlap_sums.size:
-        return
-    count = min(overlap_sums.shape[1], core_sums.shape[1])
-    overlap_sums, row = overlap_sums[:, :count], row[:count]
-    weight = (row[-1] - row + 0.5) / (row[-1] - row[0] + 1)
-    core_sums[:, :count] += weight[:, None].astype(np.float32) * (
-        overlap_sums - core_sums[:, :count]
-    )
-
-
 def _write_averages(line_sums: np.ndarray, look: Look, member: np.ndarray) -> None:
     """Write (n, K) averages of equal variance, from the (n, K + 1) sums and samples of a line."""
     full_samples = np.float32(full_sample_count(look) - 0.5)
@@ -223,33 +401,6 @@ def _write_averages(line_sums: np.ndarray, look: Look, member: np.ndarray) -> No
         mean += np.float32(NOISE_MEAN)
         if effective_samples.min() < full_samples:
             mean[...] = normalize_variance(mean, effective_samples, look)
-
-
-def _strips(field: PixelField, look: Look) -> Iterator[tuple[slice, slice, int]]:
-    """Divide the picture into strips of rows, as ranges of the list of pixels.
-
-    Yields
-    ------
-    extent, core : slice
-        The pixels that streamlines may pass, and those among them that get averages.
-    overlap_stop : int
-        End of the pixels above the core that get averages, too, for the blend with the next strip.
-    """
-    count = len(field.pixel)
-    if count * 2 * field.line_count <= MAX_STATES_PER_STRIP:
-        yield slice(0, count), slice(0, count), count
-        return
-    margin = int(look.length * look.step) + 2
-    # At least three margins, so that the margins do not dominate the work.
-    rows = max(MAX_STATES_PER_STRIP // (2 * field.line_count) // field.width, 3 * margin)
-    for start in range(0, field.height, rows):
-        stop = start + rows
-        border = np.array([start - margin, start, stop, stop + margin, stop + 2 * margin])
-        extent_start, core_start, core_stop, overlap_stop, extent_stop = np.searchsorted(
-            field.pixel, border * field.width
-        ).tolist()
-        if core_start < core_stop:
-            yield slice(extent_start, extent_stop), slice(core_start, core_stop), overlap_stop
 
 
 def _crop_rows(field: PixelField, extent: slice) -> PixelField:
@@ -357,14 +508,15 @@ class _LineAverages:
         values[unknown] = own[unknown]
         return values
 
-    def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """(M, n, K + 1) sums and effective samples of the lines of some cells."""
-        result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
+    def gather(self, cell: np.ndarray, line: np.ndarray, result: np.ndarray) -> None:
+        """Write (M, n, K + 1) sums and effective samples of the lines of some cells to `result`."""
         for line_index, out in zip(line, result, strict=True):
-            rows_as_scalars(self._values[line_index]).take(
-                cell, out=rows_as_scalars(out), mode="clip"
+            out[...] = (
+                rows_as_scalars(self._values[line_index])
+                .take(cell)
+                .view(np.float32)
+                .reshape(out.shape)
             )
-        return result
 
 
 def _cover_all_lines_task(
@@ -433,6 +585,11 @@ def _write_streamlines(
     for table, collected in zip(averages, centered_values, strict=True):
         table.write(line, np.concatenate(collected))
         table.clear_sink()
+
+
+def has_slopes(look: Look) -> bool:
+    """Whether the images of a look have slopes; see `LicImages`."""
+    return is_fine(look) and is_hatched(look)
 
 
 def is_fine(look: Look) -> bool:

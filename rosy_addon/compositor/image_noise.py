@@ -28,6 +28,10 @@ MAX_MARGIN = 512
 #: Label of all steps.
 STEP_LABEL = "making noise"
 
+#: Values are rounded to multiples of this before they are summed. Sums in double precision are then
+#: exact, and do not depend on where they begin.
+BLUR_QUANTUM = 2.0**-32
+
 #: Rows or columns that are blurred together. Their sums fit the caches of the processor.
 BLUR_LINES = 32
 
@@ -254,14 +258,17 @@ def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.n
     pads = [(0, 0), (0, 0)]
     pads[axis] = (radius + 1, radius)
     fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
-    prefix_sum = np.cumsum(np.pad(image, pads, **fill), axis=axis, dtype=np.float64)
+    prefix_sum = np.pad(image, pads, **fill).astype(np.float64)
+    prefix_sum *= 1 / BLUR_QUANTUM
+    np.rint(prefix_sum, out=prefix_sum)
+    np.cumsum(prefix_sum, axis=axis, out=prefix_sum)
     size, window = image.shape[axis], 2 * radius + 1
     after, before = (
         prefix_sum[:, start : start + size] if axis else prefix_sum[start : start + size]
         for start in (window, 0)
     )
     mean = after - before
-    mean /= window
+    mean *= BLUR_QUANTUM / window
     return mean
 
 

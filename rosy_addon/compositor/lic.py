@@ -9,6 +9,7 @@ import numpy as np
 
 from ..memory import raise_mmap_threshold
 from ..progress import Task, run_to_completion, subtask
+from .band import Band
 from .brute_force import brute_force_task
 from .fast_lic import fast_lic_lengths_task, fast_lic_task
 from .image_noise import image_noise_task
@@ -45,15 +46,22 @@ def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> 
 
 
 def lic_lengths_task(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray | None = None
+    field: PixelField,
+    looks: Sequence[Look],
+    noise: np.ndarray | None = None,
+    band: Band | None = None,
+    name: str = "",
 ) -> Task[list[LicImages]]:
-    """Do the same as `lic_task` for looks that differ in the length of streamlines, longest first."""
+    """Do the same as `lic_task` for looks that differ in the length of streamlines, longest first.
+
+    The images may be those of a band of the picture; see `fast_lic_task`.
+    """
     raise_mmap_threshold()
     look = looks[0]
     if noise is None:
         noise = yield from subtask(look_noise_task(field, look), 0.0, 0.0)
     if look.method == "sheets":
-        return (yield from fast_lic_lengths_task(field, looks, noise))
+        return (yield from fast_lic_lengths_task(field, looks, noise, band, name))
     images = []
     for each in looks:
         images.append((yield from METHODS[look.method](field, each, noise)))

@@ -86,6 +86,11 @@ class PixelField:
     def part(self, extent: slice) -> PixelField:
         """Return the field at some of the pixels. Its `neighbor_mask` is that of all pixels."""
         index = self.gbuffer_index
+        if isinstance(index, slice):
+            first = index.start or 0
+            index = slice(first + extent.start, first + extent.stop)
+        else:
+            index = index[extent]
         return replace(
             self,
             pixel=self.pixel[extent],
@@ -93,7 +98,7 @@ class PixelField:
             screen_jacobian=None if self.screen_jacobian is None else self.screen_jacobian[extent],
             neighbor_mask=self.neighbor_mask[extent],
             channels={channel: values[extent] for channel, values in self.channels.items()},
-            gbuffer_index=extent if isinstance(index, slice) else index[extent],
+            gbuffer_index=index,
         )
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from ..cache import Cache
 from ..progress import Task, subtask
 from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
+from .band import Band
 from .even_lines import EvenLines, even_lines_task
 from .lic import lic_lengths_task, look_noise_task, noise_args
 from .lic_images import LicImages
@@ -40,12 +41,23 @@ class ComposeStages:
         May be shared with other G-buffers.
     mesh_cache : Cache
         Stores what does not depend on the camera.
+    band : Band, optional
+        The rows whose LIC images are computed, if not all.
     """
 
-    def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
+    def __init__(
+        self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache, band: Band | None = None
+    ) -> None:
         self._gbuffer = gbuffer
         self._cache = cache
         self._mesh_cache = mesh_cache
+        self._band = band
+
+    def drawn(self, field: PixelField) -> slice:
+        """Return the range of the pixels of a field that its LIC images have."""
+        if self._band is None:
+            return slice(0, len(field.pixel))
+        return self._band.drawn(field.pixel, field.width)
 
     def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
         """Pixel field of one degree, rotated by the wobble of the look."""
@@ -67,10 +79,17 @@ class ComposeStages:
 
         def compute_task() -> Task[list[LicImages]]:
             noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
-            return (yield from subtask(lic_lengths_task(field, looks, noise), NOISE_SHARE, 1.0))
+            task = lic_lengths_task(field, looks, noise, self._band, f"degree {field.degree}")
+            return (yield from subtask(task, NOISE_SHARE, 1.0))
 
         key = "LIC images", self._gbuffer, field.degree, *map(lic_key, looks)
         return (yield from self._cache.get_or_create_task(key, compute_task))
+
+    def line_means_task(self, field: PixelField, look: Look, values: np.ndarray) -> Task[LicImages]:
+        """Average (P, K) values along the lines of a field."""
+        task = lic_lengths_task(field, [look], values, self._band, f"means, degree {field.degree}")
+        (images,) = yield from task
+        return images
 
     def undirected_texture_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:
         """Compute the texture where the field is undefined; see `undirected_texture_task`."""

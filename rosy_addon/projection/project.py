@@ -65,6 +65,7 @@ def project_task(
     display: str = "smooth",
     cache: Cache | None = None,
     samples: int = 1,
+    rows: tuple[int, int] | None = None,
 ) -> Task[GBuffer]:
     """Compute the G-buffer: the visible pixels of all surfaces with a field, and the field there.
 
@@ -81,6 +82,8 @@ def project_task(
     samples : int
         Samples along each side of a pixel. If there are several, the G-buffer has an entry for each
         pixel where one of them shows a field, and a `coverage`.
+    rows : (int, int), optional
+        The first row of the frame, and the row after the last one, if not all are needed.
 
     Yields
     ------
@@ -104,10 +107,10 @@ def project_task(
     yield Progress(0.0, "finding visible pixels")
     sampled = None
     if samples > 1:
-        task = _visible_samples_task(instances, camera, samples)
+        task = _visible_samples_task(instances, camera, samples, rows)
         visible, sampled, other_instance, other_triangle = yield from subtask(task, 0.0, 0.3)
     else:
-        visible = yield from subtask(_visible_pixels_task(instances, camera), 0.0, 0.3)
+        visible = yield from subtask(_visible_pixels_task(instances, camera, rows), 0.0, 0.3)
     gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.4)
     geometric_normals = yield from subtask(
         _fill_instances_task(gbuffer, visible, display, cache), 0.4, 1.0
@@ -277,15 +280,17 @@ class _VisiblePixels:
         return len(self.visible_ids) == 1
 
 
-def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[_VisiblePixels]:
-    """Find the pixels where the nearest surface has a field.
+def _visible_pixels_task(
+    instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
+) -> Task[_VisiblePixels]:
+    """Find the pixels of some rows where the nearest surface has a field.
 
     Raises
     ------
     NothingInViewError
         If there is none.
     """
-    fragments, first_triangle = yield from rasterize_instances_task(instances, camera)
+    fragments, first_triangle = yield from rasterize_instances_task(instances, camera, rows)
     if len(instances) == 1:
         if not len(fragments.pixel):
             raise_nothing_in_view(instances, camera)
@@ -311,7 +316,10 @@ def _visible_pixels_task(instances: Sequence[MeshInstance], camera: Camera) -> T
 
 
 def _visible_samples_task(
-    instances: Sequence[MeshInstance], camera: Camera, samples: int
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    samples: int,
+    rows: tuple[int, int] | None,
 ) -> Task[tuple[_VisiblePixels, SampledTriangles, np.ndarray, np.ndarray]]:
     """Find the visible triangles at all samples, and what is visible at the center of each pixel.
 
@@ -327,7 +335,9 @@ def _visible_samples_task(
     has_field = np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
-    task = rasterize_samples_task(clip, triangles, has_field, camera.width, camera.height, samples)
+    task = rasterize_samples_task(
+        clip, triangles, has_field, camera.width, camera.height, samples, rows
+    )
     sampled = yield from subtask(task, 0.0, 0.8)
     if not len(sampled.pixel):
         raise_nothing_in_view(instances, camera)
@@ -368,9 +378,9 @@ def rasterize_instances(
 
 
 def rasterize_instances_task(
-    instances: Sequence[MeshInstance], camera: Camera
+    instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None = None
 ) -> Task[tuple[Fragments, np.ndarray]]:
-    """Rasterize all mesh instances together.
+    """Rasterize all mesh instances together, in all rows of the frame or some.
 
     Returns
     -------
@@ -380,7 +390,7 @@ def rasterize_instances_task(
         Index of the first triangle of each of the B instances in this count.
     """
     clip, triangles, first_triangle = _all_triangles(instances, camera)
-    fragments = yield from rasterize_task(clip, triangles, camera.width, camera.height)
+    fragments = yield from rasterize_task(clip, triangles, camera.width, camera.height, rows)
     return fragments, first_triangle
 
 

@@ -155,7 +155,11 @@ def rasterize(
 
 
 def rasterize_task(
-    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
+    clip_vertices: np.ndarray,
+    triangles: np.ndarray,
+    width: int,
+    height: int,
+    rows: tuple[int, int] | None = None,
 ) -> Task[Fragments]:
     """Find the nearest triangle at the center of every pixel.
 
@@ -171,19 +175,22 @@ def rasterize_task(
         the common edge, or these have equal coordinates.
     width, height : int
         Size of the frame in pixels.
+    rows : (int, int), optional
+        The first row, and the row after the last one, if not all are drawn.
 
     Returns
     -------
     Fragments
     """
+    first_row, stop_row = (0, height) if rows is None else rows
     clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
     vertices, clipped = _clip_near(clip_vertices, triangles)
     screen = _to_screen(vertices, width, height)
     bands = []
     band_rows = max(1, MAX_BAND_PIXELS // width)
-    for row_start in range(0, height, band_rows):
-        row_stop = min(row_start + band_rows, height)
+    for row_start in range(first_row, stop_row, band_rows):
+        row_stop = min(row_start + band_rows, stop_row)
         rasterize_rows = _rasterize_rows_task(screen, clipped, width, row_start, row_stop)
         triangle, depth = yield from subtask(
             rasterize_rows, 0.7 * row_start / height, 0.7 * row_stop / height
@@ -203,18 +210,20 @@ def rasterize_samples_task(
     width: int,
     height: int,
     samples: int,
+    rows: tuple[int, int] | None = None,
 ) -> Task[SampledTriangles]:
     """Find the nearest triangle at several samples of each pixel, on a square grid.
 
     Parameters
     ----------
-    clip_vertices, triangles, width, height
+    clip_vertices, triangles, width, height, rows
         As of `rasterize_task`.
     is_drawn : (T,) bool ndarray
         Triangles that are not drawn only hide others.
     samples : int
         S, the samples along each side of a pixel.
     """
+    first_row, stop_row = (0, height) if rows is None else rows
     clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
     vertices, clipped = _clip_near(clip_vertices, triangles)
@@ -223,8 +232,8 @@ def rasterize_samples_task(
     ]
     bands, entry_count = [], 0
     band_rows = max(1, MAX_BAND_PIXELS // (width * samples * samples))
-    for row_start in range(0, height, band_rows):
-        row_stop = min(row_start + band_rows, height)
+    for row_start in range(first_row, stop_row, band_rows):
+        row_stop = min(row_start + band_rows, stop_row)
         buffers = []
         for scale, screen in screens:
             task = _rasterize_rows_task(

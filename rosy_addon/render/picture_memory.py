@@ -20,7 +20,9 @@ from ..compositor.fast_lic import (
     BATCH_SIZE,
     HALF_WINDOW_STEPS,
     MAX_BATCH_STEPS,
-    MAX_STATES_PER_STRIP,
+    OVERLAP_ROWS,
+    streamline_margin,
+    strip_count,
 )
 from ..compositor.hatching import (
     has_breaks,
@@ -278,11 +280,11 @@ def _sheets_bytes(
     line_bytes, cell_bytes = 25 + 16 * noise_channels, 11 + 8 * noise_channels
     if look.magnitude in ("length", "both"):
         cell_bytes += 16
-    if visible * 2 * lines > MAX_STATES_PER_STRIP:
-        margin = look.length * look.step + 2
-        strip_rows = max(MAX_STATES_PER_STRIP / (2 * lines) / camera.width, 3 * margin)
-        rows = min(rows, strip_rows + 3 * margin)
-        # The strip below, and copies of the fields of pixels.
+    margin = streamline_margin(look)
+    strips = strip_count(camera.width, camera.height, lines, margin)
+    if strips > 1:
+        rows = min(rows, camera.height / strips + 2 * margin + OVERLAP_ROWS)
+        # The values of the strip, and copies of the fields of pixels.
         line_bytes, cell_bytes = line_bytes + 4 + 4 * noise_channels, cell_bytes + 38
     strip = (line_bytes * lines + cell_bytes) * columns * rows
     half_length = max(HALF_WINDOW_STEPS, look.length // 2) + look.length

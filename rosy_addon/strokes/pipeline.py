@@ -49,6 +49,9 @@ TIP_WIDTH = 0.15
 #: fraction of its mean distance to the camera.
 OFFSCREEN_DISTANCE_RATIO = 0.1
 
+#: Smallest distance between strokes in a picture, in pixels.
+MIN_SPACING_PIXELS = 0.1
+
 #: Largest distance in pixels between a removed point and the simplified stroke, and the number of
 #: pixels that a difference of the full width counts as.
 SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
@@ -216,6 +219,8 @@ def _trace_instance(
     yield Progress(0.09, label)
     if not part.mesh.z.any():
         return None
+    if clipped and style.unit == "world":
+        _check_distance(part.mesh, camera, style.distance, instance.surface.name)
     spacing = _corner_spacing(part.mesh, camera, style, clipped)
     values = spacing.values * part.corner_values(factor[by_fan.surface.triangle_vertex])
     spacing = replace(spacing, values=values)
@@ -283,6 +288,22 @@ def _overshoot_task(
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
     return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
+
+
+def _check_distance(mesh: TangentMesh, camera: Camera, distance: float, surface_name: str) -> None:
+    """Check that strokes at this distance are not too fine for a picture.
+
+    Raises
+    ------
+    RosyError
+        If they are less than `MIN_SPACING_PIXELS` apart where the surface is nearest.
+    """
+    pixels = distance / float(pixel_size(mesh.points.reshape(-1, 3), camera).min())
+    if pixels < MIN_SPACING_PIXELS:
+        raise RosyError(
+            f"{surface_name}: strokes would be {pixels:.1g} pixels apart: increase their distance or "
+            "the size of the picture"
+        )
 
 
 def _corner_spacing(

@@ -10,6 +10,7 @@ from ..errors import RosyError
 from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
 from ..projection.project import cached_project_task, check_instances, project_task
+from .band_workers import BandWorkers
 from .picture_memory import check_picture_memory
 from .view_input import ViewInput
 
@@ -29,18 +30,30 @@ class CpuRenderer:
     keep_gbuffers : bool
         Whether G-buffers and the results computed from them are kept. If not, as for animations,
         only results that do not depend on the camera are kept.
+    workers : BandWorkers, optional
+        Processes that draw large pictures together. Their G-buffers are not kept.
     """
 
     device_name = "cpu"
 
-    def __init__(self, cache: Cache | None = None, *, keep_gbuffers: bool = True) -> None:
+    def __init__(
+        self,
+        cache: Cache | None = None,
+        *,
+        keep_gbuffers: bool = True,
+        workers: BandWorkers | None = None,
+    ) -> None:
         self._cache = cache
         self._gbuffer_cache = cache if keep_gbuffers else None
+        self._workers = workers
 
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
         self._check_memory(view)
+        rows = [] if self._workers is None else self._workers.divide(view)
+        if len(rows) > 1:
+            return Picture((yield from self._workers.draw_task(view, rows, self._cache)), ())
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(
             gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache, self._cache

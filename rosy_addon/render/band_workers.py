@@ -1,0 +1,209 @@
+"""`BandWorkers`: processes that draw the bands of a picture side by side.
+
+They are started for the first picture that is large enough, and end with the pool. Jobs and results
+are files in a folder of their own. A band whose process fails is drawn here. If this process is
+killed, the others notice, end and remove the folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from ..cache import Cache
+from ..compositor.band_division import context_rows, divide_rows
+from ..progress import Progress, Task, subtask
+from ..projection.gbuffer import MeshInstance
+from ..projection.project import raise_nothing_in_view
+from .band_jobs import POLL_SECONDS, BandJob, FileExchange, draw_band_task, result_path
+from .view_input import ViewInput
+
+#: The program of a worker. It imports `render.band_worker`, but no module of the packages above it.
+WORKER_PROGRAM = """
+import importlib, json, sys, types
+sys.path[:], package, root, folder = json.loads(sys.argv[1])
+name = ""
+for part in package.split("."):
+    name = f"{name}.{part}".lstrip(".")
+    sys.modules[name] = types.ModuleType(name)
+sys.modules[package].__path__ = [root]
+importlib.import_module(package + ".render.band_worker").main(folder)
+"""
+
+#: Environment of the workers. Each has one core.
+ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+#: Label of the progress while other processes still draw.
+WAITING_LABEL = "waiting for the other processes"
+
+
+def core_count() -> int:
+    """Return the number of processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class BandWorkers:
+    """Processes that draw the bands of a picture side by side, this one included.
+
+    Use it in a ``with`` block, or call `close`.
+
+    Parameters
+    ----------
+    count : int
+        Number of processes. With 1, no other is started.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._folder: Path | None = None
+        self._processes: list[subprocess.Popen[bytes]] = []
+        self._instances: tuple[MeshInstance, ...] = ()
+        self._scene_count = 0
+        self._picture_count = 0
+
+    def __enter__(self) -> BandWorkers:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the processes, and remove their files."""
+        processes, self._processes = self._processes, []
+        for process in processes:
+            process.kill()
+        for process in processes:
+            process.wait()
+            process.stdin.close()
+            process.stdout.close()
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder, self._instances = None, ()
+
+    def divide(self, view: ViewInput) -> list[tuple[int, int]]:
+        """Return the rows of the bands in which a picture is drawn; see `divide_rows`."""
+        return divide_rows(view.look, view.shaded_camera, view.instances, self._count)
+
+    def draw_task(
+        self, view: ViewInput, rows: Sequence[tuple[int, int]], cache: Cache | None = None
+    ) -> Task[np.ndarray]:
+        """Draw a picture in bands. If the task is closed, the processes end.
+
+        Parameters
+        ----------
+        view : ViewInput
+        rows : sequence of (int, int)
+            From `divide`.
+        cache : Cache, optional
+            Stores what does not depend on the camera, for the band that is drawn here.
+
+        Returns
+        -------
+        (H, W, 4) float32 ndarray
+            Linear RGBA, not premultiplied.
+
+        Raises
+        ------
+        RosyError
+            As of `Renderer.render_task`.
+        """
+        try:
+            return (yield from self._draw_task(view, rows, cache))
+        except BaseException:
+            self.close()
+            raise
+
+    def _draw_task(
+        self, view: ViewInput, rows: Sequence[tuple[int, int]], cache: Cache | None
+    ) -> Task[np.ndarray]:
+        camera = view.shaded_camera
+        context = context_rows(view.look, camera, view.instances)
+        self._picture_count += 1
+        jobs = [BandJob(self._picture_count, *entry, context) for entry in enumerate(rows)]
+        self._start(len(rows) - 1)
+        folder = self._folder
+        processes = self._send(view, jobs[1:])
+        task = draw_band_task(view, jobs[0], FileExchange(folder, jobs[0]), cache)
+        bands = [(yield from subtask(task, 0.0, 0.95))]
+        for job, process in zip(jobs[1:], processes, strict=True):
+            path = result_path(folder, job)
+            while process is not None and not path.exists() and process.poll() is None:
+                yield Progress(0.95, WAITING_LABEL)
+                time.sleep(POLL_SECONDS)
+            if path.exists():
+                bands.append(np.load(path))
+            else:
+                task = draw_band_task(view, job, FileExchange(folder, job), cache)
+                bands.append((yield from subtask(task, 0.95, 1.0)))
+        if not any(len(band) for band in bands):
+            raise_nothing_in_view(view.instances, camera)
+        rgba = np.zeros((camera.height, camera.width, 4), dtype=np.float32)
+        for job, band in zip(jobs, bands, strict=True):
+            if len(band):
+                rgba[slice(*job.rows)] = band
+        for path in folder.glob(f"{self._picture_count}-*"):
+            path.unlink()
+        return rgba
+
+    def _start(self, count: int) -> None:
+        """Make the folder, and start processes until there are so many that run."""
+        if self._folder is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="rosy-"))
+        package = __package__.rpartition(".")[0]
+        arguments = [sys.path, package, str(Path(__file__).parents[1]), str(self._folder)]
+        command = [sys.executable, "-I", "-S", "-c", WORKER_PROGRAM, json.dumps(arguments)]
+        self._processes = [process for process in self._processes if process.poll() is None]
+        # An embedded Python may name another program.
+        can_start = "python" in Path(sys.executable or "").name.lower()
+        while can_start and len(self._processes) < count:
+            try:
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                    env=os.environ | ENVIRONMENT,
+                )
+            except OSError:
+                return
+            self._processes.append(process)
+
+    def _send(
+        self, view: ViewInput, jobs: Sequence[BandJob]
+    ) -> list[subprocess.Popen[bytes] | None]:
+        """Send a job to each process."""
+        if view.instances is not self._instances:
+            self._instances = view.instances
+            self._scene_count += 1
+            scene = pickle.dumps(view.instances, pickle.HIGHEST_PROTOCOL)
+            (self._folder / f"scene-{self._scene_count}").write_bytes(scene)
+        rest = replace(view, instances=())
+        for process, job in zip(self._processes, jobs, strict=False):
+            name = f"{job.picture}-{job.index}-job"
+            (self._folder / name).write_bytes(pickle.dumps((rest, job), pickle.HIGHEST_PROTOCOL))
+            # A process that has ended is noticed later.
+            with suppress(OSError):
+                process.stdin.write(f"scene-{self._scene_count} {name}\n".encode())
+                process.stdin.flush()
+        missing = len(jobs) - len(self._processes)
+        return [*self._processes[: len(jobs)], *[None] * missing]

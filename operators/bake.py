@@ -12,6 +12,7 @@ from ..rosy_addon.progress import Task
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
 from .modal_task import ModalTaskMixin
 from .poll import poll_has_field
@@ -34,7 +35,9 @@ class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
         return poll_has_field(cls, context)
 
     def make_task(self, context: bpy.types.Context) -> Task[list[BakeResult]]:
-        return bake_task(context.scene, cameras=self._cameras(context))
+        return bake_task(
+            context.scene, cameras=self._cameras(context), workers=worker_count(context)
+        )
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return field_objects(context.view_layer)

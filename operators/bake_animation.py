@@ -13,6 +13,7 @@ from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
 from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.ui.preferences import worker_count
 from .modal_task import DialogTaskMixin
 from .poll import poll_has_field
 from .reports import report_warnings
@@ -73,7 +74,13 @@ class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
         cameras = scene_cameras(scene) if self.all_cameras else None
         # Frames are saved in the scene's folder, even if single pictures are packed.
         settings = replace(read_output_settings(scene), folder=output_folder(scene))
-        return bake_animation_task(scene, frames, cameras=cameras, settings=settings)
+        return bake_animation_task(
+            scene,
+            frames,
+            cameras=cameras,
+            settings=settings,
+            workers=worker_count(context),
+        )
 
     def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
         """Return the first and last frame and the step: the operator's, by default the scene's."""

@@ -15,6 +15,7 @@ from ..rosy_addon.file_io import check_writable
 from ..rosy_addon.gpu.select import select_renderer
 from ..rosy_addon.progress import Task, subtask
 from ..rosy_addon.projection.camera import check_size
+from ..rosy_addon.render.band_workers import BandWorkers
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.read_view import read_turntable_task
 from ..rosy_addon.scene.video import encode_video_task
@@ -24,6 +25,7 @@ from ..rosy_addon.turntable import (
     turntable_task,
     turntable_views,
 )
+from ..rosy_addon.ui.preferences import worker_count
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_idle, selected_mesh_objects, sync_suffix
 
@@ -121,7 +123,6 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         scene = context.scene
         look = read_look(scene.rosy)
         look = replace(look, supersampling=max(look.supersampling, 2))
-        renderer = select_renderer(scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False)
         obj = selected_mesh_objects(context)[0]
         depsgraph = context.evaluated_depsgraph_get()
         reading = read_turntable_task(scene, depsgraph, obj, look)
@@ -129,8 +130,12 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
         views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
         encode = None if has_ffmpeg() else encode_video_task
-        task = turntable_task(renderer, views, self.pictures, path, self.rate, encode)
-        return (yield from task)
+        with BandWorkers(worker_count(context)) as pool:
+            renderer = select_renderer(
+                scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False, workers=pool
+            )
+            task = turntable_task(renderer, views, self.pictures, path, self.rate, encode)
+            return (yield from task)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return selected_mesh_objects(context)[:1]

@@ -27,6 +27,7 @@ from .file_io import check_folder, check_writable, read_bytes, remove_leftovers,
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
+from .render.band_workers import BandWorkers
 from .render.renderer import Renderer
 from .render.view_input import ViewInput
 from .scene.backdrop import update_backdrops
@@ -85,6 +86,7 @@ def bake_animation_task(
     size: tuple[int, int] | None = None,
     settings: OutputSettings | None = None,
     show: bool = True,
+    workers: int = 0,
 ) -> Task[list[SequenceResult]]:
     """Draw the fields of a scene at a range of frames, and apply the image sequences.
 
@@ -96,7 +98,7 @@ def bake_animation_task(
     cameras : sequence of bpy.types.Object, optional
         One image sequence for each. By default there is one sequence, from the camera that renders
         each frame; markers may change it.
-    objects, look, size : optional
+    objects, look, size, workers : optional
         As for `bake`. Settings of the scene's own look may be animated.
     settings : OutputSettings, optional
         By default the scene's. Must have a folder.
@@ -127,6 +129,7 @@ def bake_animation_task(
     warnings: dict[str, None] = {}
     # `_frame_task` evicts the entries that a frame has not used.
     exit_stack, cache = ExitStack(), Cache()
+    pool = exit_stack.enter_context(BandWorkers(workers))
     try:
         depsgraph = scene_depsgraph(scene)
         targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
@@ -147,7 +150,9 @@ def bake_animation_task(
             yield Progress(start, label)
             scene.frame_set(frame)
             try:
-                task = _frame_task(scene, frame, cameras, objects, look, size, settings, cache)
+                task = _frame_task(
+                    scene, frame, cameras, objects, look, size, settings, cache, pool
+                )
                 scene_data, results = yield from subtask(task, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -229,13 +234,14 @@ def _frame_task(
     size: tuple[int, int] | None,
     settings: OutputSettings,
     cache: Cache,
+    pool: BandWorkers,
 ) -> Task[tuple[SceneData, list[_FrameResult]]]:
     """Draw one frame from all cameras."""
     look = read_look(scene.rosy) if look is None else look
     # The look may be animated, and its method decides which renderer can draw it.
     renderer = cache.get_or_create(
         ("renderer", settings.device, look.method),
-        lambda: select_renderer(settings.device, look, cache, keep_gbuffers=False),
+        lambda: select_renderer(settings.device, look, cache, keep_gbuffers=False, workers=pool),
     )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)

@@ -10,6 +10,7 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
+from .render.band_workers import BandWorkers
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import image_data_task
@@ -38,6 +39,7 @@ def bake_task(
     look: Look | None = None,
     size: tuple[int, int] | None = None,
     settings: OutputSettings | None = None,
+    workers: int = 0,
 ) -> Task[list[BakeResult]]:
     """Draw the fields of a scene and apply the pictures to the objects.
 
@@ -60,6 +62,8 @@ def bake_task(
         Pixels; by default the size of renders times the scene's percentage for pictures.
     settings : OutputSettings, optional
         How the pictures are stored and applied; by default the scene's.
+    workers : int
+        Processes that draw large pictures together; 0 is one for each core.
 
     Yields
     ------
@@ -87,15 +91,16 @@ def bake_task(
     scene_views = yield from subtask(reading, 0.0, 0.05)
     check_targets(scene_views.scene_data.objects, settings)
     states = read_picture_states(scene, depsgraph, sources)
-    renderer = select_renderer(settings.device, look, BAKE_CACHE)
     rendered_views = []
-    for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
-        start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
-        picture = yield from subtask(renderer.render_task(view), start, stop)
-        image_task = image_data_task(picture, as_float=settings.as_float)
-        image_data = yield from subtask(image_task, stop, stop)
-        drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
-        rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from))
+    with BandWorkers(workers) as pool:
+        renderer = select_renderer(settings.device, look, BAKE_CACHE, workers=pool)
+        for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
+            start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
+            picture = yield from subtask(renderer.render_task(view), start, stop)
+            image_task = image_data_task(picture, as_float=settings.as_float)
+            image_data = yield from subtask(image_task, stop, stop)
+            drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
+            rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.97, "applying the pictures")
     results = [
@@ -115,6 +120,7 @@ def bake(
     look: Look | None = None,
     size: tuple[int, int] | None = None,
     settings: OutputSettings | None = None,
+    workers: int = 0,
 ) -> list[BakeResult]:
     """Run `bake_task` to its end."""
     return run_to_completion(
@@ -126,5 +132,6 @@ def bake(
             look=look,
             size=size,
             settings=settings,
+            workers=workers,
         )
     )

@@ -15,7 +15,7 @@ from ..gpu.select import RENDER_DEVICES
 from ..progress import Task
 from .bake_workers import run_workers, uses_workers
 from .look import add_look_options, requested_look
-from .options import add_object_option, add_subcommand, parse_size
+from .options import add_object_option, add_subcommand, add_workers_option, parse_size
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
@@ -49,6 +49,7 @@ def add_bake_command(subparsers: Any) -> None:
         help="draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is "
         "one (auto); by default as set in the scene",
     )
+    add_workers_option(parser)
     parser.add_argument("--save", action="store_true", help="save the Blender file")
     parser.add_argument(
         "--frames",
@@ -103,6 +104,7 @@ def run_bake(options: argparse.Namespace) -> None:
         look=requested_look(options, read_look(scene.rosy)),
         size=options.size,
         settings=settings,
+        workers=options.workers,
     )
     print_warnings(warning for result in results for warning in result.warnings)
     for result in results:
@@ -144,6 +146,7 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
         look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
         size=options.size,
         settings=settings,
+        workers=options.workers,
         show=options.save,
     )
     results = _run_with_log(task)

@@ -61,6 +61,8 @@ def _forwarded_args(options: argparse.Namespace) -> list[str]:
     if options.device is not None:
         arguments.append(f"--device={options.device}")
     arguments += [f"--set={setting}" for setting in options.set]
+    # The processes for frames use all cores already.
+    arguments.append(f"--workers={options.workers or 1}")
     return arguments
 
 

@@ -96,6 +96,18 @@ def add_object_option(parser: argparse.ArgumentParser, help_text: str) -> None:
     parser.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
 
 
+def add_workers_option(parser: argparse.ArgumentParser) -> None:
+    """Add --workers."""
+    parser.add_argument(
+        "--workers",
+        type=int_between(0, 256),
+        default=0,
+        metavar="N",
+        help="number of processes that draw a large picture together; 0 is one for each core "
+        "(%(default)d). The picture is the same for any number",
+    )
+
+
 def add_subcommand(
     subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
 ) -> argparse.ArgumentParser:

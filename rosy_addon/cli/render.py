@@ -12,6 +12,7 @@ from ..color import luminance
 from ..errors import RosyError
 from ..image_io.png import read_png, write_png
 from ..progress import run_to_completion
+from ..render.band_workers import BandWorkers
 from ..render.cpu import CpuRenderer
 from ..render.mesh_view import mesh_instance, mesh_view
 from ..render.view_input import ViewInput
@@ -23,7 +24,13 @@ from .look import (
     mesh_file_look,
 )
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_subcommand, check_output, float_between, int_between
+from .options import (
+    add_subcommand,
+    add_workers_option,
+    check_output,
+    float_between,
+    int_between,
+)
 from .streams import print_line
 from .view import (
     DEFAULT_SIZE,
@@ -40,6 +47,7 @@ def add_render_command(subparsers: Any) -> None:
     add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
     add_view_options(parser, DEFAULT_SIZE)
+    add_workers_option(parser)
     add_look_options(parser)
     add_tone_options(parser)
     parser.add_argument(
@@ -70,7 +78,8 @@ def run_render(options: argparse.Namespace) -> None:
         reference_name=str(options.tone_picture),
     )
     # Only the pixels are kept, not the layers of the picture.
-    rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
+    with BandWorkers(options.workers) as pool:
+        rgba = run_to_completion(CpuRenderer(workers=pool).render_task(view)).rgba
     write_png(options.output, rgba)
 
 
@@ -94,6 +103,7 @@ def add_turntable_command(subparsers: Any) -> None:
         help="pictures per second (%(default)g)",
     )
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
+    add_workers_option(parser)
     add_look_options(parser)
     add_tone_options(parser)
 
@@ -113,15 +123,10 @@ def run_turntable(options: argparse.Namespace) -> None:
         instance, look, count, size, options.view, perspective=not options.ortho
     )
     views = _log_views(views, count)
-    task = turntable_task(
-        CpuRenderer(Cache(), keep_gbuffers=False),
-        views,
-        count,
-        options.output,
-        options.rate,
-        encode,
-    )
-    run_to_completion(task)
+    with BandWorkers(options.workers) as pool:
+        renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
+        task = turntable_task(renderer, views, count, options.output, options.rate, encode)
+        run_to_completion(task)
 
 
 def _video_encoder(path: Path) -> Encoder | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..cache import Cache
 from ..compositor.look import Look
 from ..errors import DeviceError
+from ..render.band_workers import BandWorkers
 from ..render.cpu import CpuRenderer
 from ..render.renderer import Renderer, ViewportRenderer
 from .cpu_viewport import CpuViewportRenderer
@@ -20,7 +21,12 @@ RENDER_DEVICES = {
 
 
 def select_renderer(
-    device: str, look: Look, cache: Cache | None = None, *, keep_gbuffers: bool = True
+    device: str,
+    look: Look,
+    cache: Cache | None = None,
+    *,
+    keep_gbuffers: bool = True,
+    workers: BandWorkers | None = None,
 ) -> Renderer:
     """Return the renderer that draws a look on a device.
 
@@ -34,6 +40,8 @@ def select_renderer(
     cache : Cache, optional
     keep_gbuffers : bool
         Whether the processor keeps G-buffers in the cache; see `CpuRenderer`.
+    workers : BandWorkers, optional
+        Processes that draw large pictures, if the processor does.
 
     Raises
     ------
@@ -41,7 +49,7 @@ def select_renderer(
         If the device is "gpu" and there is no graphics card, or it does not draw this look.
     """
     if device == "cpu":
-        return CpuRenderer(cache, keep_gbuffers=keep_gbuffers)
+        return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
     try:
         if look.method == "members":
             raise DeviceError(
@@ -52,7 +60,7 @@ def select_renderer(
     except DeviceError:
         if device == "gpu":
             raise
-    return CpuRenderer(cache, keep_gbuffers=keep_gbuffers)
+    return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
 
 
 def automatic_device(look: Look) -> str:

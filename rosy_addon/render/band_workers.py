@@ -18,6 +18,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from operator import is_
 from pathlib import Path
 from types import TracebackType
 
@@ -57,6 +58,11 @@ def core_count() -> int:
     return os.cpu_count() or 1
 
 
+def _are_same(first: Sequence[MeshInstance], second: Sequence[MeshInstance]) -> bool:
+    """Return whether two sequences have the same objects."""
+    return len(first) == len(second) and all(map(is_, first, second))
+
+
 class BandWorkers:
     """Processes that draw the bands of a picture side by side, this one included.
 
@@ -65,11 +71,11 @@ class BandWorkers:
     Parameters
     ----------
     count : int
-        Number of processes. With 1, no other is started.
+        Number of processes. With 1, no other is started; 0 is one for each core.
     """
 
-    def __init__(self, count: int) -> None:
-        self._count = count
+    def __init__(self, count: int = 0) -> None:
+        self._count = count or core_count()
         self._folder: Path | None = None
         self._processes: list[subprocess.Popen[bytes]] = []
         self._instances: tuple[MeshInstance, ...] = ()
@@ -192,7 +198,7 @@ class BandWorkers:
         self, view: ViewInput, jobs: Sequence[BandJob]
     ) -> list[subprocess.Popen[bytes] | None]:
         """Send a job to each process."""
-        if view.instances is not self._instances:
+        if not _are_same(view.instances, self._instances):
             self._instances = view.instances
             self._scene_count += 1
             scene = pickle.dumps(view.instances, pickle.HIGHEST_PROTOCOL)

@@ -35,9 +35,18 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         default=True,
     )
 
+    workers: bpy.props.IntProperty(
+        name="Worker Processes",
+        description="Number of processes that draw a large picture together on the processor. 0: one "
+        "for each core. The picture is the same for any number",
+        min=0,
+        max=256,
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
+        layout.prop(self, "workers")
         layout.label(text="When the first field of a scene is made")
         layout.prop(self, "live_first_field")
         layout.prop(self, "preset")
@@ -48,6 +57,12 @@ def addon_preferences(context: bpy.types.Context) -> ROSY_AP_preferences | None:
     """Return the preferences; None if RoSy does not run as an extension."""
     addon = context.preferences.addons.get(EXTENSION_ID)
     return None if addon is None else addon.preferences
+
+
+def worker_count(context: bpy.types.Context) -> int:
+    """Return the number of processes that draw a large picture; 0 is one for each core."""
+    preferences = addon_preferences(context)
+    return 0 if preferences is None else preferences.workers
 
 
 def apply_preferences(context: bpy.types.Context) -> None:

@@ -48,7 +48,7 @@ MAY_IMPORT = {
     "gpu": BASE_ROOMS | {"field", "projection", "compositor", "render", "cache"},
     "scene": BASE_ROOMS
     | {"field", "projection", "compositor", "strokes", "render", "cache", "image_io", "presets"},
-    "bake": BASE_ROOMS | {"compositor", "scene", "gpu", "cache"},
+    "bake": BASE_ROOMS | {"compositor", "render", "scene", "gpu", "cache"},
     "animation": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu", "cache"},
     "viewport": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "strokes", "scene", "cache"},

@@ -1,0 +1,70 @@
+"""Pictures at the sizes people use: presets, worker processes, and memory in bands."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import lru_cache
+
+from rosy_addon.cache import Cache
+from rosy_addon.compositor.look import is_hatched
+from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.progress import run_to_completion
+from rosy_addon.render.band_workers import BandWorkers
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.render.view_input import ViewInput
+
+from . import cases
+from .timing import Case, compare, main
+
+DEGREE, TRIANGLES = 4, 12_000
+
+#: Sizes of the pictures that workers draw, by the number of their rows.
+SIZES = {1080: (1920, 1080), 2160: (3840, 2160)}
+
+#: Presets that workers draw.
+WORKER_PRESETS = ("default", "cross-hatch")
+
+#: Keeps what does not depend on the camera.
+CACHE = Cache()
+
+
+@lru_cache
+def view(preset: str, width: int, height: int) -> ViewInput:
+    """Return the view of the ball, which covers 98 % of the picture."""
+    ball = cases.instance(TRIANGLES, DEGREE)
+    return ViewInput((ball,), cases.camera(width, height), load_preset(preset).look)
+
+
+def draw(preset: str, width: int, height: int, pool: BandWorkers | None = None) -> None:
+    """Draw a picture after the camera has moved."""
+    renderer = CpuRenderer(CACHE, keep_gbuffers=False, workers=pool)
+    run_to_completion(renderer.render_task(view(preset, width, height)))
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """Time all cases."""
+    for preset in preset_keys():
+        if is_hatched(load_preset(preset).look):
+            yield compare(
+                f"{preset} / default, 1920 x 1080 pixels",
+                lambda name=preset: draw(name, 1920, 1080),
+                lambda: draw("default", 1920, 1080),
+                target=1.4,
+                higher_is_better=False,
+                runs=runs,
+            )
+    for width, height in SIZES.values():
+        for preset in WORKER_PRESETS:
+            with BandWorkers(2) as pool:
+                yield compare(
+                    f"one process / two, {preset}, {width} x {height} pixels",
+                    lambda name=preset, size=(width, height): draw(name, *size),
+                    lambda name=preset, size=(width, height), pool=pool: draw(name, *size, pool),
+                    target=1.75,
+                    runs=runs,
+                )
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

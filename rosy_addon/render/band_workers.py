@@ -47,6 +47,9 @@ importlib.import_module(package + ".render.band_worker").main(folder)
 #: Environment of the workers. Each has one core.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
+#: Number of pixels of a band, at most, if a picture can be divided so far. Bounds the memory.
+MAX_BAND_PIXELS = 1 << 23
+
 #: Label of the progress while other processes still draw.
 WAITING_LABEL = "waiting for the other processes"
 
@@ -106,13 +109,20 @@ class BandWorkers:
             shutil.rmtree(self._folder, ignore_errors=True)
         self._folder, self._instances = None, ()
 
+    @property
+    def count(self) -> int:
+        """Number of bands that are drawn at a time."""
+        return self._count
+
     def divide(self, view: ViewInput) -> list[tuple[int, int]]:
         """Return the rows of the bands in which a picture is drawn; see `divide_rows`."""
-        return divide_rows(view.look, view.shaded_camera, view.instances, self._count)
+        camera = view.shaded_camera
+        bands_of_each = -(-camera.width * camera.height // (MAX_BAND_PIXELS * self._count))
+        return divide_rows(view.look, camera, view.instances, self._count * bands_of_each)
 
     def draw_task(
         self, view: ViewInput, rows: Sequence[tuple[int, int]], cache: Cache | None = None
-    ) -> Task[np.ndarray]:
+    ) -> Task[np.ndarray | None]:
         """Draw a picture in bands. If the task is closed, the processes end.
 
         Parameters
@@ -126,7 +136,7 @@ class BandWorkers:
         Returns
         -------
         (H, W, 4) float32 ndarray
-            Linear RGBA, not premultiplied.
+            Linear RGBA, not premultiplied. None if the files cannot be written.
 
         Raises
         ------
@@ -135,6 +145,9 @@ class BandWorkers:
         """
         try:
             return (yield from self._draw_task(view, rows, cache))
+        except OSError:
+            self.close()
+            return None
         except BaseException:
             self.close()
             raise
@@ -146,37 +159,54 @@ class BandWorkers:
         context = context_rows(view.look, camera, view.instances)
         self._picture_count += 1
         jobs = [BandJob(self._picture_count, *entry, context) for entry in enumerate(rows)]
-        self._start(len(rows) - 1)
+        rgba = np.zeros((camera.height, camera.width, 4), dtype=np.float32)
+        is_visible = False
+        for first in range(0, len(jobs), self._count):
+            start, stop = first / len(jobs), min(first + self._count, len(jobs)) / len(jobs)
+            task = self._draw_together_task(view, jobs[first : first + self._count], cache)
+            for job, band in (yield from subtask(task, start, stop)):
+                if len(band):
+                    rgba[slice(*job.rows)] = band
+                    is_visible = True
+        if not is_visible:
+            raise_nothing_in_view(view.instances, camera)
+        for path in self._folder.glob(f"{self._picture_count}-*"):
+            path.unlink()
+        return rgba
+
+    def _draw_together_task(
+        self, view: ViewInput, jobs: Sequence[BandJob], cache: Cache | None
+    ) -> Task[list[tuple[BandJob, np.ndarray]]]:
+        """Draw the first band here and each other one in a process of its own."""
+        self._start(len(jobs) - 1)
         folder = self._folder
         processes = self._send(view, jobs[1:])
         task = draw_band_task(view, jobs[0], FileExchange(folder, jobs[0]), cache)
-        bands = [(yield from subtask(task, 0.0, 0.95))]
+        bands = [(jobs[0], (yield from subtask(task, 0.0, 0.95)))]
         for job, process in zip(jobs[1:], processes, strict=True):
             path = result_path(folder, job)
             while process is not None and not path.exists() and process.poll() is None:
                 yield Progress(0.95, WAITING_LABEL)
                 time.sleep(POLL_SECONDS)
             if path.exists():
-                bands.append(np.load(path))
+                bands.append((job, np.load(path)))
+                path.unlink()
             else:
                 task = draw_band_task(view, job, FileExchange(folder, job), cache)
-                bands.append((yield from subtask(task, 0.95, 1.0)))
-        if not any(len(band) for band in bands):
-            raise_nothing_in_view(view.instances, camera)
-        rgba = np.zeros((camera.height, camera.width, 4), dtype=np.float32)
-        for job, band in zip(jobs, bands, strict=True):
-            if len(band):
-                rgba[slice(*job.rows)] = band
-        for path in folder.glob(f"{self._picture_count}-*"):
-            path.unlink()
-        return rgba
+                bands.append((job, (yield from subtask(task, 0.95, 1.0))))
+        return bands
 
     def _start(self, count: int) -> None:
-        """Make the folder, and start processes until there are so many that run."""
+        """Make the folder, and start processes until so many run."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="rosy-"))
         package = __package__.rpartition(".")[0]
-        arguments = [sys.path, package, str(Path(__file__).parents[1]), str(self._folder)]
+        arguments = [
+            list(map(str, sys.path)),
+            package,
+            str(Path(__file__).parents[1]),
+            str(self._folder),
+        ]
         command = [sys.executable, "-I", "-S", "-c", WORKER_PROGRAM, json.dumps(arguments)]
         self._processes = [process for process in self._processes if process.poll() is None]
         # An embedded Python may name another program.
@@ -189,6 +219,8 @@ class BandWorkers:
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,
                     env=os.environ | ENVIRONMENT,
+                    # No console in Windows.
+                    creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
                 )
             except OSError:
                 return

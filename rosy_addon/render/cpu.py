@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from ..cache import Cache
 from ..compositor.compose import compose_task
 from ..compositor.picture import Picture
@@ -50,19 +52,28 @@ class CpuRenderer:
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
-        self._check_memory(view)
-        rows = [] if self._workers is None else self._workers.divide(view)
+        rows = self._checked_bands(view)
         if len(rows) > 1:
-            return Picture((yield from self._workers.draw_task(view, rows, self._cache)), ())
+            rgba = yield from self._workers.draw_task(view, rows, self._cache)
+            if rgba is not None:
+                return Picture(rgba, ())
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(
             gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache, self._cache
         )
         return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
 
-    def _check_memory(self, view: ViewInput) -> None:
-        """Check that there is enough memory, if need be after the cache has given back its own."""
+    def _checked_bands(self, view: ViewInput) -> list[tuple[int, int]]:
+        """Return the rows of the bands that the workers draw, for which there is enough memory.
+
+        If need be, the cache gives back its own, or a single process draws the picture.
+        """
         check_instances(view.instances, view.sample_camera, view.look.display)
+        if self._workers is not None:
+            rows = self._workers.divide(view)
+            with suppress(RosyError):
+                check_picture_memory(view, rows, self._workers.count)
+                return rows
         try:
             check_picture_memory(view)
         except RosyError:
@@ -70,6 +81,7 @@ class CpuRenderer:
                 raise
             self._cache.clear()
             check_picture_memory(view)
+        return []
 
     def _gbuffer_task(self, view: ViewInput) -> Task[GBuffer]:
         """Return the G-buffer from the cache, or project the meshes."""

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..compositor.band_division import context_rows
 from ..compositor.even_lines import has_even_lines
 from ..compositor.fast_lic import (
     BATCH_SIZE,
@@ -86,6 +87,9 @@ SHADOW_MAP_BYTES = 110_000_000
 #: Bytes of a pixel of a finished picture, and while it is written to a file.
 PICTURE_BYTES, WRITING_BYTES = 16, 6
 
+#: Bytes of a process that draws a band, before it begins.
+PROCESS_BYTES = 60_000_000
+
 #: Fraction of the memory of arrays below `MMAP_THRESHOLD_BYTES` that the C library keeps for later
 #: arrays after they are freed.
 KEPT_FRACTION = 0.85
@@ -107,10 +111,20 @@ class Coverage(NamedTuple):
     rows: float = 1.0
 
 
-def check_picture_memory(view: ViewInput) -> None:
+def check_picture_memory(
+    view: ViewInput, rows: Sequence[tuple[int, int]] = (), together: int = 1
+) -> None:
     """Check that a picture can take the memory that it needs.
 
     The visible pixels are counted only if a picture full of them would need more than there is.
+
+    Parameters
+    ----------
+    view : ViewInput
+    rows : sequence of (int, int)
+        Of the bands in which it is drawn, if there are several.
+    together : int
+        Bands that are drawn at a time, each in a process.
 
     Raises
     ------
@@ -118,12 +132,12 @@ def check_picture_memory(view: ViewInput) -> None:
         If it needs more than `available_memory`.
     """
     free = available_memory()
-    if free is None or picture_memory(view, Coverage()) <= free:
+    if free is None or bands_memory(view, Coverage(), rows, together) <= free:
         return
     camera, samples = view.camera, view.look.supersampling
     each = f" with {samples} x {samples} samples each" if samples > 1 else ""
     check_memory(
-        picture_memory(view, view_coverage(view)),
+        bands_memory(view, view_coverage(view), rows, together),
         f"a picture of {camera.width} x {camera.height} pixels{each}",
         "choose a smaller size" + (", or less supersampling" if samples > 1 else ""),
     )
@@ -146,6 +160,33 @@ def view_coverage(view: ViewInput) -> Coverage:
         (int(column.max() - column.min()) + 1) / width,
         (int(row[-1] - row[0]) + 1) / height,
     )
+
+
+def bands_memory(
+    view: ViewInput, coverage: Coverage, rows: Sequence[tuple[int, int]], together: int
+) -> int:
+    """Estimate the memory that all processes together take for a picture.
+
+    Parameters
+    ----------
+    view, coverage
+        As for `picture_memory`.
+    rows, together
+        As for `check_picture_memory`.
+    """
+    if len(rows) < 2:
+        return picture_memory(view, coverage)
+    camera = view.camera
+    context = context_rows(view.look, camera, view.instances)
+    height = min(max(stop - start for start, stop in rows) + 2 * context, camera.height)
+    visible = min(coverage.visible * camera.height / height, coverage.columns)
+    band = picture_memory(
+        replace(view, camera=replace(camera, height=height)),
+        Coverage(visible, coverage.columns, 1.0),
+    )
+    together = min(together, len(rows))
+    picture = PICTURE_BYTES * camera.width * camera.height
+    return together * band + (together - 1) * PROCESS_BYTES + picture
 
 
 def picture_memory(view: ViewInput, coverage: Coverage) -> int:

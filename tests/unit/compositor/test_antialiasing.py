@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from conftest import long, mainly
 from shapes import icosphere, torus
 
 from rosy_addon.compositor import outline
@@ -52,8 +54,10 @@ def luminance(rgba, where):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LOOKS)
-@pytest.mark.parametrize("degree", [3, 4])
+@pytest.mark.parametrize(
+    ("degree", "name"),
+    mainly([(4, "default"), (3, "tapered, on the surface")], product([3, 4], LOOKS)),
+)
 def test_streaks_are_those_of_many_samples(name, degree):
     """Nearer to them than without samples, of the same contrast, and with the same silhouettes."""
     instance, look = torus_instance(degree), LOOKS[name]
@@ -69,7 +73,7 @@ def test_streaks_are_those_of_many_samples(name, degree):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("preset", ["cross-hatch", "pencil", "woodcut"])
+@pytest.mark.parametrize("preset", ["cross-hatch", "pencil", *long("woodcut")])
 def test_hatching_is_that_of_many_samples(preset):
     """Nearer to it than without samples, of the same tone and contrast.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import long
 from shapes import cylinder, from_quads, grid_of_quads, icosphere, torus
 
 from rosy_addon.field.generate import axis_field
@@ -76,7 +77,7 @@ def closed_cylinder(columns):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("view", [(-26, 8), (40, 30), (100, -15)])
+@pytest.mark.parametrize("view", [(-26, 8), *long(((40, 30),), ((100, -15),))])
 @pytest.mark.parametrize(
     ("coarse", "dense"),
     [

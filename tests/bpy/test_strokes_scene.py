@@ -398,7 +398,7 @@ def test_cancelling_leaves_nothing(monkey, camera, scene):
         ),
         ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
         ("", {"style": StrokeStyle(spacing=1e4)}, "no stroke fits"),
-        ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "increase the spacing"),
+        ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "increase their distance"),
     ],
 )
 def test_wrong_input_is_one_line_and_changes_nothing(

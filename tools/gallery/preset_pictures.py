@@ -12,7 +12,7 @@ from .sheet import display
 
 #: Sizes of the palettes of pictures with few hues, and with noise of many. They are not visible
 #: at the size of previews, and reduce the files to a third.
-TONES, COLORS = 32, 256
+TONES, COLORS = 32, 96
 
 
 def write() -> None:

@@ -18,7 +18,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
-from window_steps import SHOTS, in_view, rosy, run_steps, view, wait_until
+from window_steps import SHOTS, in_view, preferences, rosy, run_steps, view, wait_until
 
 # Helpers of the steps
 
@@ -296,6 +296,36 @@ def press_escape():
 
 def stop_with_escape():
     yield from check_interruption(press_escape, screenshot="baking")
+
+
+def workers_stopped_with_escape():
+    """The processes that draw a large picture together end, and their files are removed."""
+    module = rosy("rosy_addon.render.band_workers")
+    draw_together, started = module.BandWorkers._draw_together_task, []
+
+    def noted(pool, view, jobs, cache):
+        task = draw_together(pool, view, jobs, cache)
+        next(task)
+        started.append((pool._folder, list(pool._processes)))
+        return (yield from task)
+
+    def start():
+        scene = bpy.context.scene
+        scene.rosy.look.method = "sheets"
+        scene.rosy.look.supersampling = 2
+        scene.render.resolution_x, scene.render.resolution_y = 1920, 1080
+        preferences().workers = 2
+        yield from start_bake()
+
+    module.BandWorkers._draw_together_task = noted
+    try:
+        yield from check_interruption(press_escape, start)
+    finally:
+        module.BandWorkers._draw_together_task = draw_together
+        preferences().workers = 0
+    ((folder, processes),) = started
+    assert processes and all(process.poll() is not None for process in processes)
+    assert not folder.exists()
 
 
 def strokes_stopped_with_escape():
@@ -661,6 +691,7 @@ run_steps(
     eevee_shows_the_picture,
     undo_after_bake,
     stop_with_escape,
+    workers_stopped_with_escape,
     strokes_stopped_with_escape,
     field_stopped_with_escape,
     import_stopped_with_escape,

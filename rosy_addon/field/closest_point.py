@@ -136,8 +136,13 @@ class _TriangleGrid:
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) int64 cells of points; the nearest cell for points outside of the grid."""
-        cell = np.floor((points - self.origin) / self.cell_size).astype(np.int64)
-        return np.clip(cell, 0, self.shape - 1)
+        return np.clip(np.floor(self._in_cells(points)), 0, self.shape - 1).astype(np.int64)
+
+    def _in_cells(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) positions of points in cells; those far outside of the grid are moved beside it."""
+        margin = self.cell_size
+        points = np.clip(points, self.origin - margin, self.top + margin)
+        return (points - self.origin) / self.cell_size
 
     def _keys_of(self, cell: np.ndarray) -> np.ndarray:
         """(n,) int64: (n, 3) cells as single numbers, to sort by."""
@@ -145,7 +150,7 @@ class _TriangleGrid:
 
     def distance_to_cell_border(self, points: np.ndarray) -> np.ndarray:
         """(n,) distances of points from the border of their cell; 0 outside of the grid."""
-        fraction = (points - self.origin) / self.cell_size - self._cells_of(points)
+        fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
 
     def search_ring_task(

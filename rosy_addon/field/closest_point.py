@@ -196,9 +196,10 @@ class _TriangleGrid:
 
     def _cell_distances(self, points: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """(n k,) distances of n points from the k cells at the given offsets from their own."""
-        fraction = ((points - self.origin) / self.cell_size - self._cells_of(points))[:, None]
-        gap = np.maximum(np.maximum(offset - fraction, fraction - offset - 1), 0)
-        return np.sqrt(dot(gap, gap)).ravel() * self.cell_size
+        size = self.cell_size
+        position = (points - self.origin - self._cells_of(points) * size)[:, None]
+        gap = np.maximum(np.maximum(offset * size - position, position - (offset + 1) * size), 0)
+        return np.sqrt(dot(gap, gap)).ravel()
 
     def update_closest(
         self,

@@ -27,6 +27,7 @@ SCRIPTS = (
     "stages",
     "planar_rlic",
     "surface_vtk",
+    "two_cores_vtk",
     "large",
     "gpu_vtk",
     "again",

@@ -167,10 +167,17 @@ def machine() -> str:
 
 def use_one_core() -> None:
     """Limit this process to one core, so that the threads of libraries have no advantage."""
+    use_cores(1)
+
+
+def use_cores(count: int) -> None:
+    """Limit this process, and those that it starts, to a number of cores."""
     if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        os.sched_setaffinity(0, set(sorted(os.sched_getaffinity(0))[:count]))
     else:
-        print("this system cannot limit a process to one core: peers may use more", file=sys.stderr)
+        print(
+            "this system cannot limit a process to some cores: peers may use more", file=sys.stderr
+        )
 
 
 def _processor() -> str:

@@ -69,7 +69,10 @@ def divide_rows(
 def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> int:
     """Return how many rows around a band the pixels in it may depend on."""
     look = look_in_pixels(replace(look, supersampling=1), camera, instances)
-    noise = int(np.ceil(3 * BLUR_FACTOR * look.high_pass)) + int(np.ceil(look.grain))
+    noise = 0
+    if look.anchor == "surface":
+        # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
+        noise = int(np.ceil(3 * BLUR_FACTOR * look.high_pass)) + int(np.ceil(look.grain))
     disc = int(np.abs(disc_offsets(look.grain)).max())
     rows = max(_longest_margin(look) + OVERLAP_ROWS, disc) + noise
     if has_outline(look):

@@ -1,0 +1,60 @@
+"""Time of a frame of a cross field relative to one vector field by VTK, each on two cores.
+
+As in `surface_vtk`, but RoSy draws with two processes, and VTK's driver with two threads.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from rosy_addon.progress import run_to_completion
+from rosy_addon.render.band_workers import BandWorkers
+from rosy_addon.render.cpu import CpuRenderer
+from rosy_addon.render.view_input import ViewInput
+
+from . import cases
+from .surface_vtk import AZIMUTH_STEP, DEGREE, LARGE_SIZE, LOOK, SAMPLES_LABEL, vtk_renderer
+from .timing import Case, compare, main, use_cores
+
+TRIANGLES, SAMPLES, CORES = 12_000, 2, 2
+
+
+def measure(runs: int) -> Iterator[Case]:
+    """Time the large frame."""
+    use_cores(CORES)
+    # Set before the library is loaded: llvmpipe counts the cores of the machine, not of the process.
+    os.environ["LP_NUM_THREADS"] = str(CORES)
+    try:
+        import vtk
+    except ImportError:
+        print("two cores of VTK: skipped, because vtk is not installed", file=sys.stderr)
+        return
+    draw_next, read_pixels, name = vtk_renderer(vtk, TRIANGLES, LARGE_SIZE)
+    print(name, flush=True)
+    look = replace(LOOK, supersampling=SAMPLES)
+    instances = (cases.instance(TRIANGLES, DEGREE),)
+    azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
+    with BandWorkers(CORES) as pool:
+        renderer = CpuRenderer(cases.CORNER_FIELDS, keep_gbuffers=False, workers=pool)
+
+        def draw() -> None:
+            camera = cases.camera(LARGE_SIZE, azimuth=next(azimuths))
+            run_to_completion(renderer.render_task(ViewInput(instances, camera, look)))
+
+        yield compare(
+            f"N = 4{SAMPLES_LABEL[SAMPLES]} / VTK's one vector field, frame, two cores each",
+            draw,
+            lambda: (draw_next(), read_pixels()),
+            target=0.8,
+            higher_is_better=False,
+            runs=runs,
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, measure))

@@ -20,6 +20,7 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -57,21 +58,22 @@ def write() -> None:
         _surface_row(ring, around_field(ring, 4), (24, 44), "A torus, N = 4"),
     ]
     save(sheet(rows), IMAGES / "performance-surfaces.png")
-    _samples()
+    _samples(LOOK, "performance-samples.png")
+    _samples(load_preset("cross-hatch").look, "performance-hatching.png")
 
 
-def _samples() -> None:
+def _samples(look: Look, name: str) -> None:
     """Draw and save pictures with one and four samples a pixel, at 100 % and at 400 %."""
     ring = torus()
     instance = MeshInstance(ring, np.eye(4), around_field(ring, 4))
     camera = orbit_camera(ring, 24, 44, SAMPLED_SIDE, SAMPLED_SIDE)
     pictures = {}
     for label, samples in (("one sample", 1), ("2 x 2 samples", 2)):
-        look = replace(LOOK, supersampling=samples)
-        task = CpuRenderer().render_task(ViewInput((instance,), camera, look))
+        sampled = replace(look, supersampling=samples)
+        task = CpuRenderer().render_task(ViewInput((instance,), camera, sampled))
         pictures[label] = display(run_to_completion(task).rgba)
     gbuffer = project([instance], camera.scaled(4))
-    every_sample = compose(gbuffer, replace(LOOK, supersampling=4))
+    every_sample = compose(gbuffer, replace(look, supersampling=4))
     pictures["streaks at each of 4 x 4 samples"] = display(every_sample.rgba)
     part = SAMPLED_SIDE // 4
     top, left = round(0.12 * SAMPLED_SIDE), round(0.6 * SAMPLED_SIDE)
@@ -83,7 +85,7 @@ def _samples() -> None:
             for picture in pictures.values()
         ],
     ]
-    save(sheet(rows), IMAGES / "performance-samples.png")
+    save(sheet(rows), IMAGES / name)
 
 
 def write_others(folder: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import Task
 
 #: Rows beyond those of a band whose pixels may show a sample of them.
 BORDER_ROWS = 1
@@ -29,22 +29,6 @@ class BandExchange(Protocol):
 
     def get_task(self, key: Hashable) -> Task[np.ndarray | None]:
         """Wait for an array of the band below, and return it; None if that band ends without it."""
-
-
-class LocalExchange:
-    """A `BandExchange` of bands that are drawn one after the other, from the bottom."""
-
-    def __init__(self) -> None:
-        self._values: dict[Hashable, np.ndarray] = {}
-
-    def put(self, key: Hashable, values: np.ndarray) -> None:
-        """Store an array for the band above."""
-        self._values[key] = values
-
-    def get_task(self, key: Hashable) -> Task[np.ndarray | None]:
-        """Return an array of the band below, or None."""
-        yield Progress(1.0, "tracing streamlines")
-        return self._values.pop(key, None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,18 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .even_lines import has_even_lines
 from .fast_lic import OVERLAP_ROWS, streamline_margin, strip_count
-from .hatching import has_breaks, has_outline, has_overshoot, is_shaded_by_pixel
+from .hatching import (
+    has_breaks,
+    has_outline,
+    has_overshoot,
+    has_paper_grain,
+    is_shaded_by_pixel,
+)
 from .image_noise import BLUR_FACTOR, MAX_MARGIN
 from .look import Look, colors_magnitude
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
+from .paper_grain import surface_paper_grain_args
 from .streak_statistics import break_steps
 from .undirected import disc_offsets
 
@@ -75,6 +82,9 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
         noise = int(np.ceil(3 * BLUR_FACTOR * look.high_pass)) + int(np.ceil(look.grain))
     disc = int(np.abs(disc_offsets(look.grain)).max())
     rows = max(_longest_margin(look) + OVERLAP_ROWS, disc) + noise
+    if has_paper_grain(look) and look.anchor == "surface":
+        high_pass = surface_paper_grain_args(look)["high_pass"]
+        rows = max(rows, int(np.ceil(3 * BLUR_FACTOR * high_pass)))
     if has_outline(look):
         rows = max(rows, int(np.ceil(look.outline)) + 1 + FULL_MARK_LENGTH)
     return rows + NEIGHBOR_ROWS

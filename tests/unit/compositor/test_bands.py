@@ -9,13 +9,13 @@ import pytest
 from shapes import icosphere, torus
 
 from rosy_addon.compositor import fast_lic
-from rosy_addon.compositor.band import Band, LocalExchange
+from rosy_addon.compositor.band import Band
 from rosy_addon.compositor.band_division import context_rows, divide_rows
 from rosy_addon.compositor.compose import compose, compose_task
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import Progress, run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project, project_task
@@ -32,6 +32,20 @@ def _many_strips(monkeypatch):
     monkeypatch.setattr(fast_lic, "MIN_STRIP_MARGINS", 1)
 
 
+class OneAfterTheOther:
+    """The exchange of bands that are drawn from the bottom, in one process."""
+
+    def __init__(self):
+        self.values = {}
+
+    def put(self, key, values):
+        self.values[key] = values
+
+    def get_task(self, key):
+        yield Progress(1.0, "")
+        return self.values.pop(key, None)
+
+
 def instances() -> tuple[MeshInstance, ...]:
     """A torus with a field of degree 4, and a ball with one of degree 3 in front of a part of it."""
     ring, ball = torus(30, 15), icosphere(3)
@@ -45,7 +59,7 @@ def instances() -> tuple[MeshInstance, ...]:
 
 def drawn(view: ViewInput, rows: list[tuple[int, int]], context: int) -> np.ndarray:
     """Draw bands from the bottom, and put them together."""
-    exchange, parts = LocalExchange(), []
+    exchange, parts = OneAfterTheOther(), []
     samples = view.samples_per_side
     for start, stop in rows:
         band = Band(start, stop, context, exchange)
@@ -63,6 +77,9 @@ LOOKS = {
     "cross-hatch": replace(load_preset("cross-hatch").look, length=14, overshoot=4.0),
     "pencil": replace(load_preset("pencil").look, length=14, overshoot=4.0),
     "wide grain": Look(length=14, grain=4.0, high_pass=40.0, ink="hatch", outline=3.0),
+    "wide paper grain": Look(
+        length=6, grain=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
+    ),
     "magnitude": Look(length=14, magnitude="both", magnitude_range=1.0),
 }
 

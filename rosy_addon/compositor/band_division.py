@@ -67,7 +67,8 @@ def divide_rows(
     ):
         return [(0, height)]
     look = look_in_pixels(replace(look, supersampling=1), camera, instances)
-    lines = max(FieldSymmetry(field.degree, ()).line_count for field in fields)
+    # Fields with more lines have more strips, at the borders of these and between them.
+    lines = min(FieldSymmetry(field.degree, ()).line_count for field in fields)
     strips = strip_count(camera.width, height, lines, _longest_margin(look))
     borders = [height * (strips * band // count) // strips for band in range(count + 1)]
     return [(start, stop) for start, stop in pairwise(borders) if start < stop]

@@ -28,7 +28,7 @@ CAMERA = perspective_camera(look_at((0.4, -6.0, 3.0), (0, 0, 0.5)), WIDTH, HEIGH
 @pytest.fixture(autouse=True)
 def _many_strips(monkeypatch):
     """Small pictures have strips, too."""
-    monkeypatch.setattr(fast_lic, "STRIP_STATES", 1 << 10)
+    monkeypatch.setattr(fast_lic, "STRIP_STATES", 1 << 14)
     monkeypatch.setattr(fast_lic, "MIN_STRIP_MARGINS", 1)
 
 
@@ -47,13 +47,13 @@ class OneAfterTheOther:
 
 
 def instances() -> tuple[MeshInstance, ...]:
-    """A torus with a field of degree 4, and a ball with one of degree 3 in front of a part of it."""
+    """A torus with a field of degree 4, and in front a ball with one of degree 7: with more strips."""
     ring, ball = torus(30, 15), icosphere(3)
     moved = np.eye(4)
     moved[:3, 3] = 0.2, -0.5, 1.0
     return (
         MeshInstance(ring, np.eye(4), axis_field(ring, 4, (0, 0, 1))),
-        MeshInstance(ball, moved, generate(ball, "smoothest", 3)),
+        MeshInstance(ball, moved, generate(ball, "smoothest", 7)),
     )
 
 
@@ -109,3 +109,12 @@ def test_bands_are_parts_of_the_picture(name, samples):
 )
 def test_pictures_that_depend_on_all_pixels_are_not_divided(look):
     assert divide_rows(look, CAMERA, instances(), 2) == [(0, HEIGHT)]
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 8])
+def test_bands_end_where_strips_of_all_fields_do(count):
+    look = Look(length=14)
+    rows = divide_rows(look, CAMERA, instances(), count)
+    for lines in (2, 7):
+        strips = fast_lic.strip_count(WIDTH, HEIGHT, lines, fast_lic.streamline_margin(look))
+        assert {start for start, _ in rows} <= {HEIGHT * k // strips for k in range(strips)}

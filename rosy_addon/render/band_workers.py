@@ -47,8 +47,9 @@ importlib.import_module(package + ".render.band_worker").main(folder)
 #: Environment of the workers. Each has one core.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
-#: Number of pixels of a band, at most, if a picture can be divided so far. Bounds the memory.
-MAX_BAND_PIXELS = 1 << 23
+#: Number of pixels that a process draws at a time, at most, if a picture can be divided so far. Bounds
+#: the memory.
+MAX_PIXELS_AT_A_TIME = 1 << 23
 
 #: Label of the progress while other processes still draw.
 WAITING_LABEL = "waiting for the other processes"
@@ -75,10 +76,15 @@ class BandWorkers:
     ----------
     count : int
         Number of processes. With 1, no other is started; 0 is one for each core.
+
+    Attributes
+    ----------
+    count : int
+        Number of bands that are drawn at a time.
     """
 
     def __init__(self, count: int = 0) -> None:
-        self._count = count or core_count()
+        self.count = count or core_count()
         self._folder: Path | None = None
         self._processes: list[subprocess.Popen[bytes]] = []
         self._instances: tuple[MeshInstance, ...] = ()
@@ -109,16 +115,11 @@ class BandWorkers:
             shutil.rmtree(self._folder, ignore_errors=True)
         self._folder, self._instances = None, ()
 
-    @property
-    def count(self) -> int:
-        """Number of bands that are drawn at a time."""
-        return self._count
-
     def divide(self, view: ViewInput) -> list[tuple[int, int]]:
         """Return the rows of the bands in which a picture is drawn; see `divide_rows`."""
         camera = view.shaded_camera
-        bands_of_each = -(-camera.width * camera.height // (MAX_BAND_PIXELS * self._count))
-        return divide_rows(view.look, camera, view.instances, self._count * bands_of_each)
+        bands_of_each = -(-camera.width * camera.height // (MAX_PIXELS_AT_A_TIME * self.count))
+        return divide_rows(view.look, camera, view.instances, self.count * bands_of_each)
 
     def draw_task(
         self, view: ViewInput, rows: Sequence[tuple[int, int]], cache: Cache | None = None
@@ -161,9 +162,9 @@ class BandWorkers:
         jobs = [BandJob(self._picture_count, *entry, context) for entry in enumerate(rows)]
         rgba = np.zeros((camera.height, camera.width, 4), dtype=np.float32)
         is_visible = False
-        for first in range(0, len(jobs), self._count):
-            start, stop = first / len(jobs), min(first + self._count, len(jobs)) / len(jobs)
-            task = self._draw_together_task(view, jobs[first : first + self._count], cache)
+        for first in range(0, len(jobs), self.count):
+            start, stop = first / len(jobs), min(first + self.count, len(jobs)) / len(jobs)
+            task = self._draw_together_task(view, jobs[first : first + self.count], cache)
             for job, band in (yield from subtask(task, start, stop)):
                 if len(band):
                     rgba[slice(*job.rows)] = band
@@ -226,22 +227,28 @@ class BandWorkers:
                 return
             self._processes.append(process)
 
+    @property
+    def _scene_path(self) -> Path:
+        """The file of the mesh instances of the current picture."""
+        return self._folder / f"scene-{self._scene_count}"
+
     def _send(
         self, view: ViewInput, jobs: Sequence[BandJob]
     ) -> list[subprocess.Popen[bytes] | None]:
         """Send a job to each process."""
         if not _are_same(view.instances, self._instances):
+            # No process needs the meshes of the pictures before.
+            self._scene_path.unlink(missing_ok=True)
             self._instances = view.instances
             self._scene_count += 1
-            scene = pickle.dumps(view.instances, pickle.HIGHEST_PROTOCOL)
-            (self._folder / f"scene-{self._scene_count}").write_bytes(scene)
+            self._scene_path.write_bytes(pickle.dumps(view.instances, pickle.HIGHEST_PROTOCOL))
         rest = replace(view, instances=())
         for process, job in zip(self._processes, jobs, strict=False):
             name = f"{job.picture}-{job.index}-job"
             (self._folder / name).write_bytes(pickle.dumps((rest, job), pickle.HIGHEST_PROTOCOL))
             # A process that has ended is noticed later.
             with suppress(OSError):
-                process.stdin.write(f"scene-{self._scene_count} {name}\n".encode())
+                process.stdin.write(f"{self._scene_path.name} {name}\n".encode())
                 process.stdin.flush()
         missing = len(jobs) - len(self._processes)
         return [*self._processes[: len(jobs)], *[None] * missing]

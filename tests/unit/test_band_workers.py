@@ -73,6 +73,9 @@ def test_processes_draw_one_picture_after_the_other(expected):
         assert drawn(other, workers).tobytes() == drawn(other).tobytes()
         assert drawn(VIEW, workers).tobytes() == expected.tobytes()
         assert workers._processes == processes
+        moved = replace(VIEW.instances[0], matrix=np.diag([1.1, 1.1, 1.1, 1.0]))
+        drawn(replace(VIEW, instances=(moved,)), workers)
+        assert len(list(workers._folder.iterdir())) == 1
 
 
 @pytest.mark.slow

@@ -53,9 +53,15 @@ class Band:
         """Return the rows of the G-buffer, for a frame of this height."""
         return max(self.start - self.context, 0), min(self.stop + self.context, height)
 
-    def drawn(self, pixel: np.ndarray, width: int) -> slice:
-        """Return the range of ascending flat pixels that get colors: of the band and its border."""
-        first_pixels = np.array(
-            [max(self.start - BORDER_ROWS, 0) * width, (self.stop + BORDER_ROWS) * width]
-        )
-        return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+
+def drawn_pixels(band: Band | None, pixel: np.ndarray, width: int) -> slice:
+    """Return the range of ascending flat pixels that get colors.
+
+    They are those of a band and of its border, or all if there is no band.
+    """
+    if band is None:
+        return slice(0, len(pixel))
+    first_pixels = np.array(
+        [max(band.start - BORDER_ROWS, 0) * width, (band.stop + BORDER_ROWS) * width]
+    )
+    return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())

@@ -19,8 +19,9 @@ from .hatching import (
     has_overshoot,
     has_paper_grain,
     is_shaded_by_pixel,
+    overshoot_steps,
 )
-from .image_noise import BLUR_FACTOR, MAX_MARGIN
+from .image_noise import MAX_MARGIN, high_pass_margin
 from .look import Look, colors_magnitude
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
@@ -62,7 +63,7 @@ def divide_rows(
         or not (is_shaded_by_pixel(look) or look.supersampling == 1)
         or has_even_lines(look)
         or (depends_on_all and not look.magnitude_range)
-        or BLUR_FACTOR * look.high_pass * 3 > MAX_MARGIN
+        or high_pass_margin(look.high_pass) > MAX_MARGIN
         or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)
     ):
         return [(0, height)]
@@ -80,12 +81,11 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
     noise = 0
     if look.anchor == "surface":
         # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
-        noise = int(np.ceil(3 * BLUR_FACTOR * look.high_pass)) + int(np.ceil(look.grain))
+        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.grain))
     disc = int(np.abs(disc_offsets(look.grain)).max())
     rows = max(_longest_margin(look) + OVERLAP_ROWS, disc) + noise
     if has_paper_grain(look) and look.anchor == "surface":
-        high_pass = surface_paper_grain_args(look)["high_pass"]
-        rows = max(rows, int(np.ceil(3 * BLUR_FACTOR * high_pass)))
+        rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))
     if has_outline(look):
         rows = max(rows, int(np.ceil(look.outline)) + 1 + FULL_MARK_LENGTH)
     return rows + NEIGHBOR_ROWS
@@ -97,5 +97,5 @@ def _longest_margin(look: Look) -> int:
     if has_breaks(look):
         lengths.append(break_steps(look))
     if has_overshoot(look):
-        lengths.append(round(look.overshoot / look.step))
-    return max(streamline_margin(replace(look, length=max(length, 1))) for length in lengths)
+        lengths.append(overshoot_steps(look))
+    return streamline_margin(replace(look, length=max(lengths)))

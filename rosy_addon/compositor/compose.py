@@ -23,6 +23,7 @@ from .hatching import (
     has_outline,
     has_overshoot,
     has_paper_grain,
+    overshoot_steps,
     render_hatching,
 )
 from .image_noise import NOISE_MEAN
@@ -257,7 +258,7 @@ def _tone_along_lines_task(
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
-    overshoot_look = replace(look, length=max(round(look.overshoot / look.step), 1), taper=False)
+    overshoot_look = replace(look, length=overshoot_steps(look), taper=False)
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.

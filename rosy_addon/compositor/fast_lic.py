@@ -19,7 +19,7 @@ import numpy as np
 
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
-from .band import BORDER_ROWS, Band
+from .band import BORDER_ROWS, Band, drawn_pixels
 from .contrast import normalize_variance
 from .covering import (
     ALL_NEIGHBORS,
@@ -104,7 +104,7 @@ def fast_lic_task(
     Returns
     -------
     LicImages
-        At the pixels ``band.drawn(field.pixel, field.width)``, by default all.
+        At the `drawn_pixels` of the band.
     """
     (images,) = yield from fast_lic_lengths_task(field, [look], noise, band, name)
     return images
@@ -134,7 +134,7 @@ def fast_lic_lengths_task(
     step_limits = []
     for look in looks:
         step_limits.append((yield from subtask(step_limits_task(field, look), 0.0, 0.0)))
-    drawn = slice(0, len(field.pixel)) if band is None else band.drawn(field.pixel, field.width)
+    drawn = drawn_pixels(band, field.pixel, field.width)
     images = [_NewImages.empty(field, look, drawn, noise.shape[1]) for look in looks]
     strips = _strips(field, looks[0], band)
     # The first rows of the strip above, which are blended with the values of this one.
@@ -147,8 +147,8 @@ def fast_lic_lengths_task(
             _strip_values_task(field, strip, looks, noise, step_limits), start, stop
         )
         if place:
-            rows = field.pixel[upper_head] // np.int32(field.width) - np.int32(strip.stop_row)
-            _blend_rows(upper_values, _at(values, strip, upper_head), rows)
+            row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strip.stop_row)
+            _blend_rows(upper_values, _at(values, strip, upper_head), row)
             yield from subtask(_write_task(images, upper_head, upper_values), stop, stop)
         elif strip.stop_row < field.height:
             border = slice(strip.core.stop, drawn.stop)
@@ -167,8 +167,8 @@ def fast_lic_lengths_task(
             lower = yield from subtask(task, 1.0, 1.0)
             below.append(rows[:, :0] if lower is None else lower)
         count = border.stop - border.start
-        rows = field.pixel[upper_head] // np.int32(field.width) - np.int32(strips[0].start_row)
-        _blend_rows(upper_values, [part[:, count:] for part in below], rows)
+        row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strips[0].start_row)
+        _blend_rows(upper_values, [part[:, count:] for part in below], row)
         yield from subtask(_write_task(images, border, [part[:, :count] for part in below]), 1, 1)
     yield from subtask(_write_task(images, upper_head, upper_values), 1.0, 1.0)
     blended = []
@@ -229,7 +229,7 @@ class _Strip(NamedTuple):
     @property
     def averaged(self) -> slice:
         """The pixels that get averages."""
-        return slice(self.core.start, max(self.core.stop, self.tail.stop))
+        return slice(self.core.start, self.tail.stop)
 
 
 def strip_count(width: int, height: int, lines: int, margin: int) -> int:
@@ -304,13 +304,13 @@ def _strip_values_task(
         slope (see `LicImages`) if it is needed. n is 0 for a strip without pixels.
     """
     channels, extent, averaged = noise.shape[1], strip.extent, strip.averaged
-    has_pixels = strip.core.start < strip.core.stop
-    shape = field.line_count, (averaged.stop - averaged.start) * has_pixels
+    is_empty = strip.core.start == strip.core.stop
+    shape = field.line_count, 0 if is_empty else averaged.stop - averaged.start
     values = [
         np.empty((*shape, channels + 2 if has_slopes(look) else channels + 1), dtype=np.float32)
         for look in looks
     ]
-    if not has_pixels:
+    if is_empty:
         return values
     strip_field = _crop_rows(field, extent)
     strip_noise = noise[extent] - np.float32(NOISE_MEAN)
@@ -339,7 +339,7 @@ def _strip_values_task(
 def _at(values: Sequence[np.ndarray], strip: _Strip, pixels: slice) -> list[np.ndarray]:
     """The values of a strip at a range of the pixels of the field."""
     first = strip.averaged.start
-    return [rows[:, max(pixels.start - first, 0) : pixels.stop - first] for rows in values]
+    return [rows[:, pixels.start - first : pixels.stop - first] for rows in values]
 
 
 def _blend_rows(upper: Sequence[np.ndarray], lower: Sequence[np.ndarray], row: np.ndarray) -> None:

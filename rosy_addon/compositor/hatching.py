@@ -324,6 +324,11 @@ def has_overshoot(look: Look) -> bool:
     return is_hatched(look) and look.overshoot > 0
 
 
+def overshoot_steps(look: Look) -> int:
+    """Return the steps in each direction over which the tone is averaged for the overshoot."""
+    return max(round(look.overshoot / look.step), 1)
+
+
 def has_outline(look: Look) -> bool:
     """Whether lines are drawn along silhouettes and creases."""
     return is_hatched(look) and look.outline > 0

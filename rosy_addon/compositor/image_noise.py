@@ -165,7 +165,7 @@ def _noise_tiles_task(
     high_pass: float,
 ) -> Task[np.ndarray]:
     """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
-    full_margin = int(np.ceil(3 * BLUR_FACTOR * high_pass))
+    full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
     padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
@@ -209,6 +209,11 @@ def _lattice_noise_task(
         np.float32(NOISE_MEAN - density * scale)
         + np.float32(scale / (TAPS_PER_SIDE * TAPS_PER_SIDE)) * total
     )
+
+
+def high_pass_margin(high_pass: float) -> int:
+    """Return how many pixels around a pixel its noise depends on, with this high pass."""
+    return int(np.ceil(3 * BLUR_FACTOR * high_pass))
 
 
 def box_radius(sigma: float) -> int:

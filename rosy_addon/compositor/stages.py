@@ -11,7 +11,7 @@ from ..cache import Cache
 from ..progress import Task, subtask
 from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
-from .band import Band
+from .band import Band, drawn_pixels
 from .even_lines import EvenLines, even_lines_task
 from .lic import lic_lengths_task, look_noise_task, noise_args
 from .lic_images import LicImages
@@ -55,9 +55,7 @@ class ComposeStages:
 
     def drawn(self, field: PixelField) -> slice:
         """Return the range of the pixels of a field that its LIC images have."""
-        if self._band is None:
-            return slice(0, len(field.pixel))
-        return self._band.drawn(field.pixel, field.width)
+        return drawn_pixels(self._band, field.pixel, field.width)
 
     def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
         """Pixel field of one degree, rotated by the wobble of the look."""

@@ -350,6 +350,10 @@ def remove_applied_picture(data: bpy.types.ID | None) -> None:
     for index in reversed(range(len(getattr(data, "materials", ())))):
         if _is_picture(data.materials[index]):
             data.materials.pop(index=index)
+    if not getattr(data, "materials", True):
+        # To pop the last material leaves a slot in the objects, and Blender crashes if another
+        # object is joined to them (4.3, 5.2).
+        data.materials.clear()
     for name in _applied_attributes(data):
         data.attributes.remove(data.attributes[name])
 

@@ -211,9 +211,11 @@ def select(monkey: Monkey, obj: bpy.types.Object, *others: bpy.types.Object) -> 
     """Make objects the selection. Return whether that was possible."""
     if bpy.context.mode != "OBJECT" and not monkey.blender("object.mode_set", mode="OBJECT"):
         return False
-    for other in objects(monkey):
+    # Names do not tell: a linked object may have the name of a local one.
+    present = set(objects(monkey))
+    for other in present:
         other.select_set(False)
-    if any(other.name not in bpy.context.view_layer.objects for other in (obj, *others)):
+    if not present.issuperset((obj, *others)):
         return False
     for other in (obj, *others):
         other.select_set(True)

@@ -379,7 +379,10 @@ def materials(monkey):
     if obj is None:
         return
     if monkey.chance(0.3) and obj.data.materials:
-        obj.data.materials.pop(index=0)
+        if len(obj.data.materials) > 1:
+            obj.data.materials.pop(index=0)
+        else:  # to pop the last one leaves slots in objects, and Blender's Join crashes
+            obj.data.materials.clear()
     elif len(bpy.data.materials) < 8:
         obj.data.materials.append(monkey.pick([bpy.data.materials.new(monkey.name()), None]))
 

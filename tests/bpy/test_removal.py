@@ -292,6 +292,18 @@ def test_a_linked_object_is_left_alone(tmp_path):
     assert contents() == before
 
 
+def test_objects_without_materials_have_no_slots_afterwards(tmp_path):
+    """Blender crashes if an object with more slots than its mesh has materials is joined."""
+    scene = build()
+    obj("Plain").data.materials.clear()
+    bake(scene)
+    apply("Plain")(tmp_path)
+    copied = link(obj("Plain").copy())
+    remove_bakes(scene)
+    for other in (obj("Plain"), copied):
+        assert len(other.material_slots) == len(other.data.materials) == 0
+
+
 def test_materials_of_strokes_stay(tmp_path):
     """A mesh of the user's may have the ink of strokes that were converted."""
     scene = build()

@@ -67,7 +67,7 @@ def add_guide(monkey):
     mesh_name = obj.name
     monkey.blender(kind, location=obj.matrix_world.translation)
     obj = bpy.data.objects.get(mesh_name)
-    if obj is not None and obj.name in bpy.context.view_layer.objects:
+    if obj in objects(monkey):
         obj.select_set(True)
         bpy.context.view_layer.objects.active = obj
 

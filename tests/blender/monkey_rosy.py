@@ -242,7 +242,7 @@ def prepare(monkey, probability=0.5):
     camera_object = next((o for o in bpy.data.objects if o.name == "Eye" and not o.library), None)
     if camera_object is None or camera_object.type != "CAMERA" or camera_object.library is not None:
         camera_object = bpy.data.objects.new("Eye", bpy.data.cameras.new("Eye"))
-    if camera_object.name not in scene.objects:
+    if camera_object not in scene.objects.values():
         scene.collection.objects.link(camera_object)
     camera_object.parent = None
     camera_object.scale = 1.0, 1.0, 1.0

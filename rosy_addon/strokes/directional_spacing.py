@@ -57,6 +57,14 @@ class CornerSpacing:
     double: np.ndarray | None = None
     is_directional: np.ndarray | None = None
 
+    def take(self, kept: np.ndarray) -> CornerSpacing:
+        """Return the spacing on some triangles; `kept` is (T,) bool."""
+        if self.is_directional is None:
+            return CornerSpacing(self.values[kept])
+        return CornerSpacing(
+            self.values[kept], self.mean[kept], self.double[kept], self.is_directional[kept]
+        )
+
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at barycentric coordinates, for unit directions."""
         spacing = np.einsum("nk,nk->n", weights, self.values[triangle])

@@ -14,7 +14,7 @@ from ..field.frames import normalize
 from ..progress import Progress, Task
 from ..projection.camera import Camera
 from .stroke_set import Strokes
-from .tangent_mesh import TangentMesh, with_corners
+from .tangent_mesh import TangentMesh, take_triangles, with_corners
 
 #: Distance from the frame up to which strokes are traced, in pixels and as a fraction of the frame; the
 #: lesser of both counts. Strokes then reach the frame as if the mesh went on.
@@ -46,6 +46,10 @@ class MeshInView:
     def corner_values(self, values: np.ndarray) -> np.ndarray:
         """Return (T', 3) values at the corners, interpolated from those of the (T, 3) whole ones."""
         return np.einsum("tkj,tj->tk", self.weights, values[self.triangle])
+
+    def take(self, kept: np.ndarray) -> MeshInView:
+        """Return some of the parts; `kept` is (T',) bool."""
+        return MeshInView(take_triangles(self.mesh, kept), self.triangle[kept], self.weights[kept])
 
     def on_whole_mesh(self, strokes: Strokes) -> Strokes:
         """Return strokes that were traced on the part as strokes on the whole mesh."""

@@ -22,6 +22,7 @@ from .mesh_in_view import mesh_in_view_task, whole_mesh
 from .outline import OUTLINE_KINDS, outline_task
 from .outline_visibility import clip_outline_task
 from .overshoot import extension_task, mark_free_boundary_ends
+from .seen_triangles import seen_triangles_task, triangles_near
 from .smoothing import smooth_task
 from .spacing import (
     MAX_SPACING_RATIO,
@@ -141,10 +142,17 @@ def draw_instances_task(
     if clip_to_frame or not style.hidden:
         drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     clips = clip_to_frame or not style.hidden
+    depth_buffer = None
+    if drawn and not style.hidden:
+        label = "finding visible strokes"
+        depth_buffer = yield from subtask(depth_task(instances, camera), 0.01, 0.05, label)
     traced = {}
     for rank, index in enumerate(drawn):
-        start, stop = (0.05 + 0.8 * done / len(drawn) for done in (rank, rank + 1))
-        task = _trace_instance(instances[index], camera, style, lights, clips, cache)
+        start, stop = (0.05 + 0.83 * done / len(drawn) for done in (rank, rank + 1))
+        seen = None
+        if depth_buffer is not None:
+            seen = yield from seen_triangles_task(instances, index, camera, depth_buffer)
+        task = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
         strokes = yield from subtask(task, start, stop)
         if strokes is not None:
             traced[index] = strokes
@@ -155,10 +163,6 @@ def draw_instances_task(
     family_counts = [len(strokes.names) for strokes in traced.values()]
     if not len(strokes) and not style.outline:
         raise RosyError("no stroke fits on the surface: reduce the spacing")
-    depth_buffer = None
-    if not style.hidden:
-        label = "finding visible strokes"
-        depth_buffer = yield from subtask(depth_task(instances, camera), 0.85, 0.88, label)
     if clips:
         task = clip_task(
             strokes,
@@ -193,9 +197,13 @@ def _trace_instance(
     style: StrokeStyle,
     lights: Sequence[LightSource],
     clipped: bool,
+    seen: np.ndarray | None,
     cache: Cache,
 ) -> Task[Strokes | None]:
-    """Return all strokes of a mesh instance, including hidden parts; None if none can be in view."""
+    """Return the strokes of a mesh instance, before they are clipped; None if none can be in view.
+
+    If `seen`, (T,) bool, is given, strokes are traced only on these triangles and near them.
+    """
     label = "computing the spacing"
     yield Progress(0.0, label)
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
@@ -224,7 +232,12 @@ def _trace_instance(
     spacing = _corner_spacing(part.mesh, camera, style, clipped)
     values = spacing.values * part.corner_values(factor[by_fan.surface.triangle_vertex])
     spacing = replace(spacing, values=values)
-    check_stroke_memory(part.mesh, values, camera, clipped, instance.surface.name)
+    if seen is not None:
+        kept = triangles_near(part.mesh, seen[part.triangle], values)
+        if not part.mesh.z[kept].any():
+            return None
+        part, spacing = part.take(kept), spacing.take(kept)
+    check_stroke_memory(part.mesh, spacing.values, camera, clipped, instance.surface.name)
     task = trace_on_mesh_task(part.mesh, spacing, surface_name=instance.surface.name)
     strokes = part.on_whole_mesh((yield from subtask(task, 0.1, 0.9)))
     strokes = mark_free_boundary_ends(strokes, mesh)

@@ -313,6 +313,26 @@ def tangent_mesh_task(
     )
 
 
+def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
+    """Return some triangles of a mesh; `kept` is (T,) bool. Strokes stop where there is no other."""
+    number = np.where(kept, np.cumsum(kept, dtype=np.int32) - np.int32(1), np.int32(-1))
+    neighbor = mesh.neighbor[kept]
+    per_triangle = {
+        name: getattr(mesh, name)[kept]
+        for name in (
+            "points", "x", "y", "normal", "corner_normal", "face", "gradient", "z",
+            "neighbor_edge", "edge_transport", "area", "triangle_vertex",
+        )
+    }  # fmt: skip
+    return replace(
+        mesh,
+        harmonics=tuple((j, values[kept]) for j, values in mesh.harmonics),
+        family_z=None if mesh.family_z is None else mesh.family_z[kept],
+        neighbor=np.where(neighbor >= 0, number[neighbor], np.int32(-1)),
+        **per_triangle,
+    )
+
+
 def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
     """Return a mesh with other corners, (T, 3, 3), in the planes of its triangles.
 

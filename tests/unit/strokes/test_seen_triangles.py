@@ -1,0 +1,119 @@
+"""Strokes are traced only where they can be seen: all that is seen, and as if there were more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import icosphere, plane, torus
+
+from rosy_addon.field.generate import generate
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.pipeline import draw_instances
+from rosy_addon.strokes.seen_triangles import HIDDEN_MARGIN, seen_triangles_task, triangles_near
+from rosy_addon.strokes.style import StrokeStyle
+from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
+from rosy_addon.strokes.visibility import (
+    clip_to_visible,
+    in_frame,
+    project_to_pixels,
+    rasterize_depth,
+)
+
+
+def instance(surface, location=(0, 0, 0)):
+    matrix = np.eye(4)
+    matrix[:3, 3] = location
+    return MeshInstance(surface, matrix, generate(surface, "smoothest", 4))
+
+
+def seen(instances, index, camera):
+    return run_to_completion(
+        seen_triangles_task(instances, index, camera, rasterize_depth(instances, camera))
+    )
+
+
+SIDE = perspective_camera(look_at((0, -6, 1.5), (0, 0, 0)), 240, 180)
+#: Triangles are smaller than pixels.
+FAR = perspective_camera(look_at((0, -40, 10), (0, 0, 0)), 80, 60)
+CLOSE = orthographic_camera(look_at((0, -3, 0.5), (0.6, 0, 0)), 120, 100, scale=0.8)
+
+
+@pytest.mark.parametrize("camera", [SIDE, FAR, CLOSE], ids=["side", "far", "close"])
+def test_every_triangle_that_is_not_hidden_is_seen(camera):
+    """A sphere behind a torus: rays to points on it meet nothing else."""
+    ball, ring = instance(icosphere(3)), instance(torus(24, 12), (0, -2.2, 0))
+    instances = [ring, ball]
+    found = seen(instances, 1, camera)
+    corners = ball.world_points()[ball.surface.triangle_vertex]
+    occluders = np.concatenate(
+        [other.world_points()[other.surface.triangle_vertex] for other in instances]
+    )
+    rng = np.random.default_rng(3)
+    weights = rng.dirichlet(np.ones(3), size=len(corners))
+    points = np.einsum("tk,tki->ti", weights, corners)
+    is_seen = ~meets_another(points, camera.view_directions(points), occluders)
+    assert is_seen.sum() > 50
+    assert found[is_seen].mean() > 0.98
+    pixels, _ = project_to_pixels(corners.reshape(-1, 3), camera)
+    inside = in_frame(pixels, camera).reshape(-1, 3).all(axis=1)
+    assert found[inside & ~is_seen].mean() < 0.6
+
+
+def meets_another(points, direction, triangles):
+    """Whether rays from points toward the camera meet a triangle, by Moeller and Trumbore."""
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    result = np.zeros(len(points), dtype=bool)
+    for index, (point, ray) in enumerate(zip(points, direction, strict=True)):
+        p = np.cross(ray, v)
+        determinant = np.einsum("ij,ij->i", u, p)
+        determinant[determinant == 0] = np.nan
+        to_point = point - a
+        q = np.cross(to_point, u)
+        s = np.einsum("ij,ij->i", to_point, p) / determinant
+        t = np.einsum("j,ij->i", ray, q) / determinant
+        depth = np.einsum("ij,ij->i", v, q) / determinant
+        result[index] = ((s >= 0) & (t >= 0) & (s + t <= 1) & (depth > 1e-6)).any()
+    return result
+
+
+def test_the_margin_is_a_distance_on_the_surface():
+    """Triangles are kept up to the margin, also if they are long and thin."""
+    strip = instance(plane(200, 2, 1.0))
+    mesh = build_tangent_mesh(strip)
+    x = mesh.points[:, :, 0]
+    spacing = 0.02
+    first = x.max(axis=1) < x.min() + 0.011
+    kept = triangles_near(mesh, first, np.full((len(x), 3), spacing))
+    reach = x[kept].max() - x[first].max()
+    assert abs(reach / spacing - HIDDEN_MARGIN) < 0.1 * HIDDEN_MARGIN
+    assert not triangles_near(mesh, np.zeros(len(x), bool), np.full((len(x), 3), spacing)).any()
+    assert triangles_near(mesh, first, np.full((len(x), 3), 1.0)).all()
+
+
+@pytest.mark.parametrize("surface", [icosphere(3), torus(48, 24)], ids=["sphere", "torus"])
+def test_strokes_in_view_are_as_dense_as_those_of_the_whole_surface(surface):
+    """Both drawings have the same length of strokes in each part of the picture."""
+    instances = [instance(surface)]
+    camera = orthographic_camera(look_at((0, -5, 3), (0, 0, 0)), 400, 400, scale=2.6)
+    drawn = draw_instances(instances, camera, StrokeStyle(spacing=8)).strokes
+    whole = draw_instances(instances, camera, StrokeStyle(spacing=8, hidden=True)).strokes
+    whole = clip_to_visible(whole, instances, camera)
+    lengths = [length_by_cell(strokes, camera, 50) for strokes in (drawn, whole)]
+    full = lengths[1] > 0.5 * np.percentile(lengths[1], 95)
+    assert full.sum() >= 8
+    assert abs(lengths[0].sum() / lengths[1].sum() - 1) < 0.03
+    ratio = lengths[0][full] / lengths[1][full]
+    assert abs(ratio.mean() - 1) < 0.05 and ratio.min() > 0.7
+
+
+def length_by_cell(strokes, camera, size):
+    middle = (strokes.points[1:] + strokes.points[:-1]) / 2
+    length = np.linalg.norm(np.diff(strokes.points, axis=0), axis=1)
+    length[strokes.start[1:-1] - 1] = 0
+    clip = middle @ (camera.projection @ camera.view)[:2, :3].T
+    clip += (camera.projection @ camera.view)[:2, 3]
+    cells = ((clip + 1) / 2 * camera.width / size).astype(int)
+    count = -(-camera.width // size)
+    return np.bincount(cells[:, 1] * count + cells[:, 0], length, count * count)

@@ -1,4 +1,4 @@
-"""Time to trace 20,000 strokes on 200,000 triangles, relative to computing the smoothest field."""
+"""Time to trace 20,000 strokes on 200,000 triangles, and to draw those that a camera sees."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ import numpy as np
 from harness.stroke_spacing import lateral_gaps
 
 from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.strokes.pipeline import draw_instances
 from rosy_addon.strokes.separation_rules import SeparationRules
+from rosy_addon.strokes.style import StrokeStyle
 from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
 from rosy_addon.strokes.trace import trace_strokes
 
@@ -28,7 +31,7 @@ MAX_SECONDS = 30.0
 
 
 def measure(runs: int) -> Iterator[Case]:
-    """Yield the ratio of the two times. Number, evenness and time go to the error stream."""
+    """Yield the ratios of times. Number, evenness and time go to the error stream."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
     rules = SeparationRules(max_length=MAX_LENGTH)
@@ -50,6 +53,18 @@ def measure(runs: int) -> Iterator[Case]:
     verdict = "yes" if seconds <= MAX_SECONDS else "NO"
     print(f"{seconds:.1f} s, at most {MAX_SECONDS:g}: {verdict}", file=sys.stderr)
     yield case
+    camera = orthographic_camera(look_at((0, -4, 1), (0, 0, 0)), 800, 800, scale=2.4)
+
+    def draw(hidden: bool) -> object:
+        return draw_instances([instance], camera, StrokeStyle(spacing=5.0, hidden=hidden))
+
+    yield compare(
+        "strokes without / with hidden ones, ball, 800 x 800, spacing 5",
+        lambda: draw(False),
+        lambda: draw(True),
+        higher_is_better=False,
+        runs=min(runs, 3),
+    )
 
 
 if __name__ == "__main__":

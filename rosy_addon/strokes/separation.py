@@ -86,11 +86,10 @@ def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> T
     point = np.concatenate(
         [np.arange(strokes.start[stroke], strokes.start[stroke + 1]) for stroke in candidates]
     )
-    subset = strokes.select(candidates)
     yield Progress(0.3, label)
-    refined, source = _refine(subset, np.isin(point, near_suspect))
+    refined, source = _refine(strokes.select(candidates), np.isin(point, near_suspect))
     yield Progress(0.4, label)
-    task = _too_close_task(mesh, refined, suspect[point][source], subset.length)
+    task = _too_close_task(mesh, refined, suspect[point][source], strokes.length[candidates])
     too_close = yield from subtask(task, 0.4, 0.8, label)
     if not too_close.any():
         return strokes

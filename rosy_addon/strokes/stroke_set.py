@@ -228,24 +228,31 @@ class Strokes:
         before = np.maximum(point - 1, 0)
 
         def interpolate(values: np.ndarray) -> np.ndarray:
-            weight = fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-            return values[before] + weight * (values[point] - values[before])
+            previous, result = values[before], values[point]
+            result -= previous
+            result *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            result += previous
+            return result
 
-        repeated = self._take_points(point)
         # The weights of the previous point may be in another triangle, so they are not
         # interpolated.
+        weights = self.weights[point]
+        weights[fraction < 1] = np.nan
+        interpolated = {
+            name: interpolate(getattr(self, name))
+            for name in ("points", "spacing", "width", "opacity")
+        }
+        repeated = {name: getattr(self, name)[point] for name in ("face", "triangle", "member")}
         return replace(
-            repeated,
-            points=interpolate(self.points),
+            self,
+            **interpolated,
+            **repeated,
             start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),
             family=self.family[first:stop],
             closed=self.closed[first:stop],
             free_ends=self.free_end_mask[first:stop],
             normal=normalize(interpolate(self.normal)),
-            spacing=interpolate(self.spacing),
-            width=interpolate(self.width),
-            opacity=interpolate(self.opacity),
-            weights=np.where((fraction < 1)[:, None], np.nan, repeated.weights),
+            weights=weights,
         )
 
     @staticmethod

@@ -115,6 +115,7 @@ def trace_on_mesh_task(
     rules = placer.rules
     yield from subtask(place_streamlines_task(placer), 0.0, 0.9)
     strokes = yield from subtask(collect_task(placer), 0.9, 0.92)
+    del placer  # its samples take more memory than the strokes
     strokes = yield from subtask(close_loops_task(mesh, strokes, spacing), 0.92, 0.95)
     return (yield from subtask(separation_task(mesh, strokes, rules.min_length), 0.95, 1.0))
 
@@ -214,6 +215,8 @@ def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
         yield Progress(0.05 * len(columns), label)
         columns.append(np.concatenate(column))
     segments = StrokeSegments(*columns)
+    placer.segments.clear()
+    del columns
     keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
     stroke, sign, triangle, begin_weights, weights, direction = (
         column[keep] for column in segments

@@ -8,12 +8,12 @@ does.
 from __future__ import annotations
 
 import os
-import queue
 import re
 import reprlib
+import shutil
 import subprocess
 import sys
-import threading
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -23,6 +23,12 @@ from .errors import RosyError
 
 #: Largest number of a frame in Blender.
 MAX_FRAME = 1_048_574
+
+#: Seconds between two looks at what processes have printed.
+POLL_SECONDS = 0.05
+
+#: Seconds that a process has to end before it is killed.
+STOP_SECONDS = 10.0
 
 #: Frames of one task of the Dask cluster. Several, because starting Blender takes as long as
 #: several frames.
@@ -121,42 +127,82 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
         If a process failed. It is raised after all processes have ended, with the error of each.
     """
     process_count = max(min(process_count, len(frames)), 1)
-    workers = []
-    for index in range(process_count):
-        share = frames[index::process_count]
-        workers.append((share, _start_worker([*command, f"--frames={format_frames(share)}"])))
-    # Read the output of all processes at the same time: a process whose pipe is full would block.
-    messages: queue.Queue[tuple[int, str | None]] = queue.Queue()
-    for index, (_, process) in enumerate(workers):
-        threading.Thread(target=_read_output, args=(index, process, messages), daemon=True).start()
-    output: list[list[str]] = [[] for _ in workers]
-    running_count = len(workers)
+    workers: list[_Worker] = []
+    folder = Path(tempfile.mkdtemp(prefix="rosy-"))
     try:
-        while running_count:
-            index, line = messages.get()
-            if line is None:
-                running_count -= 1
-            else:
-                output[index].append(line)
-                yield line
-        failures = [
-            f"frames {format_frames(share)}: {_error_line(output[index])}"
-            for index, (share, process) in enumerate(workers)
-            if process.wait()
-        ]
+        for index in range(process_count):
+            log = folder / f"{index}.log"
+            workers.append(_Worker(command, frames[index::process_count], log))
+        running = list(workers)
+        while running:
+            # A process that has ended prints no more, so what it printed is read after that.
+            ended = [worker for worker in running if worker.process.poll() is not None]
+            for worker in running:
+                yield from worker.new_lines()
+            running = [worker for worker in running if worker not in ended]
+            time.sleep(POLL_SECONDS if running else 0.0)
     finally:
-        for _, process in workers:
-            if process.poll() is None:
-                process.terminate()
+        for worker in workers:
+            worker.stop()
+        shutil.rmtree(folder, ignore_errors=True)
+    failures = [
+        f"frames {format_frames(worker.frames)}: {_error_line(worker.lines)}"
+        for worker in workers
+        if worker.process.returncode
+    ]
     if failures:
         raise RosyError("; ".join(failures))
 
 
-def _read_output(index: int, process: subprocess.Popen, messages: queue.Queue) -> None:
-    """Put the output lines of a process into a queue, and None at the end of the output."""
-    for line in process.stdout:
-        messages.put((index, line.rstrip("\n")))
-    messages.put((index, None))
+class _Worker:
+    """A process that runs a command for some frames, with its output and errors in a file.
+
+    Files can be read without waiting on every system. Pipes cannot, and would need threads.
+
+    Attributes
+    ----------
+    frames : sequence of int
+    process : subprocess.Popen
+    lines : list of str
+        The lines that were read.
+    """
+
+    def __init__(self, command: Sequence[str], frames: Sequence[int], log: Path) -> None:
+        self.frames, self.lines = frames, []
+        with log.open("wb") as output:
+            self.process = subprocess.Popen(
+                [*command, f"--frames={format_frames(frames)}"],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=worker_environment(),
+            )
+        self._log = log.open("rb")
+        self._partial_line = b""
+
+    def new_lines(self) -> Iterator[str]:
+        """Read what the process has printed since the last call, and yield the lines.
+
+        Once the process has ended, this includes a last line without an end.
+        """
+        *lines, self._partial_line = (self._partial_line + self._log.read()).split(b"\n")
+        if self.process.returncode is not None and self._partial_line:
+            lines.append(self._partial_line)
+            self._partial_line = b""
+        for line in lines:
+            self.lines.append(line.decode(errors="replace").rstrip("\r"))
+            yield self.lines[-1]
+
+    def stop(self) -> None:
+        """End the process if it still runs."""
+        self._log.close()
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(STOP_SECONDS)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
 
 
 def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
@@ -242,18 +288,6 @@ def format_frames(frames: Sequence[int]) -> str:
     if len(frames) == 1 or not isinstance(frames, range):
         return ",".join(map(str, frames))
     return f"{frames[0]}-{frames[-1]}" + (f":{frames.step}" if frames.step > 1 else "")
-
-
-def _start_worker(command: list[str]) -> subprocess.Popen:
-    """Start a process whose output and errors are read as one stream of text."""
-    return subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=worker_environment(),
-        stdin=subprocess.DEVNULL,
-    )
 
 
 def _error_line(output: Sequence[str]) -> str:

@@ -1,0 +1,56 @@
+"""Processes for frames: all that they print arrives, while they run, and none is left."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+
+import pytest
+
+from rosy_addon.errors import RosyError
+from rosy_addon.frame_workers import run_local
+
+
+def command(script):
+    return [sys.executable, "-c", "import os, sys, time\nframes = sys.argv[1]\n" + script]
+
+
+def test_all_lines_arrive():
+    """Also more than a pipe holds, errors, bytes that are no text, and a last line without an end."""
+    script = (
+        "print(frames, flush=True)\n"
+        "for number in range(20_000): print('line', number)\n"
+        "sys.stdout.flush()\n"
+        "os.write(2, b'caf\\xe9\\r\\nlast')"
+    )
+    lines = list(run_local(command(script), range(1, 6), 2))
+    assert len(lines) == 2 * 20_003
+    assert {"--frames=1-5:2", "--frames=2-4:2"} <= set(lines)
+    assert lines.count("line 19999") == lines.count("caf\N{REPLACEMENT CHARACTER}") == 2
+    assert lines.count("last") == 2
+
+
+def test_lines_arrive_while_processes_run():
+    script = "print('begun', flush=True)\ntime.sleep(60)"
+    lines = run_local(command(script), range(1, 3), 1)
+    start = time.monotonic()
+    assert next(lines) == "begun"
+    lines.close()
+    assert time.monotonic() - start < 30
+
+
+def test_processes_end_with_the_generator():
+    script = "print(os.getpid(), flush=True)\ntime.sleep(60)"
+    lines = run_local(command(script), range(1, 4), 3)
+    pids = [int(next(lines)) for _ in range(3)]
+    lines.close()
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_each_process_that_fails_is_named():
+    script = "print('rosy: frame 2: no camera')\nsys.exit(2 if frames[-1] == '2' else 0)"
+    with pytest.raises(RosyError, match=r"^frames 2: no camera$"):
+        list(run_local(command(script), [1, 2], 2))

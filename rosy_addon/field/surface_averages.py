@@ -139,7 +139,10 @@ class SurfaceAverages:
                 break
             direction = preconditioned + current / previous * direction
             image = apply(direction)
-            length = current / np.vdot(direction, image).real
+            curvature = np.vdot(direction, image).real
+            if not curvature > 0:
+                break  # obtuse triangles can make the Laplacian indefinite
+            length = current / curvature
             solution += length * direction
             residual -= length * image
             previous = current

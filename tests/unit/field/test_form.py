@@ -186,3 +186,16 @@ def test_averages_of_numbers_below_all_normal_ones():
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
     assert sums.any()
     assert not run_to_completion(averages.smooth_task(matrix, 0.1, sums)).any()
+
+
+def test_averages_with_an_indefinite_matrix():
+    """Obtuse triangles have negative weights: conjugate gradients end at their last good step."""
+    surface = icosphere(0)
+    connection = run_to_completion(connection_task(surface))
+    averages = SurfaceAverages(surface, connection, *face_frames(surface))
+    # With unit masses, five neighbors and 4 on the diagonal, the sum of every row is 0.
+    matrix = run_to_completion(laplacian_task(connection, 0))
+    matrix = matrix.with_values(np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
+    sums = np.ones(connection.node_count)
+    area = float(averages.mass.mean())
+    assert not run_to_completion(averages.smooth_task(matrix, area, sums)).any()

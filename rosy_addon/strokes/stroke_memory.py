@@ -9,10 +9,11 @@ from ..projection.camera import Camera
 from .tangent_mesh import TangentMesh
 from .visibility import pixel_size, project_to_pixels
 
-#: Bytes of a square of the surface as wide as the spacing, for each family of lines: of strokes that
-#: are not clipped, and of those that are, which take more for each pixel of their length. Fitted to
-#: measurements.
-SQUARE_BYTES, CLIPPED_SQUARE_BYTES, CLIPPED_PIXEL_BYTES = 2200, 850, 350
+#: Bytes of a square of the surface as wide as the spacing, and of a length of one spacing across a
+#: triangle, for each family of lines: of strokes that are not clipped, and of those that are, which take
+#: more for each pixel of their length. Fitted to measurements.
+SQUARE_BYTES, CROSSING_BYTES = 2300, 4700
+CLIPPED_SQUARE_BYTES, CLIPPED_CROSSING_BYTES, CLIPPED_PIXEL_BYTES = 1320, 3200, 70
 
 #: Pixels of the spacing from which on the points of strokes do not get denser: close to the camera.
 MAX_SPACING_PIXELS = 4096
@@ -61,12 +62,15 @@ def stroke_memory(mesh: TangentMesh, spacing: np.ndarray, camera: Camera, clippe
     """
     triangle_spacing = spacing.mean(axis=1)
     squares = mesh.area / triangle_spacing**2
+    # Strokes have a point wherever they cross an edge.
+    crossings = np.sqrt(squares)
     if clipped:
         centroid = mesh.points.mean(axis=1)
         is_in_front = np.isfinite(project_to_pixels(centroid, camera)[0]).all(axis=1)
         pixels = triangle_spacing / pixel_size(centroid, camera)
         pixels = np.minimum(pixels, MAX_SPACING_PIXELS) * is_in_front
         needed = squares * (CLIPPED_SQUARE_BYTES + CLIPPED_PIXEL_BYTES * pixels)
+        needed += crossings * CLIPPED_CROSSING_BYTES
     else:
-        needed = squares * SQUARE_BYTES
+        needed = squares * SQUARE_BYTES + crossings * CROSSING_BYTES
     return float(needed.sum()) * mesh.family_count

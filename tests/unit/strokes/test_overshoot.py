@@ -113,7 +113,7 @@ def test_extensions_cross_the_silhouette():
 
 @pytest.mark.slow
 def test_extensions_have_the_direction_of_their_strokes():
-    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
+    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0)
     plain_pixels, extended_pixels = (
         project_to_pixels(strokes.points, FRONT_CAMERA)[0] for strokes in (plain, extended)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
@@ -23,6 +24,30 @@ OPACITY_LEVELS = 16
 #: Widths that differ by less than this fraction of the full width are drawn as constant.
 WIDTH_TOLERANCE = 0.02
 
+_COLOR_NAMES = """
+    aliceblue antiquewhite aqua aquamarine azure beige bisque black blanchedalmond blue blueviolet
+    brown burlywood cadetblue chartreuse chocolate coral cornflowerblue cornsilk crimson cyan
+    darkblue darkcyan darkgoldenrod darkgray darkgreen darkgrey darkkhaki darkmagenta
+    darkolivegreen darkorange darkorchid darkred darksalmon darkseagreen darkslateblue
+    darkslategray darkslategrey darkturquoise darkviolet deeppink deepskyblue dimgray dimgrey
+    dodgerblue firebrick floralwhite forestgreen fuchsia gainsboro ghostwhite gold goldenrod gray
+    green greenyellow grey honeydew hotpink indianred indigo ivory khaki lavender lavenderblush
+    lawngreen lemonchiffon lightblue lightcoral lightcyan lightgoldenrodyellow lightgray
+    lightgreen lightgrey lightpink lightsalmon lightseagreen lightskyblue lightslategray
+    lightslategrey lightsteelblue lightyellow lime limegreen linen magenta maroon mediumaquamarine
+    mediumblue mediumorchid mediumpurple mediumseagreen mediumslateblue mediumspringgreen
+    mediumturquoise mediumvioletred midnightblue mintcream mistyrose moccasin navajowhite navy
+    oldlace olive olivedrab orange orangered orchid palegoldenrod palegreen paleturquoise
+    palevioletred papayawhip peachpuff peru pink plum powderblue purple red rosybrown royalblue
+    saddlebrown salmon sandybrown seagreen seashell sienna silver skyblue slateblue slategray
+    slategrey snow springgreen steelblue tan teal thistle tomato turquoise violet wheat white
+    whitesmoke yellow yellowgreen
+"""
+#: The names of colors in SVG 1.1.
+COLOR_NAMES = frozenset(_COLOR_NAMES.split())
+#: A color as a code.
+_COLOR_CODE = re.compile("#(?:[0-9a-f]{3}){1,2}", re.IGNORECASE)
+
 #: Largest distance of the outline of a stroke from its center line at a bend, in half widths.
 MAX_MITER = 1.25
 
@@ -42,7 +67,8 @@ class Pen:
     width : float
         Full width of a stroke, in pixels of the camera.
     colours : sequence of str
-        Colors of the families in turn, as SVG color values. They repeat if there are more families.
+        Colors of the families in turn: ``#rgb``, ``#rrggbb`` or a name of SVG, such as ``navy``. They
+        repeat if there are more families.
     paper : str or None
         Color of the background; None for no background.
     millimetres : float or None
@@ -55,7 +81,7 @@ class Pen:
     Raises
     ------
     RosyError
-        If a width is not above 0, or there is no color.
+        If a width is not above 0, there is no color, or a color has no such form.
     """
 
     width: float = 1.0
@@ -70,6 +96,10 @@ class Pen:
             raise RosyError("the pen needs a width above 0, and at least one color")
         if self.millimetres is not None and not self.millimetres > 0:
             raise RosyError("the page needs a width above 0")
+        optional = (color for color in (self.paper, self.outline) if color is not None)
+        for color in (*self.colours, *optional):
+            if not _COLOR_CODE.fullmatch(color) and color.lower() not in COLOR_NAMES:
+                raise RosyError(f"{color!r} is not a color: use #rrggbb or a name of SVG")
 
     def family_colors(self, names: Sequence[str]) -> list[str]:
         """Return the color of each family, given `Strokes.names`."""

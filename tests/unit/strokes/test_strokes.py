@@ -16,7 +16,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
 
-from rosy_addon.cli import main
+from rosy_addon.cli.parser import main
+from rosy_addon.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
@@ -756,6 +757,12 @@ def path_points(data):
     """Return the (n, 2) points of SVG path data, without the radii of arcs."""
     without_arcs = re.sub(r"A\S+ 0 0 1", "", data)
     return np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", without_arcs), dtype=float)
+
+
+@pytest.mark.parametrize("color", ["", "\x1b[31m", "blakc", "#12", "#gggggg", 'red" x="', "#00f\n"])
+def test_color_must_be_one_of_svg(color):
+    with pytest.raises(RosyError, match="is not a color"):
+        Pen(colours=("Navy", "#00F", color))
 
 
 def test_svg_has_one_layer_per_family_and_one_path_per_stroke():

@@ -8,12 +8,13 @@ def register() -> None:
     global _cli_command
     import bpy
 
-    from . import operators
-    from .rosy_addon import cli, ui
+    from .operators import registration as operators
+    from .rosy_addon.cli.parser import main
+    from .rosy_addon.ui import registration as ui
 
     ui.register()
     operators.register()
-    _cli_command = bpy.utils.register_cli_command("rosy", cli.main)
+    _cli_command = bpy.utils.register_cli_command("rosy", main)
 
 
 def unregister() -> None:
@@ -21,10 +22,11 @@ def unregister() -> None:
     global _cli_command
     import bpy
 
-    from . import operators
-    from .rosy_addon import cache, ui
+    from .operators import registration as operators
+    from .rosy_addon import cache
     from .rosy_addon.gpu import device
     from .rosy_addon.scene import staleness
+    from .rosy_addon.ui import registration as ui
 
     bpy.utils.unregister_cli_command(_cli_command)
     _cli_command = None

@@ -103,7 +103,7 @@ def test_nothing_outside_bpy_is_touched():
 
 def controls():
     """Yield the description of each operator, and all properties that a user sees, by their owner."""
-    for module in sys.modules[f"{EXTENSION}.operators"].MODULES:
+    for module in sys.modules[f"{EXTENSION}.operators.registration"].MODULES:
         for cls in module.CLASSES:
             if issubclass(cls, bpy.types.Operator):
                 rna = getattr(bpy.ops.rosy, cls.bl_idname.split(".")[1]).get_rna_type()

@@ -30,7 +30,7 @@ def test_field_picture_strokes_and_removal(scene, camera, monkey, tmp_path):
 
 
 def test_blender_can_read_the_properties_of_every_operator():
-    operators = importlib.import_module("rosy.operators")
+    operators = importlib.import_module("rosy.operators.registration")
     classes = [cls for module in operators.MODULES for cls in module.CLASSES]
     for cls in classes:
         # Blender does the same when it registers a class. It prints errors and goes on.
@@ -40,7 +40,7 @@ def test_blender_can_read_the_properties_of_every_operator():
 
 def test_callbacks_of_properties_see_the_names_of_their_module():
     """A function that is written inside an annotation does not."""
-    modules = importlib.import_module("rosy.operators").MODULES
+    modules = importlib.import_module("rosy.operators.registration").MODULES
     modules += tuple(
         importlib.import_module(f"rosy.rosy_addon.ui.{name}")
         for name in ("properties", "preferences")

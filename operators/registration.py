@@ -1,0 +1,68 @@
+"""Registration of the operators."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..rosy_addon.viewport import session
+from . import (
+    bake,
+    bake_animation,
+    bake_occlusion,
+    bake_remove,
+    bake_show,
+    field_convert,
+    field_export,
+    field_generate,
+    field_import,
+    modal_task,
+    preset_apply,
+    preset_export,
+    preset_import,
+    preset_remove,
+    preset_rename,
+    preset_save,
+    singularities,
+    strokes,
+    turntable,
+    viewport,
+)
+
+#: Modules with operators, in the order of registration.
+MODULES = (
+    field_generate,
+    field_convert,
+    field_import,
+    field_export,
+    singularities,
+    strokes,
+    bake_occlusion,
+    bake,
+    bake_animation,
+    turntable,
+    viewport,
+    bake_show,
+    bake_remove,
+    preset_apply,
+    preset_save,
+    preset_rename,
+    preset_remove,
+    preset_import,
+    preset_export,
+)
+
+
+def register() -> None:
+    """Register the operators."""
+    for module in MODULES:
+        for cls in module.CLASSES:
+            bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Stop the current task and the live view, and unregister the operators."""
+    modal_task.stop_current_job()
+    session.stop()
+    for module in reversed(MODULES):
+        for cls in reversed(module.CLASSES):
+            bpy.utils.unregister_class(cls)

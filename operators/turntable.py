@@ -21,7 +21,6 @@ from ..rosy_addon.scene.read_view import read_turntable_task
 from ..rosy_addon.scene.video import encode_video_task
 from ..rosy_addon.turntable import (
     check_video_path,
-    has_ffmpeg,
     turntable_task,
     turntable_views,
 )
@@ -129,12 +128,13 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         instance, lights = yield from subtask(reading, 0.0, 0.0)
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
         views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
-        encode = None if has_ffmpeg() else encode_video_task
         with BandWorkers(worker_count(context)) as pool:
             renderer = select_renderer(
                 scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False, workers=pool
             )
-            task = turntable_task(renderer, views, self.pictures, path, self.rate, encode)
+            task = turntable_task(
+                renderer, views, self.pictures, path, self.rate, encode_video_task
+            )
             return (yield from task)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:

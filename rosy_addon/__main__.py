@@ -14,7 +14,7 @@ def _stop_at_once(*_: object) -> None:
 # A KeyboardInterrupt inside an import may become another exception.
 signal.signal(signal.SIGINT, _stop_at_once)
 
-from .cli import main  # noqa: E402
+from .extras.command_line import main  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-sys.exit(main(sys.argv[1:], prog="python -m rosy_addon"))
+sys.exit(main())

@@ -1,4 +1,4 @@
-"""Frame ranges, and running a command for many frames in processes or on a Dask cluster.
+"""Frame ranges, and running a command for many frames in several processes.
 
 Each worker runs the same command that a user would run for some of the frames. The command may be
 run again, or twice at the same time, without harm. This module does not depend on what the command
@@ -12,12 +12,10 @@ import re
 import reprlib
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from .errors import RosyError
 
@@ -29,13 +27,6 @@ POLL_SECONDS = 0.05
 
 #: Seconds that a process has to end before it is killed.
 STOP_SECONDS = 10.0
-
-#: Frames of one task of the Dask cluster. Several, because starting Blender takes as long as
-#: several frames.
-FRAMES_PER_TASK = 8
-
-#: How many times Dask may run a task again that failed on a worker.
-MAX_RETRIES = 3
 
 
 def parse_frames(text: str) -> Sequence[int]:
@@ -75,31 +66,6 @@ def _parse_range(part: str, text: str) -> range:
             f"with B from A to {MAX_FRAME}"
         )
     return range(first, last + 1, step)
-
-
-def worker_command(blender: str, scene: Path) -> list[str]:
-    """Return the command that bakes a Blender file, in Blender or in plain Python.
-
-    Parameters
-    ----------
-    blender : str
-        Path of the Blender executable. If empty, the command runs in this Python.
-    scene : Path
-        The .blend file.
-    """
-    if blender:
-        return [blender, "-b", str(scene), "--command", "rosy", "bake"]
-    return [sys.executable, "-m", "rosy_addon", "bake", str(scene)]
-
-
-def worker_environment() -> dict[str, str]:
-    """Return the environment variables of worker processes.
-
-    The package is on the import path, and OpenMP uses one thread.
-    """
-    package_root = str(Path(__file__).resolve().parents[1])
-    paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "OMP_NUM_THREADS": "1"}
 
 
 def run_local(command: Sequence[str], frames: Sequence[int], process_count: int) -> Iterator[str]:
@@ -146,7 +112,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
             worker.stop()
         shutil.rmtree(folder, ignore_errors=True)
     failures = [
-        f"frames {format_frames(worker.frames)}: {_error_line(worker.lines)}"
+        f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"
         for worker in workers
         if worker.process.returncode
     ]
@@ -175,7 +141,7 @@ class _Worker:
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
-                env=worker_environment(),
+                env=os.environ | {"OMP_NUM_THREADS": "1"},
             )
         self._log = log.open("rb")
         self._partial_line = b""
@@ -205,84 +171,6 @@ class _Worker:
                 self.process.wait()
 
 
-def run_dask(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
-    """Run a command for all frames on the workers of a Dask cluster.
-
-    Workers need the same program and files under the same paths. If a worker is lost, its frames
-    are given to another one. If a task of several frames fails, its frames are run again one by
-    one.
-
-    Parameters
-    ----------
-    command : sequence of str
-        Without ``--frames``, which is added.
-    frames : sequence of int
-    address : str
-        Address of the scheduler.
-
-    Yields
-    ------
-    str
-        Lines of the output of each task that succeeded.
-
-    Raises
-    ------
-    RosyError
-        If Dask is not installed, the scheduler does not answer, or frames failed. Failed frames are
-        reported after all others have ended, each with its number and its error.
-    """
-    try:
-        from distributed import Client, as_completed
-    except ImportError:
-        raise RosyError("--scheduler needs Dask: pip install distributed") from None
-    try:
-        client = Client(address)
-    except (OSError, ValueError) as reason:
-        raise RosyError(f"--scheduler {address}: cannot connect: {reason}") from None
-    failures = []
-    with client:
-        frames = list(frames)
-        pending = {}
-
-        def submit(chunk: list[int]) -> Any:
-            text = format_frames(chunk)
-            future = client.submit(
-                subprocess.run,
-                [*command, f"--frames={text}"],
-                capture_output=True,
-                text=True,
-                key=f"rosy-{text}-{time.time_ns()}",
-                retries=MAX_RETRIES,
-                pure=False,
-            )
-            pending[future] = chunk
-            return future
-
-        chunks = [
-            frames[start : start + FRAMES_PER_TASK]
-            for start in range(0, len(frames), FRAMES_PER_TASK)
-        ]
-        futures = as_completed([submit(chunk) for chunk in chunks])
-        for future in futures:
-            chunk = pending.pop(future)
-            worker_lost = future.status == "error"
-            if not worker_lost and not future.result().returncode:
-                yield from future.result().stdout.splitlines()
-            elif len(chunk) > 1:
-                # Run the frames one by one, to find the one that fails and to complete the others.
-                for frame in chunk:
-                    futures.add(submit([frame]))
-            else:
-                cause = (
-                    repr(future.exception())
-                    if worker_lost
-                    else _error_line(future.result().stderr.splitlines())
-                )
-                failures.append((chunk[0], cause))
-    if failures:
-        raise RosyError("; ".join(f"frame {frame}: {cause}" for frame, cause in sorted(failures)))
-
-
 def format_frames(frames: Sequence[int]) -> str:
     """Write frames in the form that `parse_frames` reads."""
     if len(frames) == 1 or not isinstance(frames, range):
@@ -290,8 +178,8 @@ def format_frames(frames: Sequence[int]) -> str:
     return f"{frames[0]}-{frames[-1]}" + (f":{frames.step}" if frames.step > 1 else "")
 
 
-def _error_line(output: Sequence[str]) -> str:
-    """Return the error message in the output of a failed process.
+def error_line(output: Sequence[str]) -> str:
+    """Return the error message in the output of a failed command.
 
     It is the last line that begins with ``rosy:``, else the last line that is not empty.
     """

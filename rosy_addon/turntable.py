@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from .file_io import write_bytes
 from .image_io.gif import gif_task
 from .image_io.png import write_png
 from .memory import check_memory
-from .processes import process_task
 from .progress import Progress, Task, subtask
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
@@ -30,6 +28,9 @@ VIDEO_SUFFIXES = (".mp4", ".gif")
 #: A task that encodes a video. Its arguments are the folder of pictures, their number and size, the
 #: frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], Task[None]]
+
+#: What is wrong with an .mp4 for which there is no encoder.
+NO_ENCODER = "an .mp4 needs ffmpeg or Blender; a .gif needs neither"
 
 #: Bytes of memory of a pixel of a .gif: its colors until the end, and its compressed data.
 GIF_BYTES = 4.5
@@ -133,13 +134,20 @@ class VideoWriter:
         Frames per second.
     encode : function, optional
         Encodes the pictures of a folder as .mp4, given the folder, the number and size of the
-        pictures, the frames per second and the file; by default the program ffmpeg.
+        pictures, the frames per second and the file.
+
+    Raises
+    ------
+    RosyError
+        If an .mp4 has no encoder.
     """
 
     def __init__(self, path: Path, fps: float, encode: Encoder | None = None) -> None:
         self._path, self._fps = path, fps
-        self._encode = _ffmpeg_task if encode is None else encode
+        self._encode = encode
         self._is_gif = path.suffix.lower() == ".gif"
+        if encode is None and not self._is_gif:
+            raise RosyError(f"{path}: {NO_ENCODER}")
         self._temp_folder = tempfile.TemporaryDirectory()
         self._gif_frames: list[np.ndarray] = []
         self._count, self._size = 0, (0, 0)
@@ -200,13 +208,9 @@ class VideoWriter:
             return
         folder = Path(self._temp_folder.name)
         video_path = folder / "video.mp4"
+        assert self._encode is not None
         yield from self._encode(folder, self._count, self._size, self._fps, video_path)
         write_bytes(self._path, video_path.read_bytes())
-
-
-def has_ffmpeg() -> bool:
-    """Return whether the program ffmpeg is installed."""
-    return shutil.which("ffmpeg") is not None
 
 
 def check_video_path(path: Path) -> None:
@@ -219,20 +223,6 @@ def check_video_path(path: Path) -> None:
     """
     if path.suffix.lower() not in VIDEO_SUFFIXES:
         raise RosyError(f"{path}: the name of the video must end in {' or '.join(VIDEO_SUFFIXES)}")
-
-
-def _ffmpeg_task(
-    folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
-) -> Task[None]:
-    """Encode the pictures of a folder as .mp4 with the program ffmpeg. See `Encoder`."""
-    command = [
-        "ffmpeg", "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
-        "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
-    ]  # fmt: skip
-    status, output = yield from process_task(command, "encoding the video")
-    if status:
-        message = (output.strip().splitlines() or ["it failed"])[-1]
-        raise RosyError(f"ffmpeg: {message}")
 
 
 def _over_white(rgba: np.ndarray) -> np.ndarray:

@@ -7,11 +7,8 @@ Each command has its options and its function in one module. Modules in order of
 
     streams                                          safe output
     options, view, mesh_field, look, stroke_style    options that several commands share
+    extras                                           what the Python package adds
     scene, bake_workers                              Blender files, and processes for frames
     render, strokes, field, bake, presets            the commands
     parser                                           the parser of all commands, and `main`
 """
-
-from .parser import main
-
-__all__ = ["main"]

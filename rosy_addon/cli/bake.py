@@ -14,14 +14,15 @@ from ..frame_workers import parse_frames
 from ..gpu.select import RENDER_DEVICES
 from ..progress import Task
 from .bake_workers import run_workers, uses_workers
+from .extras import Extras
 from .look import add_look_options, requested_look
 from .options import add_object_option, add_subcommand, add_workers_option, parse_size
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
 
-def add_bake_command(subparsers: Any) -> None:
-    """Add the command `bake`."""
+def add_bake_command(subparsers: Any, extras: Extras) -> None:
+    """Add the command `bake`, with --scheduler if there is a cluster to run it on."""
     parser = add_subcommand(subparsers, "bake", run_bake)
     parser.add_argument(
         "scene",
@@ -61,11 +62,13 @@ def add_bake_command(subparsers: Any) -> None:
     workers.add_argument(
         "--jobs", type=int, default=1, metavar="J", help="number of processes for the frames"
     )
-    workers.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="address of a Dask cluster whose workers draw the frames",
-    )
+    parser.set_defaults(scheduler=None)
+    if extras.run_on_cluster is not None:
+        workers.add_argument(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="address of a Dask cluster whose workers draw the frames",
+        )
 
 
 def run_bake(options: argparse.Namespace) -> None:

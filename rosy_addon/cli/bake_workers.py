@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import RosyError
 from ..file_io import check_readable
-from ..frame_workers import parse_frames, run_dask, run_local, worker_command
+from ..frame_workers import parse_frames, run_local
 from ..presets.store import SHIPPED_FOLDER, find_preset_file
 from .presets import user_presets_folder
 from .streams import print_line
@@ -32,10 +32,17 @@ def run_workers(options: argparse.Namespace) -> None:
             )
         scene = Path(blend_data.filepath)
     check_readable(scene)
-    command = worker_command(blender_path, Path(os.path.realpath(scene))) + _forwarded_args(options)
+    real_path = os.path.realpath(scene)
+    if blender_path:
+        command = [blender_path, "-b", real_path, "--command", "rosy", "bake"]
+    elif not options.extras.program:
+        raise RosyError("--jobs needs Blender, or the command line of the Python package")
+    else:
+        command = [*options.extras.program, "bake", real_path]
+    command += _forwarded_args(options)
     frames = parse_frames(options.frames)
     if options.scheduler is not None:
-        output_lines = run_dask(command, frames, options.scheduler)
+        output_lines = options.extras.run_on_cluster(command, frames, options.scheduler)
     else:
         output_lines = run_local(command, frames, options.jobs)
     for line in output_lines:

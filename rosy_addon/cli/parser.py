@@ -10,6 +10,7 @@ from typing import TextIO
 
 from ..errors import REPORTED_ERRORS, error_text
 from .bake import add_bake_command
+from .extras import NO_EXTRAS, Extras
 from .field import add_field_command, add_info_command
 from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
@@ -24,7 +25,11 @@ NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")
 EXIT_OK, EXIT_OUTPUT_ERROR, EXIT_USER_ERROR, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 0, 1, 2, 130, 141
 
 
-def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command rosy") -> int:
+def main(
+    argv: Sequence[str] | None = None,
+    prog: str = "blender -b --command rosy",
+    extras: Extras = NO_EXTRAS,
+) -> int:
     """Run a command.
 
     Parameters
@@ -33,6 +38,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
         Without the program name; `sys.argv[1:]` by default.
     prog : str
         How the user starts the program, for the help.
+    extras : Extras
+        What the commands can do besides.
 
     Returns
     -------
@@ -41,7 +48,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "blender -b --command ro
     """
     arguments = sys.argv[1:] if argv is None else argv
     try:
-        options = _build_parser(prog).parse_args(_join_negative_values(arguments))
+        options = _build_parser(prog, extras).parse_args(_join_negative_values(arguments))
         options.run(options)
         sys.stdout.flush()
     except REPORTED_ERRORS as error:
@@ -70,12 +77,13 @@ class _Parser(argparse.ArgumentParser):
         print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
 
 
-def _build_parser(prog: str) -> argparse.ArgumentParser:
+def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     parser = _Parser(prog=prog, description="Draw N-way rotational symmetry fields on meshes.")
+    parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
+    add_bake_command(subparsers, extras)
     for add_command in (
-        add_bake_command,
         add_render_command,
         add_strokes_command,
         add_turntable_command,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,13 @@ from ..render.band_workers import BandWorkers
 from ..render.cpu import CpuRenderer
 from ..render.mesh_view import mesh_instance, mesh_view
 from ..render.view_input import ViewInput
-from ..turntable import Encoder, check_video_path, has_ffmpeg, turntable_task, turntable_views
+from ..turntable import (
+    NO_ENCODER,
+    Encoder,
+    check_video_path,
+    turntable_task,
+    turntable_views,
+)
 from .look import (
     add_look_options,
     add_tone_options,
@@ -114,7 +121,7 @@ def run_turntable(options: argparse.Namespace) -> None:
     check_video_path(options.output)
     if options.pictures < 2 or not options.rate > 0:
         raise RosyError("a turntable needs 2 or more --pictures, and a --rate above 0")
-    encode = _video_encoder(options.output)
+    encode = _video_encoder(options)
     look = mesh_file_look(options)
     surface, field = load_mesh_and_field(options)
     instance = mesh_instance(surface, field, up_axis(options), load_tone_map(options, surface))
@@ -129,15 +136,18 @@ def run_turntable(options: argparse.Namespace) -> None:
         run_to_completion(task)
 
 
-def _video_encoder(path: Path) -> Encoder | None:
-    """Return Blender's encoder if the video needs one and there is no ffmpeg."""
-    if path.suffix.lower() != ".mp4" or has_ffmpeg():
+def _video_encoder(options: argparse.Namespace) -> Encoder | None:
+    """Return ffmpeg's or Blender's encoder for an .mp4, or None."""
+    if options.output.suffix.lower() != ".mp4":
         return None
-    try:
-        from ..scene.video import encode_video_task
-    except ImportError:
-        raise RosyError(f"{path}: an .mp4 needs ffmpeg or Blender; a .gif needs neither") from None
-    return encode_video_task
+    find_encoder = options.extras.find_encoder
+    encode = None if find_encoder is None else find_encoder()
+    if encode is None:
+        with contextlib.suppress(ImportError):
+            from ..scene.video import encode_video_task as encode
+    if encode is None:
+        raise RosyError(f"{options.output}: {NO_ENCODER}")
+    return encode
 
 
 def _log_views(views: Iterator[ViewInput], count: int) -> Iterator[ViewInput]:

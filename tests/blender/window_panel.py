@@ -449,7 +449,7 @@ def turntable_stopped_with_escape():
 
 
 def turntable_encoded_by_another_blender():
-    """Without ffmpeg another Blender encodes an .mp4, and this one handles its events."""
+    """Another Blender encodes an .mp4, and this one handles its events."""
     path = yield from start_turntable("encoded.mp4", 3)
     ticks = 0
     while status().current is not None:

@@ -18,7 +18,7 @@ from rosy.rosy_addon import animation
 from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local, worker_command
+from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local
 from rosy.rosy_addon.gpu.select import select_renderer
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
@@ -346,7 +346,17 @@ def test_jobs_share_the_frames(file, tmp_path):
 
 
 def test_failed_frames_are_named(file, tmp_path, monkeypatch):
-    command = [*worker_command("", file), "--out", str(tmp_path / "out"), "--camera", "Nobody"]
+    command = [
+        sys.executable,
+        "-m",
+        "rosy_addon",
+        "bake",
+        str(file),
+        "--out",
+        str(tmp_path / "out"),
+        "--camera",
+        "Nobody",
+    ]
     monkeypatch.chdir(ROOT)
     with pytest.raises(RosyError, match=r"frames 1-5:2: there is no camera 'Nobody'"):
         list(run_local(command, range(1, 7), 2))

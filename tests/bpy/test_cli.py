@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from rosy.rosy_addon.cli import main
+from rosy.rosy_addon.cli.parser import main
 from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.strokes.svg import Pen
 from scenes import add_camera

@@ -114,9 +114,9 @@ def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
         os.chdir(folder)
         os.environ.update(case.environment)
         _set_limits()
-        from rosy_addon.cli import main
+        from rosy_addon.extras.command_line import main
 
-        status = main(case.arguments, prog="rosy")
+        status = main(case.arguments)
     except BaseException:
         traceback.print_exc()
     finally:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.random import Generator
 
-from rosy_addon.cli import main
+from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.scene.meshes import mesh_surface
 from rosy_addon.settings import settings_of

@@ -84,13 +84,17 @@ MAY_IMPORT = {
         "image_io",
         "presets",
     },
-    "__main__": {"cli"},
+    "extras": BASE_ROOMS | {"cli", "frame_workers", "turntable"},
+    "__main__": {"extras"},
     "__init__": set(),
 }
 NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
 
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
+
+#: What the Python package can use where it is installed.
+EXTRA_LIBRARIES = {"distributed", "imageio_ffmpeg"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -127,8 +131,8 @@ def test_imports_run_one_way(path):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
-    if room == "frame_workers":
-        allowed |= {"distributed"}  # optional, imported only if the user chooses it
+    if room == "extras":
+        allowed |= EXTRA_LIBRARIES
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 
 

@@ -17,13 +17,14 @@ from shapes import icosphere, torus
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
+from rosy_addon.extras.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, gif_task, lzw_compress
 from rosy_addon.processes import process_task
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.turntable import check_video_path, turntable_task, turntable_views
+from rosy_addon.turntable import VideoWriter, check_video_path, turntable_task, turntable_views
 
 QUICK = Look(length=8)
 
@@ -163,3 +164,24 @@ def test_an_unfinished_video_leaves_no_file(tmp_path):
             break
     task.close()
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_an_mp4_with_ffmpeg(tmp_path):
+    """As many pictures as drawn come back, and their colors."""
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    surface = icosphere(2)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
+    views = turntable_views(instance, QUICK, 4, (64, 48), (0.0, 0.0))
+    path = tmp_path / "film.mp4"
+    run_to_completion(turntable_task(CpuRenderer(), views, 4, path, 12, find_encoder()))
+    facts, *pictures = imageio_ffmpeg.read_frames(str(path))
+    assert facts["fps"] == 12 and facts["codec"] == "h264" and facts["source_size"] == (64, 48)
+    assert len(pictures) == 4
+    for picture in pictures:
+        assert np.frombuffer(picture, np.uint8).reshape(48, 64, 3)[0, 0].min() > 250  # paper
+
+
+def test_an_mp4_needs_an_encoder(tmp_path):
+    with pytest.raises(RosyError, match=r"film\.mp4: an \.mp4 needs ffmpeg or Blender"):
+        VideoWriter(tmp_path / "film.mp4", 12)

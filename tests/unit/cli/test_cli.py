@@ -16,8 +16,9 @@ import pytest
 from conftest import ROOT, long
 from shapes import cube, icosphere, torus
 
-from rosy_addon.cli import bake_workers, main
+from rosy_addon.cli import bake_workers, parser
 from rosy_addon.color import to_linear
+from rosy_addon.extras.command_line import main
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
 from rosy_addon.presets.store import preset_files
@@ -303,7 +304,7 @@ def test_wrong_usage_is_status_2(words):
 
 def test_help_names_the_program_it_was_started_as(capsys):
     assert rosy("--help").stdout.startswith("usage: python -m rosy_addon [-h] VERB")
-    assert main(["--help"]) == 0
+    assert parser.main(["--help"]) == 0
     assert capsys.readouterr().out.startswith("usage: blender -b --command rosy")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from awkward import AWKWARD
 
-from rosy_addon.cli import main
+from rosy_addon.cli.parser import main
 from rosy_addon.field.generate import GENERATORS
 
 #: Degrees in which the edges around each square, or each equilateral triangle, cancel.

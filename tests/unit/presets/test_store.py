@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from rosy_addon.cli import main
+from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.image_io.png import to_srgb_uint8

@@ -1,0 +1,18 @@
+"""The command line of the Python package: the commands, with what is not in the extension."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from ..cli.extras import Extras
+from ..cli.parser import main as cli_main
+from .cluster import run_on_cluster
+from .ffmpeg import find_encoder
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command, and return its exit status. See `cli.parser.main`."""
+    package = __package__.split(".")[0]
+    extras = Extras((sys.executable, "-m", package), run_on_cluster, find_encoder)
+    return cli_main(argv, f"python -m {package}", extras)

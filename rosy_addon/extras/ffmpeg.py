@@ -1,0 +1,43 @@
+"""Encoding videos with the program ffmpeg."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from ..errors import RosyError
+from ..processes import process_task
+from ..progress import Task
+from ..turntable import Encoder
+
+
+def find_encoder() -> Encoder | None:
+    """Return the encoder of .mp4 files, or None if ffmpeg is not installed.
+
+    It is the program on the path, or that of the package imageio-ffmpeg.
+    """
+    program = shutil.which("ffmpeg")
+    if program is None:
+        try:
+            from imageio_ffmpeg import get_ffmpeg_exe
+        except ImportError:
+            return None
+        try:
+            program = get_ffmpeg_exe()
+        except RuntimeError:  # the package has none for this system
+            return None
+
+    def encode_task(
+        folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
+    ) -> Task[None]:
+        """Encode the pictures of a folder. See `Encoder`."""
+        command = [
+            program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
+            "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
+        ]  # fmt: skip
+        status, output = yield from process_task(command, "encoding the video")
+        if status:
+            message = (output.strip().splitlines() or ["it failed"])[-1]
+            raise RosyError(f"ffmpeg: {message}")
+
+    return encode_task

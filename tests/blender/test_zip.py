@@ -1,8 +1,13 @@
-"""The zip holds what Blender needs and nothing else."""
+"""The zip as a reviewer of the Extensions platform reads it: CONTRIBUTING.md has the sources."""
 
 import ast
 import os
+import re
+import sys
+import tomllib
 import zipfile
+
+import pytest
 
 TOP_LEVEL = {
     "LICENSE",
@@ -12,42 +17,137 @@ TOP_LEVEL = {
     "presets",
     "rosy_addon",
 }
+SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt"}
+
+#: Modules that come with Blender.
+BLENDER_MODULES = {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
+
+#: Modules of Python that are turned down: threads crash Blender, and RoSy uses no network, installs
+#: nothing and loads no code.
+REFUSED_MODULES = {
+    *("threading", "_thread", "multiprocessing", "concurrent", "asyncio", "queue"),
+    *("socket", "ssl", "urllib", "http", "ftplib", "smtplib", "webbrowser", "xmlrpc"),
+    *("pip", "ensurepip", "venv", "site", "importlib", "runpy", "imp", "pkgutil", "marshal"),
+}
+
+#: Modules that reviewers ask about, and the files that may use them: what RoSy starts is Blender or
+#: its own workers in Blender's Python, and pickles are only between these.
+QUESTIONED_MODULES = {
+    "subprocess": {"frame_workers.py", "processes.py", "render/band_workers.py"},
+    "pickle": {"render/band_workers.py", "render/band_worker.py"},
+    "ctypes": {"memory.py"},
+}
+
+#: Files that look for others beside themselves, to read or to run them.
+FILES_WITH_PATHS = {
+    "gpu/passes.py": "shaders",
+    "presets/store.py": "presets",
+    "render/band_workers.py": "the code of the workers",
+    "scene/video.py": "the script that encodes videos",
+}
+
+REFUSED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint", "input"}
+REFUSED_ATTRIBUTES = {("os", "system"), ("os", "popen"), ("os", "startfile"), ("sys", "path")}
+REFUSED_TEXT = re.compile(r"PYTHONPATH|pip install|https?://(?!www\.inkscape|www\.w3|sodipodi)")
+
+#: Tags of the platform for add-ons.
+TAGS = {
+    *("3D View", "Add Curve", "Add Mesh", "Animation", "Bake", "Camera", "Compositing"),
+    *("Development", "Game Engine", "Geometry Nodes", "Grease Pencil", "Import-Export"),
+    *("Lighting", "Material", "Mesh", "Modeling", "Node", "Object", "Paint", "Physics"),
+    *("Pipeline", "Render", "Rigging", "Scene", "Sculpt", "Sequencer", "System", "Text Editor"),
+    *("Tracking", "UV", "User Interface"),
+}
 
 
-def test_contents():
-    path = os.environ["ROSY_ZIP"]
-    with zipfile.ZipFile(path) as zipped:
-        names = zipped.namelist()
-    assert {name.split("/")[0] for name in names} <= TOP_LEVEL
-    assert {name.rsplit(".", 1)[-1] for name in names if "." in name} <= {
-        "py",
-        "toml",
-        "json",
-        "glsl",
-        "png",
-    }
-    pictures = {name for name in names if name.endswith(".png")}
-    looks = {name for name in names if name.startswith("presets/") and name.endswith(".json")}
-    assert pictures == {name.replace(".json", ".png") for name in looks}
-    assert os.path.getsize(path) < 1_000_000
-
-
-#: Modules that the Extensions platform turns down: threads crash Blender.
-THREADS = {"threading", "_thread", "multiprocessing", "concurrent", "asyncio", "queue"}
-
-
-def test_no_threads():
+@pytest.fixture(scope="module")
+def files():
     with zipfile.ZipFile(os.environ["ROSY_ZIP"]) as zipped:
-        for name in zipped.namelist():
-            if name.endswith(".py"):
-                imported = imported_modules(zipped.read(name))
-                assert not imported & THREADS, f"{name} imports {imported & THREADS}"
+        return {name: zipped.read(name) for name in zipped.namelist() if not name.endswith("/")}
 
 
-def imported_modules(source):
+@pytest.fixture(scope="module")
+def sources(files):
+    return {
+        name.removeprefix("rosy_addon/"): ast.parse(data)
+        for name, data in files.items()
+        if name.endswith(".py")
+    }
+
+
+def test_contents(files):
+    assert {name.split("/")[0] for name in files} <= TOP_LEVEL
+    assert {name.rsplit(".", 1)[-1] for name in files if "." in name} <= SUFFIXES
+    pictures = {name for name in files if name.endswith(".png")}
+    looks = {name for name in files if name.startswith("presets/") and name.endswith(".json")}
+    assert pictures == {name.replace(".json", ".png") for name in looks}
+    assert b"CC0" in files["presets/LICENSE.txt"]
+    assert os.path.getsize(os.environ["ROSY_ZIP"]) < 1_000_000
+    assert max(map(len, files.values())) < 60_000
+    assert not any(name.startswith("rosy_addon/extras/") for name in files)
+    assert "rosy_addon/__main__.py" not in files
+
+
+def test_manifest(files):
+    manifest = tomllib.loads(files["blender_manifest.toml"].decode())
+    assert manifest["website"].startswith("https://")
+    texts = [manifest["tagline"], *manifest["permissions"].values()]
+    for text in texts:
+        assert len(text) <= 64 and text[0].isupper() and text[-1] not in ".!?", text
+    assert set(manifest["permissions"]) == {"files"}
+    assert set(manifest["tags"]) <= TAGS
+    assert set(manifest["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:CC0-1.0"}
+    assert "blender" not in manifest["name"].lower() + manifest["id"]
+    assert not {"blender_version_max", "wheels", "platforms"} & set(manifest)
+
+
+def test_imports(sources):
+    for name, tree in sources.items():
+        modules = imported_modules(tree)
+        assert modules <= BLENDER_MODULES | set(sys.stdlib_module_names), name
+        assert not modules & REFUSED_MODULES, f"{name} imports {modules & REFUSED_MODULES}"
+        for module in modules & set(QUESTIONED_MODULES):
+            assert name in QUESTIONED_MODULES[module], f"{name} imports {module}"
+
+
+def test_calls_paths_and_texts(sources):
+    for name, tree in sources.items():
+        docstrings = docstrings_of(tree)
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id=called)):
+                    assert called not in REFUSED_CALLS, f"{name} calls {called}"
+                case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
+                    is_refused = (owner, attribute) in REFUSED_ATTRIBUTES
+                    # Workers look for modules where Blender does.
+                    is_refused &= name != "render/band_workers.py"
+                    assert not is_refused, f"{name} uses {owner}.{attribute}"
+                case ast.Name(id="__file__") | ast.Attribute(attr="__file__"):
+                    assert name in FILES_WITH_PATHS, f"{name} uses __file__"
+                case ast.Constant(value=str(text)) if node not in docstrings:
+                    assert not REFUSED_TEXT.search(text), f"{name}: {text}"
+
+
+def test_packages_have_only_docstrings(sources):
+    """What a package imports at once would be loaded even if it is not used."""
+    for name, tree in sources.items():
+        if name.endswith("/__init__.py"):
+            assert len(tree.body) == 1 and ast.get_docstring(tree), name
+
+
+def docstrings_of(tree):
+    """Return the nodes of all docstrings: they may cite pages."""
+    return {
+        node.body[0].value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node)
+    }
+
+
+def imported_modules(tree):
     """Return the top-level names of all modules that a file imports."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:

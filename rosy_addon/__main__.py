@@ -11,10 +11,15 @@ def _stop_at_once(*_: object) -> None:
     os._exit(130)
 
 
-# A KeyboardInterrupt inside an import may become another exception.
-signal.signal(signal.SIGINT, _stop_at_once)
+def run() -> int:
+    """Run the command of `sys.argv`, and return its exit status."""
+    # A KeyboardInterrupt inside an import may become another exception.
+    signal.signal(signal.SIGINT, _stop_at_once)
+    from .extras.command_line import main
 
-from .extras.command_line import main  # noqa: E402
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    return main()
 
-signal.signal(signal.SIGINT, signal.default_int_handler)
-sys.exit(main())
+
+if __name__ == "__main__":
+    sys.exit(run())

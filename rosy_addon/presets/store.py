@@ -25,7 +25,7 @@ from ..settings import settings_of
 from .preview import draw_preview
 
 #: Folder of the shipped presets.
-SHIPPED_FOLDER = Path(__file__).resolve().parents[2] / "presets"
+SHIPPED_FOLDER = Path(__file__).resolve().with_name("shipped")
 
 #: Key of the preset with the default look.
 DEFAULT_KEY = "default"

@@ -14,9 +14,11 @@ TOP_LEVEL = {
     "__init__.py",
     "blender_manifest.toml",
     "operators",
-    "presets",
     "rosy_addon",
 }
+#: The folder of the presets.
+PRESETS = "rosy_addon/presets/shipped/"
+
 SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt"}
 
 #: Modules that come with Blender.
@@ -79,9 +81,9 @@ def test_contents(files):
     assert {name.split("/")[0] for name in files} <= TOP_LEVEL
     assert {name.rsplit(".", 1)[-1] for name in files if "." in name} <= SUFFIXES
     pictures = {name for name in files if name.endswith(".png")}
-    looks = {name for name in files if name.startswith("presets/") and name.endswith(".json")}
+    looks = {name for name in files if name.startswith(PRESETS) and name.endswith(".json")}
     assert pictures == {name.replace(".json", ".png") for name in looks}
-    assert b"CC0" in files["presets/LICENSE.txt"]
+    assert b"CC0" in files[PRESETS + "LICENSE.txt"]
     assert os.path.getsize(os.environ["ROSY_ZIP"]) < 1_000_000
     assert max(map(len, files.values())) < 60_000
     assert not any(name.startswith("rosy_addon/extras/") for name in files)

@@ -20,7 +20,7 @@ import numpy as np
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
 from rosy_addon.progress import run_to_completion
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
 

@@ -17,9 +17,9 @@ from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
 from rosy_addon.progress import run_to_completion
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.render.picture_memory import picture_memory, view_coverage
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.picture_memory import picture_memory, view_coverage
+from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
 from .timing import Case, main

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from rosy_addon.progress import run_to_completion
-from rosy_addon.render.band_workers import BandWorkers
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.band_workers import BandWorkers
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
 from .surface_vtk import AZIMUTH_STEP, DEGREE, LARGE_SIZE, LOOK, SAMPLES_LABEL, vtk_renderer

@@ -15,11 +15,11 @@ from ..rosy_addon.file_io import check_writable
 from ..rosy_addon.gpu.select import select_renderer
 from ..rosy_addon.progress import Task, subtask
 from ..rosy_addon.projection.camera import check_size
-from ..rosy_addon.render.band_workers import BandWorkers
+from ..rosy_addon.rendering.band_workers import BandWorkers
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.read_view import read_turntable_task
 from ..rosy_addon.scene.video import encode_video_task
-from ..rosy_addon.turntable import (
+from ..rosy_addon.turntable_video import (
     check_video_path,
     turntable_task,
     turntable_views,

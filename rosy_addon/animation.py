@@ -27,9 +27,9 @@ from .file_io import check_folder, check_writable, read_bytes, remove_leftovers,
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
-from .render.band_workers import BandWorkers
-from .render.renderer import Renderer
-from .render.view_input import ViewInput
+from .rendering.band_workers import BandWorkers
+from .rendering.renderer import Renderer
+from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import frame_path, image_data_task, write_frame

@@ -10,7 +10,7 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
-from .render.band_workers import BandWorkers
+from .rendering.band_workers import BandWorkers
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import image_data_task

@@ -12,15 +12,15 @@ from .cache import BAKE_CACHE
 from .compositor.shading import lights_of
 from .errors import RosyError
 from .file_io import check_writable, write_bytes
+from .line_drawing.pipeline import StrokeDrawing, draw_instances_task, geometry_task
+from .line_drawing.style import StrokeStyle
+from .line_drawing.svg import Pen, svg_task
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
 from .scene.scene_reader import SceneData, read_scene_task
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
-from .strokes.pipeline import StrokeDrawing, draw_instances_task, geometry_task
-from .strokes.style import StrokeStyle
-from .strokes.svg import Pen, svg_task
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from ..turntable import Encoder
+from ..turntable_video import Encoder
 
 
 @dataclass(frozen=True)

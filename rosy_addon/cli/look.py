@@ -17,7 +17,7 @@ from ..field.surface import Surface
 from ..image_io.png import read_png
 from ..presets.store import load_preset, preset_keys
 from ..projection.surface_tone import SurfaceTone
-from ..render.mesh_view import check_light
+from ..rendering.mesh_view import check_light
 from ..settings import settings_of
 from .mesh_field import load_uv_map
 from .presets import user_presets_folder

@@ -13,11 +13,11 @@ from ..color import luminance
 from ..errors import RosyError
 from ..image_io.png import read_png, write_png
 from ..progress import run_to_completion
-from ..render.band_workers import BandWorkers
-from ..render.cpu import CpuRenderer
-from ..render.mesh_view import mesh_instance, mesh_view
-from ..render.view_input import ViewInput
-from ..turntable import (
+from ..rendering.band_workers import BandWorkers
+from ..rendering.cpu import CpuRenderer
+from ..rendering.mesh_view import mesh_instance, mesh_view
+from ..rendering.view_input import ViewInput
+from ..turntable_video import (
     NO_ENCODER,
     Encoder,
     check_video_path,

@@ -6,9 +6,9 @@ import argparse
 from dataclasses import replace
 from functools import partial
 
+from ..line_drawing.style import StrokeStyle
+from ..line_drawing.svg import Pen
 from ..settings import Choice, Number, Setting, Switch, settings_of
-from ..strokes.style import StrokeStyle
-from ..strokes.svg import Pen
 from .options import float_between
 
 #: Placeholders of numbers in the help, by their units.

@@ -12,11 +12,11 @@ from typing import Any
 from ..compositor.shading import lights_of
 from ..errors import RosyError
 from ..frame_workers import parse_frames
+from ..line_drawing.pipeline import draw_instances
+from ..line_drawing.style import StrokeStyle
+from ..line_drawing.svg import Pen, write_svg
 from ..projection.camera import orbit_camera
-from ..render.mesh_view import check_light, mesh_instance
-from ..strokes.pipeline import draw_instances
-from ..strokes.style import StrokeStyle
-from ..strokes.svg import Pen, write_svg
+from ..rendering.mesh_view import check_light, mesh_instance
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_object_option, add_subcommand, check_output
 from .scene import find_camera, open_scene, print_warnings, requested_objects

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..projection.camera import check_size
-from ..render.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from ..rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .options import float_tuple, parse_size
 
 #: Azimuth and elevation in degrees: from the front left, looking slightly down.

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import RosyError
 from ..processes import process_task
 from ..progress import Task
-from ..turntable import Encoder
+from ..turntable_video import Encoder
 
 
 def find_encoder() -> Encoder | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..render.view_input import Background
+from ..rendering.view_input import Background
 from .device import Device
 from .passes import BACKGROUND
 

@@ -13,8 +13,8 @@ from ..errors import NothingInViewError
 from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..render.cpu import CpuRenderer
-from ..render.view_input import Background, ViewInput
+from ..rendering.cpu import CpuRenderer
+from ..rendering.view_input import Background, ViewInput
 from .background import draw_background
 from .device import Device
 from .passes import BACKGROUND, COMPOSITE

@@ -20,7 +20,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
-from ..render.view_input import Background, ViewInput
+from ..rendering.view_input import Background, ViewInput
 from . import lookup_tables, passes
 from .background import draw_background
 from .device import Device

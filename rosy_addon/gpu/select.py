@@ -5,9 +5,9 @@ from __future__ import annotations
 from ..cache import Cache
 from ..compositor.look import Look
 from ..errors import DeviceError
-from ..render.band_workers import BandWorkers
-from ..render.cpu import CpuRenderer
-from ..render.renderer import Renderer, ViewportRenderer
+from ..rendering.band_workers import BandWorkers
+from ..rendering.cpu import CpuRenderer
+from ..rendering.renderer import Renderer, ViewportRenderer
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer

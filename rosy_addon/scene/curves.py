@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
-from ..strokes.pipeline import StrokeGeometry
+from ..line_drawing.pipeline import StrokeGeometry
 from .compat import has_nodes_by_default
 
 #: Called with each datablock that is created and the name that it should have.

@@ -14,7 +14,7 @@ from ..compositor.shading import Light
 from ..errors import RosyError
 from ..progress import Task
 from ..projection.gbuffer import MeshInstance
-from ..render.view_input import ViewInput
+from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
 from .lights import read_lights
 from .scene_reader import SceneData, read_scene_task

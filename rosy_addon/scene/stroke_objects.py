@@ -15,9 +15,9 @@ from mathutils import Matrix
 from ..color import to_hex
 from ..compositor.family_hues import PALETTE
 from ..errors import RosyError
-from ..strokes.pipeline import StrokeGeometry
-from ..strokes.style import StrokeStyle
-from ..strokes.svg import Pen
+from ..line_drawing.pipeline import StrokeGeometry
+from ..line_drawing.style import StrokeStyle
+from ..line_drawing.svg import Pen
 from .compat import is_editable
 from .curves import new_curves
 from .grease_pencil import new_grease_pencil

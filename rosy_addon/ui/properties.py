@@ -11,12 +11,12 @@ from ..color import from_hex
 from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
+from ..line_drawing.style import StrokeStyle
 from ..presets.store import DEFAULT_KEY
 from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
-from ..strokes.style import StrokeStyle
 from . import preset_library
 
 CAMERA_ITEMS = [

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
 from ..settings import panel_settings, settings_of
-from ..strokes.style import StrokeStyle
 from . import job_status
 from .sidebar import SidebarPanel, draw_progress, use_property_columns
 

@@ -9,7 +9,7 @@ from ..color import from_hex, to_linear
 from ..compositor.look import Look, is_hatched
 from ..errors import RosyError
 from ..projection.camera import Camera
-from ..render.view_input import Background
+from ..rendering.view_input import Background
 from ..scene.backdrop import frame_corners
 from ..scene.cameras import camera_of_object
 

@@ -10,8 +10,8 @@ from typing import Any
 from ..compositor.look_units import preview_look
 from ..errors import RosyError, error_text
 from ..progress import Progress, Task, run_to_completion
-from ..render.renderer import ViewportRenderer
-from ..render.view_input import ViewInput
+from ..rendering.renderer import ViewportRenderer
+from ..rendering.view_input import ViewInput
 
 #: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
 FRAME_BUDGET_SECONDS, SLICE_SECONDS = 0.06, 0.08

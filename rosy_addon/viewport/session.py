@@ -11,7 +11,7 @@ import bpy
 
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
-from ..render.view_input import ViewInput
+from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.lights import read_lights
 from ..scene.look_properties import read_look

@@ -335,7 +335,7 @@ def strokes(monkey):
     ):
         return  # strokes on what is much larger than the frame take minutes
     settings = bpy.context.scene.rosy.strokes
-    style = rosy("rosy_addon.strokes.style").StrokeStyle
+    style = rosy("rosy_addon.line_drawing.style").StrokeStyle
     randomize(monkey, settings, style, 0.2)
     if settings.unit == "world" or settings.spacing < 3:  # any number of strokes
         settings.unit, settings.spacing = "pixels", monkey.pick([4.0, 9.0, 1e4])

@@ -153,7 +153,7 @@ def test_lack_of_memory_is_reported(with_field, monkeypatch, free, message):
     """Whether it is known before, or noticed when the memory is taken."""
     modules = {
         name: sys.modules[f"bl_ext.user_default.rosy.rosy_addon.{name}"]
-        for name in ("memory", "render.picture_memory")
+        for name in ("memory", "rendering.picture_memory")
     }
 
     def fail(*_):

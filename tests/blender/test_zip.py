@@ -35,8 +35,8 @@ REFUSED_MODULES = {
 #: Modules that reviewers ask about, and the files that may use them: what RoSy starts is Blender or
 #: its own workers in Blender's Python, and pickles are only between these.
 QUESTIONED_MODULES = {
-    "subprocess": {"frame_workers.py", "processes.py", "render/band_workers.py"},
-    "pickle": {"render/band_workers.py", "render/band_worker.py"},
+    "subprocess": {"frame_workers.py", "processes.py", "rendering/band_workers.py"},
+    "pickle": {"rendering/band_workers.py", "rendering/band_worker.py"},
     "ctypes": {"memory.py"},
 }
 
@@ -44,7 +44,7 @@ QUESTIONED_MODULES = {
 FILES_WITH_PATHS = {
     "gpu/passes.py": "shaders",
     "presets/store.py": "presets",
-    "render/band_workers.py": "the code of the workers",
+    "rendering/band_workers.py": "the code of the workers",
     "scene/video.py": "the script that encodes videos",
 }
 
@@ -122,7 +122,7 @@ def test_calls_paths_and_texts(sources):
                 case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
                     is_refused = (owner, attribute) in REFUSED_ATTRIBUTES
                     # Workers look for modules where Blender does.
-                    is_refused &= name != "render/band_workers.py"
+                    is_refused &= name != "rendering/band_workers.py"
                     assert not is_refused, f"{name} uses {owner}.{attribute}"
                 case ast.Name(id="__file__") | ast.Attribute(attr="__file__"):
                     assert name in FILES_WITH_PATHS, f"{name} uses __file__"

@@ -300,7 +300,7 @@ def stop_with_escape():
 
 def workers_stopped_with_escape():
     """The processes that draw a large picture together end, and their files are removed."""
-    module = rosy("rosy_addon.render.band_workers")
+    module = rosy("rosy_addon.rendering.band_workers")
     draw_together, started = module.BandWorkers._draw_together_task, []
 
     def noted(pool, view, jobs, cache):

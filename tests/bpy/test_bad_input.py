@@ -11,7 +11,7 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
-from rosy.rosy_addon.render import picture_memory
+from rosy.rosy_addon.rendering import picture_memory
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.face_values import read_face_scalars
 from rosy.rosy_addon.scene.guides import (

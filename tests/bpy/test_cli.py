@@ -10,7 +10,7 @@ import bpy
 import pytest
 from rosy.rosy_addon.cli.parser import main
 from rosy.rosy_addon.draw_strokes import draw_strokes
-from rosy.rosy_addon.strokes.svg import Pen
+from rosy.rosy_addon.line_drawing.svg import Pen
 from scenes import add_camera
 
 ROOT = Path(__file__).resolve().parents[2]

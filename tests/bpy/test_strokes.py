@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.surface import build_surface
+from rosy.rosy_addon.line_drawing.pipeline import draw_instances
+from rosy.rosy_addon.line_drawing.style import StrokeStyle
+from rosy.rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy.rosy_addon.line_drawing.trace import trace_strokes
+from rosy.rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy.rosy_addon.projection.camera import orbit_camera
 from rosy.rosy_addon.projection.gbuffer import MeshInstance
-from rosy.rosy_addon.strokes.pipeline import draw_instances
-from rosy.rosy_addon.strokes.style import StrokeStyle
-from rosy.rosy_addon.strokes.tangent_mesh import build_tangent_mesh
-from rosy.rosy_addon.strokes.trace import trace_strokes
-from rosy.rosy_addon.strokes.visibility import project_to_pixels
 from rosy.tests.harness.outline_marks import visible_silhouettes
 from rosy.tests.harness.stroke_spacing import lateral_gaps
 from scipy.spatial import cKDTree

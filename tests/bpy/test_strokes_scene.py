@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from rosy.rosy_addon.draw_strokes import draw_strokes, draw_strokes_task
 from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
+from rosy.rosy_addon.line_drawing.style import StrokeStyle
+from rosy.rosy_addon.line_drawing.svg import Pen
+from rosy.rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
-from rosy.rosy_addon.strokes.outline import OUTLINE_KINDS
-from rosy.rosy_addon.strokes.style import StrokeStyle
-from rosy.rosy_addon.strokes.svg import Pen
-from rosy.rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
 
 PLAIN = StrokeStyle(spacing=8, outline=True)

@@ -10,7 +10,7 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.progress import run_to_completion
 from rosy.rosy_addon.scene.lights import read_lights
 from rosy.rosy_addon.scene.read_view import read_turntable_task
-from rosy.rosy_addon.turntable import turntable_views
+from rosy.rosy_addon.turntable_video import turntable_views
 from scenes import add_monkey, link
 
 

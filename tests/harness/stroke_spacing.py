@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.strokes.point_grid import PointGrid
-from rosy_addon.strokes.stroke_set import Strokes
-from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
-from rosy_addon.strokes.tangent_mesh import TangentMesh
+from rosy_addon.line_drawing.point_grid import PointGrid
+from rosy_addon.line_drawing.stroke_set import Strokes
+from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
+from rosy_addon.line_drawing.tangent_mesh import TangentMesh
 
 #: Distance between the points that are compared, and search radius, in spacings.
 SAMPLE_STEP, SEARCH_RADIUS = 0.1, 2.0

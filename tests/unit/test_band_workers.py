@@ -20,10 +20,10 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.render import band_workers
-from rosy_addon.render.band_workers import BandWorkers
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering import band_workers
+from rosy_addon.rendering.band_workers import BandWorkers
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
 
 #: Fields with many lines need many strips.
 DEGREE, WIDTH, HEIGHT = 11, 320, 1216

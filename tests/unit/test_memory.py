@@ -20,19 +20,19 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.render.picture_memory import (
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.picture_memory import (
     STATISTICS_BYTES,
     Coverage,
     picture_memory,
     view_coverage,
 )
-from rosy_addon.render.view_input import ViewInput
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.turntable import turntable_task, turntable_views
+from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.turntable_video import turntable_task, turntable_views
 
 
 def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:
@@ -44,7 +44,7 @@ def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) 
 def limit_memory(monkeypatch, free: float) -> None:
     """Let the process believe that this many bytes are free."""
     monkeypatch.setattr(memory, "available_memory", lambda: int(free))
-    monkeypatch.setattr("rosy_addon.render.picture_memory.available_memory", lambda: int(free))
+    monkeypatch.setattr("rosy_addon.rendering.picture_memory.available_memory", lambda: int(free))
 
 
 # --- what is free ---------------------------------------------------------------------------------

@@ -41,26 +41,35 @@ MAY_IMPORT = {
     "field": BASE_ROOMS,
     "projection": BASE_ROOMS | {"field"},
     "compositor": BASE_ROOMS | {"field", "projection"},
-    "strokes": BASE_ROOMS | {"field", "projection"},
+    "line_drawing": BASE_ROOMS | {"field", "projection"},
     "image_io": BASE_ROOMS,
-    "render": BASE_ROOMS | {"field", "projection", "compositor", "cache"},
+    "rendering": BASE_ROOMS | {"field", "projection", "compositor", "cache"},
     "presets": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "render", "cache"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "cache"},
     "scene": BASE_ROOMS
-    | {"field", "projection", "compositor", "strokes", "render", "cache", "image_io", "presets"},
-    "bake": BASE_ROOMS | {"compositor", "render", "scene", "gpu", "cache"},
-    "animation": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu", "cache"},
-    "viewport": BASE_ROOMS | {"projection", "compositor", "render", "scene", "gpu"},
-    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "strokes", "scene", "cache"},
+    | {
+        "field",
+        "projection",
+        "compositor",
+        "line_drawing",
+        "rendering",
+        "cache",
+        "image_io",
+        "presets",
+    },
+    "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
+    "animation": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu", "cache"},
+    "viewport": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu"},
+    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "scene", "cache"},
     "frame_workers": BASE_ROOMS,
-    "turntable": BASE_ROOMS | {"projection", "compositor", "render", "image_io"},
+    "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
         "presets",
         "field",
         "projection",
         "compositor",
-        "strokes",
+        "line_drawing",
         "scene",
         "gpu",
         "bake",
@@ -73,22 +82,30 @@ MAY_IMPORT = {
         "compositor",
         "scene",
         "gpu",
-        "render",
+        "rendering",
         "bake",
         "ui",
         "animation",
         "frame_workers",
-        "turntable",
-        "strokes",
+        "turntable_video",
+        "line_drawing",
         "draw_strokes",
         "image_io",
         "presets",
     },
-    "extras": BASE_ROOMS | {"cli", "frame_workers", "turntable"},
+    "extras": BASE_ROOMS | {"cli", "frame_workers", "turntable_video"},
     "__main__": {"extras"},
     "__init__": set(),
 }
-NUMPY_ROOMS = ("field", "projection", "compositor", "strokes", "image_io", "presets", "render")
+NUMPY_ROOMS = (
+    "field",
+    "projection",
+    "compositor",
+    "line_drawing",
+    "image_io",
+    "presets",
+    "rendering",
+)
 
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
@@ -205,7 +222,7 @@ def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         for path in FILES
-        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli", "frame_workers", "turntable")
+        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli", "frame_workers", "turntable_video")
         and path.stem != "__init__"
     ]
     assert len(modules) > 20

@@ -7,12 +7,12 @@ from PIL import Image, ImageDraw
 
 from rosy_addon.compositor.shading import lights_of
 from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.stroke_set import Strokes
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.stroke_set import Strokes
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.visibility import project_to_pixels
 
 from .looks_page import IMAGES
 from .shapes import suzanne

@@ -8,8 +8,8 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.turntable import turntable_task, turntable_views
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.turntable_video import turntable_task, turntable_views
 
 from .page import ROOT
 from .shapes import suzanne

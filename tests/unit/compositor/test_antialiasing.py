@@ -21,8 +21,8 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 240
 CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fov=0.8)

@@ -19,7 +19,7 @@ from rosy_addon.progress import Progress, run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project, project_task
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.view_input import ViewInput
 
 WIDTH, HEIGHT = 96, 320
 CAMERA = perspective_camera(look_at((0.4, -6.0, 3.0), (0, 0, 0.5)), WIDTH, HEIGHT, fov=0.5)

@@ -9,7 +9,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.progress import Progress
 from rosy_addon.projection.camera import orthographic_camera
-from rosy_addon.render.view_input import ViewInput
+from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport.progressive import ProgressiveRenderer
 
 POINTERS = 1, 2

@@ -70,7 +70,7 @@ class StreamlinePlacer:
 
     See Also
     --------
-    rosy_addon.strokes.trace.place_streamlines_task : Runs the steps in their order.
+    rosy_addon.line_drawing.trace.place_streamlines_task : Runs the steps in their order.
     """
 
     def __init__(self, mesh: TangentMesh, spacing: CornerSpacing, rules: SeparationRules) -> None:

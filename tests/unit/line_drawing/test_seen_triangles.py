@@ -7,19 +7,23 @@ import pytest
 from shapes import icosphere, plane, torus
 
 from rosy_addon.field.generate import generate
-from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.seen_triangles import HIDDEN_MARGIN, seen_triangles_task, triangles_near
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
-from rosy_addon.strokes.visibility import (
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.seen_triangles import (
+    HIDDEN_MARGIN,
+    seen_triangles_task,
+    triangles_near,
+)
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.line_drawing.visibility import (
     clip_to_visible,
     in_frame,
     project_to_pixels,
     rasterize_depth,
 )
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def instance(surface, location=(0, 0, 0)):

@@ -32,7 +32,7 @@ from ..projection.project import raise_nothing_in_view
 from .band_jobs import POLL_SECONDS, BandJob, FileExchange, draw_band_task, result_path
 from .view_input import ViewInput
 
-#: The program of a worker. It imports `render.band_worker`, but no module of the packages above it.
+#: The program of a worker. It imports `rendering.band_worker`, but no module of the packages above it.
 WORKER_PROGRAM = """
 import importlib, json, sys, types
 sys.path[:], package, root, folder = json.loads(sys.argv[1])
@@ -41,7 +41,7 @@ for part in package.split("."):
     name = f"{name}.{part}".lstrip(".")
     sys.modules[name] = types.ModuleType(name)
 sys.modules[package].__path__ = [root]
-importlib.import_module(package + ".render.band_worker").main(folder)
+importlib.import_module(package + ".rendering.band_worker").main(folder)
 """
 
 #: Environment of the workers. Each has one core.

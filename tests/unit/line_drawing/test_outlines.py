@@ -9,12 +9,12 @@ from shapes import cylinder, from_quads, grid_of_quads, icosphere, torus
 
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing.outline import OUTLINE_KINDS
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.outline import OUTLINE_KINDS
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.visibility import project_to_pixels, rasterize_depth
 
 IDENTITY = np.eye(4)
 

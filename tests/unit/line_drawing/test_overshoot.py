@@ -9,14 +9,14 @@ from shapes import cube, icosphere, moved, plane
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing.outline import OUTLINE_KINDS
+from rosy_addon.line_drawing.overshoot import MIN_EXTENSION_RATIO, extend_free_ends
+from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.svg import Pen, svg_text
+from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.outline import OUTLINE_KINDS
-from rosy_addon.strokes.overshoot import MIN_EXTENSION_RATIO, extend_free_ends
-from rosy_addon.strokes.pipeline import TIP_WIDTH, draw_instances
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.svg import Pen, svg_text
-from rosy_addon.strokes.visibility import clip_to_visible, project_to_pixels, rasterize_depth
 
 IDENTITY = np.eye(4)
 ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))

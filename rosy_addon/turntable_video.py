@@ -19,8 +19,8 @@ from .memory import check_memory
 from .progress import Progress, Task, subtask
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
-from .render.renderer import Renderer
-from .render.view_input import ViewInput
+from .rendering.renderer import Renderer
+from .rendering.view_input import ViewInput
 
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from rosy_addon.strokes.point_grid import PointGrid
+from rosy_addon.line_drawing.point_grid import PointGrid
 
 
 def spread_points(count, octaves):

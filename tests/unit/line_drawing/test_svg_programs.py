@@ -18,16 +18,16 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.stroke_set import Strokes
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.svg import Pen, write_svg
+from rosy_addon.line_drawing.trace import trace_strokes
+from rosy_addon.line_drawing.visibility import clip_to_visible, pixel_size
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.strokes.outline import outline
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.stroke_set import Strokes
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.svg import Pen, write_svg
-from rosy_addon.strokes.trace import trace_strokes
-from rosy_addon.strokes.visibility import clip_to_visible, pixel_size
 
 pytestmark = pytest.mark.slow
 

@@ -23,8 +23,13 @@ from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, gif
 from rosy_addon.processes import process_task
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.render.cpu import CpuRenderer
-from rosy_addon.turntable import VideoWriter, check_video_path, turntable_task, turntable_views
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.turntable_video import (
+    VideoWriter,
+    check_video_path,
+    turntable_task,
+    turntable_views,
+)
 
 QUICK = Look(length=8)
 

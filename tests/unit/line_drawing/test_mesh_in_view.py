@@ -7,15 +7,15 @@ import pytest
 from shapes import icosphere, plane
 
 from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view_task
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view_task
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
-from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
-from rosy_addon.strokes.visibility import project_to_pixels
 
 #: A camera at the height 2 above a ground plane, whose horizon is in the picture.
 ABOVE_GROUND = perspective_camera(look_at((0, 0, 2), (0, 20, 1)), 192, 108)

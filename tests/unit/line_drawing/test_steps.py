@@ -7,11 +7,11 @@ import pytest
 from shapes import torus
 
 from rosy_addon.field.generate import axis_field
+from rosy_addon.line_drawing import seeding
+from rosy_addon.line_drawing.tangent_mesh import tangent_mesh_task
+from rosy_addon.line_drawing.trace import trace_on_mesh_task
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes import seeding
-from rosy_addon.strokes.tangent_mesh import tangent_mesh_task
-from rosy_addon.strokes.trace import trace_on_mesh_task
 
 
 def traced(monkeypatch, batch_size):

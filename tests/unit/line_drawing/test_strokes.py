@@ -24,31 +24,31 @@ from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
-from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
-from rosy_addon.strokes.crossings import cut_intervals, find_crossings, with_crossing_gaps
-from rosy_addon.strokes.directional_spacing import spacing_in_picture
-from rosy_addon.strokes.families import global_labels
-from rosy_addon.strokes.head_on_ends import head_on_ends_task
-from rosy_addon.strokes.outline import outline
-from rosy_addon.strokes.separation import enforce_separation
-from rosy_addon.strokes.separation_rules import SeparationRules
-from rosy_addon.strokes.singularity_seeds import singularities
-from rosy_addon.strokes.spacing import (
+from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
+from rosy_addon.line_drawing.directional_spacing import spacing_in_picture
+from rosy_addon.line_drawing.families import global_labels
+from rosy_addon.line_drawing.head_on_ends import head_on_ends_task
+from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.separation import enforce_separation
+from rosy_addon.line_drawing.separation_rules import SeparationRules
+from rosy_addon.line_drawing.singularity_seeds import singularities
+from rosy_addon.line_drawing.spacing import (
     headlight_tone,
     spacing_by_curvature_task,
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
 )
-from rosy_addon.strokes.stroke_set import Strokes
-from rosy_addon.strokes.surface_particles import SurfaceParticles, trace_geodesics
-from rosy_addon.strokes.svg import Pen, plotter_order, simplify_mask, svg_text
-from rosy_addon.strokes.tangent_mesh import build_tangent_mesh
-from rosy_addon.strokes.trace import trace_strokes
-from rosy_addon.strokes.visibility import clip_to_visible, project_to_pixels
+from rosy_addon.line_drawing.stroke_set import Strokes
+from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
+from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.line_drawing.trace import trace_strokes
+from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
 
 IDENTITY = np.eye(4)
 

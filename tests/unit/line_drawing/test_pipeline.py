@@ -12,6 +12,19 @@ from rosy_addon.compositor.shading import KEY_LIGHT, Light
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing import separation, visibility
+from rosy_addon.line_drawing.pipeline import (
+    draw_instances,
+    draw_instances_task,
+    offset_toward_camera,
+    simplify_strokes,
+    stroke_geometry,
+)
+from rosy_addon.line_drawing.spacing import lit_tone
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.svg import Pen
+from rosy_addon.line_drawing.trace import trace_strokes_task
+from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,
@@ -19,19 +32,6 @@ from rosy_addon.projection.camera import (
     perspective_camera,
 )
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes import separation, visibility
-from rosy_addon.strokes.pipeline import (
-    draw_instances,
-    draw_instances_task,
-    offset_toward_camera,
-    simplify_strokes,
-    stroke_geometry,
-)
-from rosy_addon.strokes.spacing import lit_tone
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.svg import Pen
-from rosy_addon.strokes.trace import trace_strokes_task
-from rosy_addon.strokes.visibility import pixel_size, project_to_pixels
 
 IDENTITY = np.eye(4)
 ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))

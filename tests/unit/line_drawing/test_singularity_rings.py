@@ -7,8 +7,8 @@ import pytest
 from shapes import plane
 
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.trace import trace_strokes
 
 
 @pytest.mark.slow

@@ -9,11 +9,11 @@ from shapes import cube, cylinder, torus
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.strokes.pipeline import draw_instances
-from rosy_addon.strokes.style import StrokeStyle
-from rosy_addon.strokes.visibility import project_to_pixels
 
 CAMERA = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=2.0)
 

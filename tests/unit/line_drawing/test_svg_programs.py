@@ -171,7 +171,7 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
     lines = clip_to_visible(
-        trace_strokes(crossed, 14.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
+        trace_strokes(crossed, 10.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
     )
     lines = Strokes.concatenate(
         lines, clip_to_visible(outline(instance, camera), [instance], camera)

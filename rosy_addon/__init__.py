@@ -11,6 +11,7 @@ A package imports only from those above it::
     scene                 reading and writing Blender data
     viewport              the live preview in the 3D view
     ui                    properties, panels, preferences and overlay
+    api                   the functions for scripts and notebooks
     cli                   the command line
 
 The modules outside the packages are of two kinds. The base modules, such as `errors`, `progress`,
@@ -18,5 +19,80 @@ The modules outside the packages are of two kinds. The base modules, such as `er
 command line: `bake`, `animation`, `draw_strokes` and `turntable_video`.
 
 ``field``, ``projection``, ``compositor``, ``line_drawing``, ``rendering``, ``image_io`` and
-``presets`` do not import bpy and need only numpy.
+``presets`` do not import bpy and need only numpy. The public names are those of `api`. They are
+loaded when they are first used.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import (
+        Difference,
+        Drawing,
+        Field,
+        Picture,
+        RosyError,
+        RosyWarning,
+        Singularities,
+        Surface,
+        along_axis,
+        along_uv,
+        curvature,
+        features,
+        form,
+        from_angles,
+        from_directions,
+        from_tensors,
+        from_vectors,
+        guided,
+        list_presets,
+        read_field,
+        render,
+        smoothest,
+        strokes,
+        turntable,
+    )
+
+__all__ = [
+    "Difference",
+    "Drawing",
+    "Field",
+    "Picture",
+    "RosyError",
+    "RosyWarning",
+    "Singularities",
+    "Surface",
+    "along_axis",
+    "along_uv",
+    "curvature",
+    "features",
+    "form",
+    "from_angles",
+    "from_directions",
+    "from_tensors",
+    "from_vectors",
+    "guided",
+    "list_presets",
+    "read_field",
+    "render",
+    "smoothest",
+    "strokes",
+    "turntable",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the public names when one of them is used."""
+    if name not in __all__:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    from . import api
+
+    for public_name in __all__:
+        globals()[public_name] = getattr(api, public_name)
+    return globals()[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -29,6 +29,10 @@ class RosyError(ValueError):
         super().__init__(escape_unsafe(message.replace("\n", "\\n").replace("\t", "\\t")))
 
 
+class RosyWarning(UserWarning):
+    """Something that the user should know about a result, in one line."""
+
+
 class NothingInViewError(RosyError):
     """No object with a field is visible from the camera."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from ..turntable_video import Encoder
-
 
 @dataclass(frozen=True)
 class Extras:
@@ -19,13 +17,10 @@ class Extras:
     run_on_cluster : function, optional
         Runs a command for frames on a cluster, given the command, the frames and the address of the
         cluster, and yields the lines that it prints.
-    find_encoder : function, optional
-        Returns an encoder of videos, or None.
     """
 
     program: tuple[str, ...] = ()
     run_on_cluster: Callable[[Sequence[str], Sequence[int], str], Iterator[str]] | None = None
-    find_encoder: Callable[[], Encoder | None] | None = None
 
 
 NO_EXTRAS = Extras()

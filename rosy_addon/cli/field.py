@@ -9,16 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from .. import api
 from ..errors import RosyError, counted
-from ..field.analysis import angle_errors, dirichlet_energy, error_statistics
-from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
-from ..field.field_io import WRITE_SUFFIXES, load_field, write_field
+from ..field.field_io import WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
-from ..field.rosy_field import RosyField
-from ..field.singularities import euler_characteristic, find_singularities
-from ..field.surface import Surface
-from .mesh_field import add_mesh_options, load_mesh_and_field, nonfinite_policy
+from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings, read_field
 from .options import add_subcommand, check_output, float_between
 from .streams import print_line
 
@@ -58,11 +54,16 @@ def add_field_command(subparsers: Any) -> None:
 def run_field(options: argparse.Namespace) -> None:
     """Write a field file: generate a field, or convert the format, degree or vectors of one."""
     check_output(options)
-    surface, field = load_mesh_and_field(options)
-    angle = np.radians(options.turn)
-    conversion = Conversion(options.to_degree, angle, options.smooth, options.magnitude)
-    field = convert(surface, field, conversion)
-    write_field(options.output, field, surface)
+    _, field = load_mesh_and_field(options)
+    if options.to_degree is not None:
+        field = field.to_degree(options.to_degree)
+    if options.turn:
+        field = field.rotated(np.radians(options.turn))
+    if options.smooth:
+        field = field.smoothed(options.smooth)
+    if options.magnitude is not None:
+        field = field.with_magnitude(options.magnitude)
+    field.save(options.output)
 
 
 def add_info_command(subparsers: Any) -> None:
@@ -81,42 +82,41 @@ def add_info_command(subparsers: Any) -> None:
 def run_info(options: argparse.Namespace) -> None:
     """Describe a mesh and its field, and compare the field with another one."""
     surface, field = load_mesh_and_field(options)
-    vertex, index = find_singularities(surface, field)
     magnitude = field.magnitude
     facts = {
         "degree": field.degree,
         "vertices": len(surface.vertices),
         "faces": surface.face_count,
-        "euler_characteristic": euler_characteristic(surface),
+        "euler_characteristic": surface.euler_characteristic,
         "magnitude": [float(magnitude.min()), float(magnitude.max())],
         "undefined_faces": int(np.count_nonzero(magnitude == 0)),
-        "is_rosy": field.direction_ratios is None,
-        "energy": dirichlet_energy(surface, field),
-        "singularities": np.stack([vertex, index], axis=1).tolist(),
+        "is_rosy": field.is_rosy,
+        "energy": field.energy,
+        "singularities": np.stack(field.singularities, axis=1).tolist(),
     }
     if options.against is not None:
-        facts["against"] = _compare(options, surface, field, vertex, index)
+        facts["against"] = _compare(options, field)
     print_line(json.dumps(facts) if options.json else _format_info(facts))
 
 
-def _compare(
-    options: argparse.Namespace,
-    surface: Surface,
-    field: RosyField,
-    vertex: np.ndarray,
-    index: np.ndarray,
-) -> dict[str, Any]:
+def _compare(options: argparse.Namespace, field: api.Field) -> dict[str, Any]:
     """Return the angles to the field in a file, or the differences from a file of singularities."""
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
-        policy = nonfinite_policy(options)
-        other_field = load_field(options.against, surface, field.degree, policy).field
-        return error_statistics(surface, angle_errors(surface, field, other_field))
+        with printed_warnings():
+            other = read_field(options, options.against, field.surface, field.degree)
+        difference = field.difference(other)
+        return {
+            "mean": np.degrees(difference.mean),
+            "rms": np.degrees(difference.rms),
+            "max": np.degrees(difference.max),
+            "compared": difference.compared,
+        }
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(
             f"{options.against}: is for a field of degree {degree}, but this field has degree {field.degree}"
         )
-    own_pairs = set(zip(vertex.tolist(), index.tolist(), strict=True))
+    own_pairs = set(map(tuple, np.stack(field.singularities, axis=1).tolist()))
     other_pairs = set(zip(other_element.tolist(), other_index.tolist(), strict=True))
     return {
         "same": len(own_pairs & other_pairs),

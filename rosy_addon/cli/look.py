@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
+from ..api.pictures import VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..field.formats.ply import read_vertex_values
-from ..field.surface import Surface
-from ..image_io.png import read_png
-from ..presets.store import load_preset, preset_keys
-from ..projection.surface_tone import SurfaceTone
-from ..rendering.mesh_view import check_light
+from ..presets.store import find_preset_file, preset_keys, read_preset
 from ..settings import settings_of
-from .mesh_field import load_uv_map
 from .presets import user_presets_folder
-
-#: Samples per pixel along each axis in pictures of mesh files, unless the preset has more.
-FILE_SUPERSAMPLING = 2
-
-#: Name of the color attribute of vertices, as in Blender.
-VERTEX_COLOR = "Color"
+from .view import requested_size
 
 
 def add_look_options(parser: argparse.ArgumentParser) -> None:
@@ -62,19 +48,51 @@ def add_tone_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def requested_preset(options: argparse.Namespace) -> Path | None:
+    """Return the file of --preset, or None."""
+    return find_preset_file(options.preset, user_presets_folder()) if options.preset else None
+
+
+def requested_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of --set."""
+    return dict(_parse_setting(text) for text in options.set)
+
+
 def requested_look(options: argparse.Namespace, default: Look) -> Look:
     """Return the look of --preset, by default `default`, with the settings of --set."""
-    return _with_options(_preset_look(options, default), options)
+    preset = requested_preset(options)
+    look = default if preset is None else read_preset(preset).look
+    return look.with_settings(requested_settings(options))
 
 
-def _preset_look(options: argparse.Namespace, default: Look) -> Look:
-    """Return the look of --preset, by default `default`."""
-    return load_preset(options.preset, user_presets_folder()).look if options.preset else default
+def picture_arguments(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say about a picture, as arguments of `api.render`.
 
-
-def _with_options(look: Look, options: argparse.Namespace) -> Look:
-    """Return a look with the settings of --set."""
-    return look.with_settings(dict(_parse_setting(text) for text in options.set))
+    Raises
+    ------
+    RosyError
+        If they are not possible.
+    """
+    sources = {
+        option: getattr(options, f"tone_{option}", None)
+        for option in ("attribute", "image", "picture")
+    }
+    given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
+    if len(given) > 1:
+        raise RosyError(f"give either {given[0]} or {given[1]}, not both")
+    preset, settings = requested_preset(options), requested_settings(options)
+    # Mistakes are reported before the mesh is read.
+    picture_look(str(options.mesh), preset, settings, sources)
+    arguments = {
+        "view": options.view,
+        "size": requested_size(options),
+        "orthographic": options.ortho,
+        "preset": preset,
+        "tone_values": sources["attribute"],
+        "tone_image": sources["image"],
+        "workers": options.workers,
+    }
+    return arguments | settings
 
 
 def _parse_setting(text: str) -> tuple[str, Any]:
@@ -90,54 +108,3 @@ def _parse_setting(text: str) -> tuple[str, Any]:
     except ValueError:
         expected = "a whole number" if isinstance(settings[name].default, int) else "a number"
         raise RosyError(f"--set {text}: expected {expected}") from None
-
-
-def mesh_file_look(options: argparse.Namespace) -> Look:
-    """Return the look for a mesh file, with the tone source that the options name.
-
-    Raises
-    ------
-    RosyError
-        If there are two tone sources, or the look uses the lights of a scene.
-    """
-    look = _preset_look(options, Look())
-    if look.supersampling == Look().supersampling:
-        # Nothing smooths the edges of the picture later.
-        look = replace(look, supersampling=FILE_SUPERSAMPLING)
-    look = _with_options(look, options)
-    check_light(look.light, str(options.mesh))
-    sources = [
-        source
-        for source in ("attribute", "image", "picture")
-        if getattr(options, f"tone_{source}", None) is not None
-    ]
-    if len(sources) > 1:
-        raise RosyError(f"give either --tone-{sources[0]} or --tone-{sources[1]}, not both")
-    return replace(look, tone=sources[0]) if sources else look
-
-
-def load_tone_map(options: argparse.Namespace, surface: Surface) -> SurfaceTone | None:
-    """Return the tone on the mesh that the options name, or None."""
-    if options.tone_attribute is not None:
-        values = _load_vertex_tone(options.mesh, options.tone_attribute)
-        return SurfaceTone(values[surface.corner_vertex, None].astype(np.float32))
-    if options.tone_image is not None:
-        uv = load_uv_map(options.mesh)
-        return SurfaceTone(uv.astype(np.float32), luminance(read_png(options.tone_image)))
-    return None
-
-
-def _load_vertex_tone(mesh: Path, name: str) -> np.ndarray:
-    """Return (V,) values of the vertices of a .ply file: a property, or the luminance of the color."""
-    if mesh.suffix.lower() != ".ply":
-        raise RosyError(f"{mesh}: has no vertex properties, which only .ply files have")
-    values = read_vertex_values(mesh)
-    rgb = [values.get(channel) for channel in ("red", "green", "blue")]
-    if name == VERTEX_COLOR and all(channel is not None for channel in rgb):
-        return to_linear(np.stack(rgb, axis=1)) @ LUMINANCE_WEIGHTS
-    if name not in values:
-        available = ", ".join(f"'{key}'" for key in values) or "positions"
-        raise RosyError(f"{mesh}: there is no vertex property '{name}', only {available}")
-    if not np.isfinite(values[name]).all():
-        raise RosyError(f"{mesh}: the vertex property '{name}' has values that are not finite")
-    return values[name]

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import RosyError, counted
-from ..field.field_io import READ_SUFFIXES, load_field
+from .. import api
+from ..errors import RosyError, RosyWarning
+from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
-from ..field.formats.obj import read_uv
-from ..field.generate import GENERATORS, GeneratorSettings, generate
-from ..field.mesh_io import READERS, read_mesh
-from ..field.rosy_field import RosyField, check_degree
-from ..field.surface import Surface, orientation_warning
+from ..field.generate import GENERATORS
+from ..field.mesh_io import READERS
+from ..field.rosy_field import check_degree
 from .options import float_between, float_tuple, print_note
 
 
@@ -102,78 +103,69 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
     )
 
 
-def load_mesh_and_field(options: argparse.Namespace) -> tuple[Surface, RosyField]:
+def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
     """Read the mesh; read the field, or generate one."""
     if options.degree is not None:
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    surface = read_mesh(options.mesh)
-    if options.field is not None:
-        loaded = load_field(
-            options.field,
-            surface,
-            options.degree,
-            nonfinite_policy(options),
-            mesh=options.field_mesh,
-        )
-        print_note(loaded.note)
-        return surface, loaded.field
-    print_note(orientation_warning(surface))
-    degree = 4 if options.degree is None else options.degree
+    surface = api.Surface(options.mesh, up=getattr(options, "up", None))
+    with printed_warnings():
+        if options.field is not None:
+            return surface, read_field(options, options.field, surface, options.degree)
+        return surface, _generate_field(options, surface)
+
+
+def read_field(
+    options: argparse.Namespace, path: Path, surface: api.Surface, degree: int | None
+) -> api.Field:
+    """Read a field file, with the options for field files."""
+    nonfinite = "zero" if options.undefined else "error"
+    return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
+
+
+@contextmanager
+def printed_warnings() -> Iterator[None]:
+    """Print the warnings that are issued in a ``with`` block as notes."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RosyWarning)
+        try:
+            yield
+        finally:
+            for warning in caught:
+                if issubclass(warning.category, RosyWarning):
+                    print_note(str(warning.message))
+
+
+def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Field:
+    """Generate a field of the kind that the options name."""
+    degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
-    kind = options.generate or ("guided" if has_guides else "form")
-    field = generate(surface, _generator_settings(options, surface, kind, degree), degree)
-    print_note(_undefined_note(surface, field, kind))
-    return surface, field
-
-
-def _undefined_note(surface: Surface, field: RosyField, kind: str) -> str:
-    """Say on how many faces a generated field has no direction; empty if it has one on all faces.
-
-    Faces without area do not count.
-    """
-    has_area = surface.face_normal.any(axis=1)
-    count = int((has_area & ~field.vectors.any(axis=1)).sum())
-    if not count:
-        return ""
-    total = int(has_area.sum())
-    where = "any face" if count == total else f"{count:,} of {counted(total, 'face')}"
-    return (
-        f"{surface.name}: {kind} gives no direction on {where}: choose another kind with --generate, "
-        "such as form"
-    )
-
-
-def _generator_settings(
-    options: argparse.Namespace, surface: Surface, kind: str, degree: int
-) -> GeneratorSettings:
-    """Return the settings of the generator, with the guides that the options name."""
-    settings = GeneratorSettings(kind, options.axis, options.reach, np.radians(options.sharp_angle))
-    if options.strokes is not None:
-        settings = replace(settings, strokes=read_guide_strokes(options.strokes))
-    if options.guides is not None:
-        guides = load_field(options.guides, surface, degree, nonfinite_policy(options)).field
-        settings = replace(settings, vectors=guides.vectors)
-    if options.uv or kind == "uv":
-        settings = replace(settings, uv=load_uv_map(options.mesh))
-    return settings
-
-
-def nonfinite_policy(options: argparse.Namespace) -> str:
-    """Return what happens to vectors in field files that are not finite: ``error`` or ``zero``."""
-    return "zero" if options.undefined else "error"
-
-
-def load_uv_map(mesh: Path) -> np.ndarray:
-    """Return the UV coordinates of the corners of an .obj file.
-
-    Raises
-    ------
-    RosyError
-        If it is another kind of file, or has no UV map.
-    """
-    uv = read_uv(mesh) if mesh.suffix.lower() == ".obj" else None
-    if uv is None:
-        raise RosyError(f"{mesh}: has no UV map, which only .obj files can have")
-    return uv
+    match options.generate or ("guided" if has_guides else "form"):
+        case "form":
+            return api.form(surface, degree)
+        case "smoothest":
+            return api.smoothest(surface, degree)
+        case "curvature":
+            return api.curvature(surface, degree, reach=options.reach)
+        case "features":
+            return api.features(surface, degree, sharp_angle=np.radians(options.sharp_angle))
+        case "axis":
+            return api.along_axis(surface, options.axis, degree)
+        case "uv":
+            return api.along_uv(surface, degree)
+        case "guided":
+            strokes = [] if options.strokes is None else read_guide_strokes(options.strokes)
+            guides = None
+            if options.guides is not None:
+                guides = read_field(options, options.guides, surface, degree)
+            return api.guided(
+                surface,
+                degree,
+                strokes=strokes,
+                vectors=guides,
+                uv=options.uv,
+                reach=options.reach,
+            )
+        case kind:
+            raise RosyError(f"unknown generator '{kind}': choose {', '.join(GENERATORS)}")

@@ -12,10 +12,10 @@ from ..errors import REPORTED_ERRORS, error_text
 from .bake import add_bake_command
 from .extras import NO_EXTRAS, Extras
 from .field import add_field_command, add_info_command
-from .strokes import add_strokes_command
 from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
 from .streams import discard_output, print_error, print_line
+from .strokes import add_strokes_command
 
 #: Options whose values may begin with a minus sign.
 NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")

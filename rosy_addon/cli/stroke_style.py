@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
@@ -44,11 +45,16 @@ def _add_setting_option(parser: argparse.ArgumentParser, setting: Setting) -> No
 
 def stroke_style_of(options: argparse.Namespace, base: StrokeStyle) -> StrokeStyle:
     """Return the style with the fields that the options override."""
-    values = vars(options)
-    overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
-    if "spacing" in values or "distance" in values:
-        overrides["unit"] = "world" if "distance" in values else "pixels"
+    overrides = style_overrides(options)
+    if "spacing" in overrides or "distance" in overrides:
+        overrides["unit"] = "world" if "distance" in overrides else "pixels"
     return replace(base, **overrides)
+
+
+def style_overrides(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of `StrokeStyle` that the options override."""
+    values = vars(options)
+    return {name: values[name] for name in settings_of(StrokeStyle) if name in values}
 
 
 def add_pen_options(parser: argparse.ArgumentParser) -> None:

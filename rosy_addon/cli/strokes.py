@@ -9,20 +9,25 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..compositor.shading import lights_of
+from .. import api
+from ..api.pictures import DEFAULT_VIEW
 from ..errors import RosyError
 from ..frame_workers import parse_frames
-from ..line_drawing.pipeline import draw_instances
 from ..line_drawing.style import StrokeStyle
-from ..line_drawing.svg import Pen, write_svg
-from ..projection.camera import orbit_camera
-from ..rendering.mesh_view import check_light, mesh_instance
+from ..line_drawing.svg import Pen
+from ..rendering.mesh_view import check_light
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_object_option, add_subcommand, check_output
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
-from .stroke_style import add_pen_options, add_style_options, pen_of, stroke_style_of
-from .view import DEFAULT_VIEW, add_view_options, requested_size, up_axis
+from .stroke_style import (
+    add_pen_options,
+    add_style_options,
+    pen_of,
+    stroke_style_of,
+    style_overrides,
+)
+from .view import add_view_options, requested_size
 
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
@@ -63,16 +68,32 @@ def run_strokes(options: argparse.Namespace) -> None:
         _draw_scene_strokes(options)
         return
     _reject_options(options, SCENE_ONLY_DEFAULTS, ".blend files")
+    arguments = _drawing_arguments(options)
+    surface, field = load_mesh_and_field(options)
+    api.strokes(surface, field, **arguments).save(options.output)
+
+
+def _drawing_arguments(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say about a drawing, as arguments of `api.strokes`.
+
+    Raises
+    ------
+    RosyError
+        If they are not possible.
+    """
+    # Mistakes are reported before the mesh is read.
     style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    surface, field = load_mesh_and_field(options)
-    instance = mesh_instance(surface, field, up_axis(options))
-    size = requested_size(options)
-    camera = orbit_camera(
-        instance.face_points(), *options.view, *size, perspective=not options.ortho
-    )
-    drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
-    write_svg(options.output, drawing.strokes, camera, pen)
+    return style_overrides(options) | {
+        "view": options.view,
+        "size": requested_size(options),
+        "orthographic": options.ortho,
+        "width": pen.width,
+        "colors": pen.colours,
+        "paper": pen.paper,
+        "millimeters": pen.millimetres,
+        "plotter": pen.plotter,
+    }
 
 
 def _draw_scene_strokes(options: argparse.Namespace) -> None:

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
 from ..projection.camera import check_size
-from ..rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from ..rendering.mesh_view import UP_AXIS_MATRIX
 from .options import float_tuple, parse_size
-
-#: Azimuth and elevation in degrees: from the front left, looking slightly down.
-DEFAULT_VIEW = (-25.0, 20.0)
-
-#: Pixels: width and height of pictures, and of the pictures of a turntable.
-DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
 
 
 def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
@@ -41,8 +36,3 @@ def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | No
 def requested_size(options: argparse.Namespace) -> tuple[int, int]:
     """Return the size of the picture in pixels."""
     return check_size(*(options.size or DEFAULT_SIZE))
-
-
-def up_axis(options: argparse.Namespace) -> str:
-    """Return the upward axis of the mesh file, "y" or "z"."""
-    return options.up or UP_AXIS_BY_SUFFIX[options.mesh.suffix.lower()]

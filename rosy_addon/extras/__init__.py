@@ -1,7 +1,5 @@
-"""What the Python package has and the extension for Blender has not: what reaches outside of RoSy.
+"""The command line of the Python package, and what it has besides those of the extension for Blender.
 
-Each module needs another program or library, and says so if it is missing::
-
-    cluster     Dask: frames on a cluster
-    ffmpeg      ffmpeg: videos in .mp4 files
+command_line   the commands
+cluster        Dask: frames on a cluster
 """

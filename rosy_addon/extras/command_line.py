@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from ..cli.extras import Extras
 from ..cli.parser import main as cli_main
 from .cluster import run_on_cluster
-from .ffmpeg import find_encoder
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit status. See `cli.parser.main`."""
     package = __package__.split(".")[0]
-    extras = Extras((sys.executable, "-m", package), run_on_cluster, find_encoder)
+    extras = Extras((sys.executable, "-m", package), run_on_cluster)
     return cli_main(argv, f"python -m {package}", extras)

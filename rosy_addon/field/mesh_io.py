@@ -35,26 +35,27 @@ BINARY_MEMORY = {".ply": 20, ".stl": 10}
 SHARP_ANGLE = np.radians(60)
 
 
-def read_mesh(path: str | os.PathLike[str]) -> Surface:
+def read_mesh(path: str | os.PathLike[str], sharp_angle: float | None = None) -> Surface:
     """Read a mesh from a file; see `read_mesh_task`.
 
     Examples
     --------
     >>> surface = read_mesh("bunny.obj")
     """
-    return run_to_completion(read_mesh_task(path))
+    return run_to_completion(read_mesh_task(path, sharp_angle))
 
 
-def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
+def read_mesh_task(path: str | os.PathLike[str], sharp_angle: float | None = None) -> Task[Surface]:
     """Read a mesh from an .obj, .off, .ply or .stl file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
-    Equal corners of an .stl file are merged into one vertex. Edges with an angle above
-    `SHARP_ANGLE` are sharp.
+    Equal corners of an .stl file are merged into one vertex.
 
     Parameters
     ----------
     path : path-like
+    sharp_angle : float, optional
+        Edges with a larger angle, in radians, are sharp. By default `SHARP_ANGLE`.
 
     Returns
     -------
@@ -76,5 +77,6 @@ def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     polygons = yield from subtask(reader(path), 0.0, 0.5)
-    task = surface_task(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    sharp_angle = SHARP_ANGLE if sharp_angle is None else sharp_angle
+    task = surface_task(*polygons, name=str(path), sharp_angle=sharp_angle)
     return (yield from subtask(task, 0.5, 1.0))

@@ -86,7 +86,8 @@ def test_contents(files):
     assert b"CC0" in files[PRESETS + "LICENSE.txt"]
     assert os.path.getsize(os.environ["ROSY_ZIP"]) < 1_000_000
     assert max(map(len, files.values())) < 60_000
-    assert not any(name.startswith("rosy_addon/extras/") for name in files)
+    outside = ("rosy_addon/extras/", "rosy_addon/external/")
+    assert not any(name.startswith(outside) for name in files)
     assert "rosy_addon/__main__.py" not in files
 
 

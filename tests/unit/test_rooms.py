@@ -75,8 +75,22 @@ MAY_IMPORT = {
         "bake",
         "viewport",
     },
+    "external": BASE_ROOMS | {"turntable_video"},
+    "api": BASE_ROOMS
+    | {
+        "field",
+        "projection",
+        "compositor",
+        "line_drawing",
+        "rendering",
+        "image_io",
+        "presets",
+        "turntable_video",
+        "external",
+    },
     "cli": BASE_ROOMS
     | {
+        "api",
         "field",
         "projection",
         "compositor",
@@ -93,9 +107,9 @@ MAY_IMPORT = {
         "image_io",
         "presets",
     },
-    "extras": BASE_ROOMS | {"cli", "frame_workers", "turntable_video"},
+    "extras": BASE_ROOMS | {"cli", "frame_workers"},
     "__main__": {"extras"},
-    "__init__": set(),
+    "__init__": {"api"},
 }
 NUMPY_ROOMS = (
     "field",
@@ -148,7 +162,7 @@ def test_imports_run_one_way(path):
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
-    if room == "extras":
+    if room in ("external", "extras"):
         allowed |= EXTRA_LIBRARIES
     assert outside <= allowed, "only relative imports inside the package, only numpy outside it"
 

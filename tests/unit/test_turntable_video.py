@@ -17,7 +17,7 @@ from shapes import icosphere, torus
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
-from rosy_addon.extras.ffmpeg import find_encoder
+from rosy_addon.external.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, gif_task, lzw_compress
 from rosy_addon.processes import process_task

@@ -1,0 +1,53 @@
+"""The functions and classes for scripts and notebooks; the commands for mesh files use them as well.
+
+Angles are in radians, except those of a view, which are in degrees.
+
+    surface      `Surface`: a mesh from arrays, a file or another library
+    field        `Field`: a field on a surface; fields from arrays and files
+    generators   fields that are computed
+    pictures     pictures and turntables
+    drawings     strokes
+"""
+
+from ..errors import RosyError, RosyWarning
+from .drawings import Drawing, strokes
+from .field import (
+    Difference,
+    Field,
+    Singularities,
+    from_angles,
+    from_directions,
+    from_tensors,
+    from_vectors,
+    read_field,
+)
+from .generators import along_axis, along_uv, curvature, features, form, guided, smoothest
+from .pictures import Picture, list_presets, render, turntable
+from .surface import Surface
+
+__all__ = [
+    "Difference",
+    "Drawing",
+    "Field",
+    "Picture",
+    "RosyError",
+    "RosyWarning",
+    "Singularities",
+    "Surface",
+    "along_axis",
+    "along_uv",
+    "curvature",
+    "features",
+    "form",
+    "from_angles",
+    "from_directions",
+    "from_tensors",
+    "from_vectors",
+    "guided",
+    "list_presets",
+    "read_field",
+    "render",
+    "smoothest",
+    "strokes",
+    "turntable",
+]

@@ -1,0 +1,153 @@
+"""`strokes`: evenly spaced lines along a field, as a drawing in SVG."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compositor.shading import lights_of
+from ..errors import RosyError
+from ..file_io import write_bytes
+from ..line_drawing.pipeline import StrokeDrawing, draw_instances
+from ..line_drawing.style import StrokeStyle
+from ..line_drawing.svg import Pen, svg_text
+from ..projection.camera import Camera, check_size, orbit_camera
+from ..rendering.mesh_view import check_light, mesh_instance
+from ..settings import settings_of
+from .field import Field, check_same_surface
+from .generators import form
+from .pictures import DEFAULT_SIZE, DEFAULT_VIEW
+from .surface import Surface
+
+
+class Drawing:
+    """Strokes along a field. A notebook shows them.
+
+    Parameters
+    ----------
+    strokes : rosyfields.line_drawing.pipeline.StrokeDrawing
+    camera : rosyfields.projection.camera.Camera
+    pen : rosyfields.line_drawing.svg.Pen
+    """
+
+    def __init__(self, strokes: StrokeDrawing, camera: Camera, pen: Pen) -> None:
+        self._strokes = strokes.strokes
+        self._camera = camera
+        self._pen = pen
+
+    def __repr__(self) -> str:
+        return f"<Drawing: {len(self):,} strokes>"
+
+    def __len__(self) -> int:
+        return len(self._strokes)
+
+    @cached_property
+    def svg(self) -> str:
+        """The drawing as an SVG document, with a layer for each family of lines."""
+        return svg_text(self._strokes, self._camera, self._pen)
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    @cached_property
+    def polylines(self) -> list[NDArray[np.float64]]:
+        """The points of each stroke in world space, (n, 3), where z points up."""
+        return np.split(self._strokes.points, self._strokes.start[1:-1])
+
+    @property
+    def family_names(self) -> list[str]:
+        """The family of each stroke: a line of the field, or a kind of outline."""
+        return [self._strokes.names[family] for family in self._strokes.family]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an ``.svg`` file.
+
+        Raises
+        ------
+        RosyError
+            If the name does not end in ``.svg``, or the file cannot be written.
+        """
+        if not os.fspath(path).lower().endswith(".svg"):
+            raise RosyError(f"{path}: the name of the file must end in .svg")
+        write_bytes(path, self.svg.encode())
+
+
+def strokes(
+    surface: Surface,
+    field: Field | None = None,
+    *,
+    view: tuple[float, float] = DEFAULT_VIEW,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    orthographic: bool = False,
+    width: float = Pen.width,
+    colors: Sequence[str] = ("#000000",),
+    paper: str | None = Pen.paper,
+    millimeters: float | None = None,
+    plotter: bool = False,
+    **style: Any,
+) -> Drawing:
+    """Draw evenly spaced strokes along a field, without the hidden ones.
+
+    Parameters
+    ----------
+    surface, field, view, size, orthographic
+        As for `render`. The length of a pixel follows from the size.
+    width : float
+        Full width of a stroke in pixels.
+    colors : sequence of str
+        SVG colors of the families in turn, such as ``"#204060"`` or ``"navy"``.
+    paper : str or None
+        Color of the background; None for none.
+    millimeters : float, optional
+        Width of the page in millimeters; by default the page is in pixels.
+    plotter : bool
+        Lines of constant width, in an order that keeps the travel of the pen short.
+    **style
+        Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, tone=True, outline=True``.
+        `spacing` is in pixels; `distance` is the spacing in units of the mesh.
+
+    Returns
+    -------
+    Drawing
+
+    Raises
+    ------
+    RosyError
+        If a setting is not possible, the field is on another surface, no stroke is visible, or there
+        is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> square = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> drawing = rf.strokes(square, view=(0, 90), size=(100, 100), spacing=20)
+    >>> drawing.svg.startswith("<?xml") and len(drawing) > 4
+    True
+    """
+    stroke_style = _style_of(style)
+    check_light(stroke_style.light, surface.name)
+    pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
+    field = form(surface) if field is None else field
+    check_same_surface(surface, field)
+    instance = mesh_instance(surface.mesh, field.rosy, surface.up)
+    camera = orbit_camera(
+        instance.face_points(), *view, *check_size(*size), perspective=not orthographic
+    )
+    lights = lights_of(stroke_style, ())
+    return Drawing(draw_instances([instance], camera, stroke_style, lights=lights), camera, pen)
+
+
+def _style_of(values: dict[str, Any]) -> StrokeStyle:
+    """Return the style of strokes with some settings. The unit follows from the spacing."""
+    known = [name for name in settings_of(StrokeStyle) if name != "unit"]
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
+    unit = {"unit": "world"} if "distance" in values else {}
+    return replace(StrokeStyle(), **values, **unit)

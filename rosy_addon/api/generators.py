@@ -1,0 +1,247 @@
+"""Fields that are computed from the surface, or from guides on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import RosyError, counted
+from ..field.generate import GeneratorSettings, generate
+from ..field.surface import orientation_warning
+from .field import Field, check_same_surface, warn
+from .surface import Surface
+
+
+def form(surface: Surface, degree: int = 4) -> Field:
+    """Make a field that follows the form of the surface. It is the default of RoSy.
+
+    It follows clear curvature and sharp edges, and is smooth between them. The scale suits the noise
+    of the mesh.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N, from 1 to 12.
+
+    Raises
+    ------
+    RosyError
+        If the degree is not supported, or there is not enough memory.
+    """
+    return _generated(surface, GeneratorSettings("form"), degree)
+
+
+def smoothest(surface: Surface, degree: int = 4) -> Field:
+    """Make the field of the lowest Dirichlet energy, which has few singularities.
+
+    The method is that of Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields"
+    (SIGGRAPH 2013).
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N, from 1 to 12.
+
+    Raises
+    ------
+    RosyError
+        If the degree is not supported, or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> cube = rf.Surface(
+    ...     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+    ...     [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+    ... )
+    >>> field = rf.smoothest(cube)
+    >>> int(field.singularities.index.sum()) == field.degree * cube.euler_characteristic
+    True
+    """
+    return _generated(surface, GeneratorSettings("smoothest"), degree)
+
+
+def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field:
+    """Make a field along the principal directions of curvature.
+
+    Its magnitude says how well they are defined, from 0 to 1.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N, an even number.
+    reach : float
+        Distance over which clear directions extend into parts without any, as a fraction of the
+        longest side of the mesh. At 0, each face has its own directions.
+
+    Raises
+    ------
+    RosyError
+        If the degree is odd or not supported, or there is not enough memory.
+    """
+    return _generated(surface, GeneratorSettings("curvature", smoothing_length=reach), degree)
+
+
+def features(
+    surface: Surface,
+    degree: int = 4,
+    *,
+    sharp_angle: float = np.pi / 6,
+    edges: ArrayLike | None = None,
+) -> Field:
+    """Make a field along borders and sharp edges that is smooth between them.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N, from 1 to 12.
+    sharp_angle : float
+        Smallest angle in radians between the normals of the two faces of a sharp edge.
+    edges : (E, 2) array_like of int, optional
+        Pairs of vertices: the edges to follow instead.
+
+    Raises
+    ------
+    RosyError
+        If there is no such edge.
+    """
+    settings = GeneratorSettings(
+        "features", sharp_angle=sharp_angle, edges=None if edges is None else np.asarray(edges)
+    )
+    return _generated(surface, settings, degree)
+
+
+def guided(
+    surface: Surface,
+    degree: int = 4,
+    *,
+    strokes: Sequence[ArrayLike] = (),
+    vectors: ArrayLike | Field | None = None,
+    edges: ArrayLike | None = None,
+    uv: bool = False,
+    reach: float = 0.0,
+) -> Field:
+    """Make a field that follows guides and is smooth between them.
+
+    A face with several guides gets their mean, as RoSys.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N, from 1 to 12.
+    strokes : sequence of (n, 3) array_like
+        Polylines on the surface.
+    vectors : (F, 3) array_like or Field, optional
+        A member for each face, zero where there is no guide.
+    edges : (E, 2) array_like of int, optional
+        Pairs of vertices: edges of the mesh to follow.
+    uv : bool
+        Follow the UV map of the surface.
+    reach : float
+        Distance over which guides are smoothed, as a fraction of the longest side of the mesh. At 0,
+        the field meets them exactly.
+
+    Raises
+    ------
+    RosyError
+        If there is no guide, or the surface has no UV map.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> square = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> field = rf.guided(square, 2, strokes=[[[0.1, 0.2, 0], [0.9, 0.2, 0]]])
+    >>> abs(field.vectors).round(6)
+    array([[1., 0., 0.],
+           [1., 0., 0.]])
+    """
+    if isinstance(vectors, Field):
+        check_same_surface(surface, vectors)
+        if vectors.degree != degree:
+            raise RosyError(
+                f"{surface.name}: guides of degree {vectors.degree} cannot guide a field of degree "
+                f"{degree}: convert them with to_degree"
+            )
+        vectors = vectors.vectors
+    settings = GeneratorSettings(
+        "guided",
+        smoothing_length=reach,
+        edges=None if edges is None else np.asarray(edges),
+        strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
+        uv=uv_map(surface) if uv else None,
+        vectors=None if vectors is None else np.asarray(vectors, dtype=np.float64),
+    )
+    return _generated(surface, settings, degree)
+
+
+def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree: int = 4) -> Field:
+    """Make a field along a direction that is projected to the surface.
+
+    Its magnitude is the length of the projection. The field is undefined where that is zero.
+
+    Parameters
+    ----------
+    surface : Surface
+    axis : sequence of 3 floats
+        Of any length above 0.
+    degree : int
+        N, from 1 to 12.
+
+    Raises
+    ------
+    RosyError
+        If the axis is not a direction.
+    """
+    x, y, z = (float(component) for component in axis)
+    return _generated(surface, GeneratorSettings("axis", axis=(x, y, z)), degree)
+
+
+def along_uv(surface: Surface, degree: int = 4) -> Field:
+    """Make a field along the axes of the UV map of the surface.
+
+    Raises
+    ------
+    RosyError
+        If the surface has no UV map.
+    """
+    return _generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
+
+
+def uv_map(surface: Surface) -> np.ndarray:
+    """Return (C, 2) texture coordinates of the corners.
+
+    Raises
+    ------
+    RosyError
+        If the surface has no UV map.
+    """
+    if surface.uv is None:
+        raise RosyError(
+            f"{surface.name}: has no UV map: give uv, or choose an .obj file that has one"
+        )
+    return surface.uv
+
+
+def _generated(surface: Surface, settings: GeneratorSettings, degree: int) -> Field:
+    """Generate a field, and warn of faces without a direction."""
+    warn(orientation_warning(surface.mesh), stacklevel=4)
+    field = Field(surface, generate(surface.mesh, settings, degree))
+    # Faces without area do not count.
+    has_area = surface.face_normals.any(axis=1)
+    count = int((has_area & ~field.vectors.any(axis=1)).sum())
+    if count:
+        total = int(has_area.sum())
+        where = "any face" if count == total else f"{count:,} of {counted(total, 'face')}"
+        warn(
+            f"{surface.name}: {settings.kind} gives no direction on {where}: choose another kind of "
+            "field, such as form",
+            stacklevel=4,
+        )
+    return field

@@ -1,0 +1,379 @@
+"""`render`: the picture of a field; and `turntable`: a video of it from all sides."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..cache import Cache
+from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
+from ..compositor.look import Look
+from ..errors import RosyError
+from ..image_io.png import png_task, read_png, to_srgb_uint8, write_png
+from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
+from ..progress import run_to_completion
+from ..projection.camera import check_size
+from ..projection.gbuffer import MeshInstance
+from ..projection.surface_tone import SurfaceTone
+from ..rendering.band_workers import BandWorkers
+from ..rendering.cpu import CpuRenderer
+from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
+from ..rendering.view_input import ViewInput
+from ..turntable_video import Encoder, check_video_path, turntable_task, turntable_views
+from .field import Field, check_same_surface
+from .generators import form, uv_map
+from .surface import Surface
+
+#: Azimuth and elevation in degrees: from the front left, looking slightly down.
+DEFAULT_VIEW = (-25.0, 20.0)
+
+#: Width and height in pixels of pictures, and of the pictures of a turntable.
+DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
+
+#: Samples per pixel along each axis, unless the preset has more: nothing smooths the edges of the
+#: picture later.
+SUPERSAMPLING = 2
+
+#: The tone attribute that is the luminance of the vertex colors, as Blender calls it.
+VERTEX_COLOR = "Color"
+
+
+class Picture:
+    """A picture. A notebook shows it, and `numpy.asarray` makes it an array.
+
+    The array is (H, W, 4) uint8, sRGB with straight alpha, the top row first, as
+    ``matplotlib.pyplot.imshow`` and ``PIL.Image.fromarray`` take it.
+
+    Parameters
+    ----------
+    rgba : (H, W, 4) float32 ndarray
+
+    Attributes
+    ----------
+    rgba : (H, W, 4) float32 ndarray
+        Linear, not premultiplied, the bottom row first.
+    """
+
+    def __init__(self, rgba: NDArray[np.float32]) -> None:
+        self.rgba = rgba
+
+    def __repr__(self) -> str:
+        return f"<Picture: {self.rgba.shape[1]} x {self.rgba.shape[0]} pixels>"
+
+    def __array__(
+        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
+    ) -> NDArray[Any]:
+        if copy is False:
+            raise ValueError("a Picture has no array of display values that could be shared")
+        array = to_srgb_uint8(self.rgba[::-1])
+        return array if dtype is None else array.astype(dtype)
+
+    def _repr_png_(self) -> bytes:
+        return run_to_completion(png_task(self.rgba))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an 8-bit ``.png`` file.
+
+        Raises
+        ------
+        RosyError
+            If the name does not end in ``.png``, or the file cannot be written.
+        """
+        if Path(path).suffix.lower() != ".png":
+            raise RosyError(f"{path}: the name of the file must end in .png")
+        write_png(path, self.rgba)
+
+
+def list_presets() -> dict[str, str]:
+    """Return the names of all presets with their descriptions: those of RoSy and your own.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> "engraving" in rf.list_presets()
+    True
+    """
+    found = {}
+    for key, path in preset_files(default_user_folder()).items():
+        with suppress(RosyError):
+            found[key] = read_preset(path).description
+    return found
+
+
+def render(
+    surface: Surface,
+    field: Field | None = None,
+    *,
+    view: tuple[float, float] = DEFAULT_VIEW,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    orthographic: bool = False,
+    preset: str | os.PathLike[str] | None = None,
+    tone_values: str | ArrayLike | None = None,
+    tone_image: str | os.PathLike[str] | ArrayLike | Picture | None = None,
+    tone_picture: str | os.PathLike[str] | ArrayLike | Picture | None = None,
+    workers: int = 0,
+    **settings: Any,
+) -> Picture:
+    """Draw a field as a picture. The mesh fills the frame.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : Field, optional
+        By default a field of degree 4 along the form of the surface; see `form`.
+    view : (float, float)
+        Azimuth and elevation in degrees: (0, 0) is from the front, (90, 0) from the right, (0, 90)
+        from above.
+    size : (int, int)
+        Width and height in pixels.
+    orthographic : bool
+        Orthographic projection instead of perspective.
+    preset : str or path-like, optional
+        Name of a preset, or a ``.json`` file; see `list_presets`.
+    tone_values : str or (V,) array_like, optional
+        For hatching: tones of the vertices, linear, 0 is dark and 1 is light. A string names an
+        array of `Surface.vertex_data`; "Color" is the luminance of the colors of a ``.ply`` file.
+    tone_image : path-like, array_like or Picture, optional
+        For hatching: an image on the UV map of the surface, whose luminance is the tone.
+    tone_picture : path-like, array_like or Picture, optional
+        For hatching: a picture of the surface in the same view, whose luminance is the tone.
+    workers : int
+        Number of processes that draw a large picture together; 0 is one for each core. The picture
+        is the same for any number.
+    **settings
+        Settings of the look, after the preset: ``length=120, seed=3``. See the page of looks.
+
+    Returns
+    -------
+    Picture
+        Transparent where there is no surface. The same arguments give the same bytes.
+
+    Raises
+    ------
+    RosyError
+        If a setting, the preset, the size or the view is not possible, the field is on another
+        surface, or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> square = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> field = rf.along_axis(square, (1, 1, 0), degree=2)
+    >>> rf.render(square, field, view=(0, 90), size=(64, 64), preset="engraving")
+    <Picture: 64 x 64 pixels>
+    """
+    sources = {"attribute": tone_values, "image": tone_image, "picture": tone_picture}
+    look = picture_look(surface.name, preset, settings, sources)
+    tone = _surface_tone(surface, tone_values, tone_image)
+    reference = None if tone_picture is None else _image_luminance(tone_picture)
+    name = str(tone_picture) if isinstance(tone_picture, (str, os.PathLike)) else "tone_picture"
+    picture_view = mesh_view(
+        _instance(surface, field, tone),
+        look,
+        view,
+        check_size(*size),
+        perspective=not orthographic,
+        reference_luminance=reference,
+        reference_name=name,
+    )
+    # Only the pixels are kept, not the layers of the picture.
+    with BandWorkers(workers) as pool:
+        return Picture(run_to_completion(CpuRenderer(workers=pool).render_task(picture_view)).rgba)
+
+
+def turntable(
+    surface: Surface,
+    field: Field | None = None,
+    *,
+    path: str | os.PathLike[str],
+    pictures: int = 72,
+    rate: float = 24.0,
+    view: tuple[float, float] = DEFAULT_VIEW,
+    size: tuple[int, int] = DEFAULT_VIDEO_SIZE,
+    orthographic: bool = False,
+    preset: str | os.PathLike[str] | None = None,
+    tone_values: str | ArrayLike | None = None,
+    tone_image: str | os.PathLike[str] | ArrayLike | Picture | None = None,
+    workers: int = 0,
+    encode: Encoder | None = None,
+    on_picture: Callable[[int], None] | None = None,
+    **settings: Any,
+) -> Path:
+    """Draw a field from all sides, as a video.
+
+    Parameters
+    ----------
+    surface, field, size, orthographic, preset, tone_values, tone_image, workers, **settings
+        As for `render`.
+    path : path-like
+        A ``.gif``, or an ``.mp4`` if there is an encoder.
+    pictures : int
+        Number of pictures in a full turn, 2 or more.
+    rate : float
+        Pictures per second.
+    view : (float, float)
+        Azimuth of the first picture, and elevation, in degrees.
+    encode : function, optional
+        Encodes an ``.mp4``: see `turntable_video.Encoder`. By default ffmpeg, where it is installed.
+    on_picture : function, optional
+        Called with the number of each picture, from 1, before it is drawn.
+
+    Returns
+    -------
+    Path
+        The file. It is written after the last picture.
+
+    Raises
+    ------
+    RosyError
+        As `render`, or if the video cannot be written.
+    """
+    path = Path(path)
+    check_video_path(path)
+    if pictures < 2 or not rate > 0:
+        raise RosyError(f"{path}: a turntable needs 2 or more pictures, and a rate above 0")
+    if path.suffix.lower() == ".mp4" and encode is None:
+        encode = find_ffmpeg()
+    sources = {"attribute": tone_values, "image": tone_image}
+    look = picture_look(surface.name, preset, settings, sources)
+    instance = _instance(surface, field, _surface_tone(surface, tone_values, tone_image))
+    views = turntable_views(
+        instance, look, pictures, check_size(*size), view, perspective=not orthographic
+    )
+    if on_picture is not None:
+        views = _announced(views, on_picture)
+    with BandWorkers(workers) as pool:
+        renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
+        return run_to_completion(turntable_task(renderer, views, pictures, path, rate, encode))
+
+
+def picture_look(
+    name: str,
+    preset: str | os.PathLike[str] | None,
+    settings: Mapping[str, Any],
+    tone_sources: Mapping[str, Any],
+) -> Look:
+    """Return the look of a picture of a surface that is not in a scene.
+
+    Parameters
+    ----------
+    name : str
+        Of the surface, for messages.
+    preset : str or path-like or None
+        Name of a preset, or a file.
+    settings : mapping
+        Settings of `Look`, after the preset.
+    tone_sources : mapping
+        The sources of the tone by the values of `Look.tone`; None where there is none.
+
+    Raises
+    ------
+    RosyError
+        If a setting is not possible, there are two tone sources, or the look uses the lights of a
+        scene.
+    """
+    look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
+    if look.supersampling == Look().supersampling:
+        look = replace(look, supersampling=SUPERSAMPLING)
+    look = look.with_settings(dict(settings))
+    check_light(look.light, name)
+    given = [source for source, value in tone_sources.items() if value is not None]
+    if len(given) > 1:
+        raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
+    return replace(look, tone=given[0]) if given else look
+
+
+def _announced(
+    views: Iterator[ViewInput], on_picture: Callable[[int], None]
+) -> Iterator[ViewInput]:
+    """Yield the same views, and call a function with the number of each before it is drawn."""
+    for number, view in enumerate(views, 1):
+        on_picture(number)
+        yield view
+
+
+def find_ffmpeg() -> Encoder | None:
+    """Return the encoder of the Python package; None in the extension, or if ffmpeg is not installed."""
+    try:
+        from ..external.ffmpeg import find_encoder
+    except ImportError:  # the extension for Blender
+        return None
+    return find_encoder()
+
+
+def _instance(surface: Surface, field: Field | None, tone: SurfaceTone | None) -> MeshInstance:
+    """Return a surface with its field in world space, upright."""
+    field = form(surface) if field is None else field
+    check_same_surface(surface, field)
+    return mesh_instance(surface.mesh, field.rosy, surface.up, tone)
+
+
+def _surface_tone(
+    surface: Surface,
+    values: str | ArrayLike | None,
+    image: str | os.PathLike[str] | ArrayLike | Picture | None,
+) -> SurfaceTone | None:
+    """Return the tone of the vertices, or of an image on the UV map, or None."""
+    if values is not None:
+        if isinstance(values, str):
+            values = _named_tone(surface, values)
+        array = np.asarray(values, dtype=np.float64)
+        if array.shape != (len(surface.vertices),):
+            raise RosyError(
+                f"{surface.name}: tone_values must be {len(surface.vertices):,} numbers, one for each "
+                f"vertex, not an array of shape {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            raise RosyError(f"{surface.name}: tone_values has values that are not finite")
+        return SurfaceTone(array[surface.mesh.corner_vertex, None].astype(np.float32))
+    if image is not None:
+        return SurfaceTone(uv_map(surface).astype(np.float32), _image_luminance(image))
+    return None
+
+
+def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
+    """Return (V,) tones: an array of the vertices, or the luminance of their colors."""
+    data = surface.vertex_data
+    if not data:
+        raise RosyError(
+            f"{surface.name}: has no vertex attributes; of mesh files, only .ply files have any"
+        )
+    rgb = [data.get(channel) for channel in ("red", "green", "blue")]
+    if name == VERTEX_COLOR and all(channel is not None for channel in rgb):
+        return to_linear(np.stack(rgb, axis=1)) @ LUMINANCE_WEIGHTS  # type: ignore[arg-type]
+    if name not in data:
+        available = ", ".join(f"'{key}'" for key in data)
+        raise RosyError(f"{surface.name}: there is no vertex attribute '{name}', only: {available}")
+    if not np.isfinite(data[name]).all():
+        raise RosyError(
+            f"{surface.name}: the vertex attribute '{name}' has values that are not finite"
+        )
+    return data[name]
+
+
+def _image_luminance(
+    image: str | os.PathLike[str] | ArrayLike | Picture,
+) -> NDArray[np.float32]:
+    """Return (H, W) linear luminance, the bottom row first, of a file or of display values."""
+    if isinstance(image, Picture):
+        return luminance(image.rgba)
+    if isinstance(image, (str, os.PathLike)):
+        return luminance(read_png(image))
+    array = np.asarray(image)
+    if array.ndim not in (2, 3) or (array.ndim == 3 and array.shape[2] not in (3, 4)):
+        raise RosyError(
+            f"an image must have the shape (H, W), (H, W, 3) or (H, W, 4), not {array.shape}"
+        )
+    if array.ndim == 2:
+        array = np.repeat(array[..., None], 3, axis=2)
+    scale = 255.0 if array.dtype == np.uint8 else 1.0
+    linear = to_linear(np.asarray(array[::-1, :, :3], dtype=np.float32) / scale)
+    alpha = array[::-1, :, 3:] / scale if array.shape[2] == 4 else np.ones_like(linear[..., :1])
+    return luminance(np.concatenate([linear, alpha], axis=2).astype(np.float32))

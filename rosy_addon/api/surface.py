@@ -1,0 +1,221 @@
+"""`Surface`: a polygon mesh, from arrays, a file, or the mesh of another library."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import RosyError, counted
+from ..field.formats.obj import read_uv
+from ..field.formats.ply import read_vertex_values
+from ..field.formats.polygons import offsets_from_sizes
+from ..field.mesh_io import SHARP_ANGLE, read_mesh
+from ..field.representation import face_frames
+from ..field.singularities import euler_characteristic
+from ..field.surface import Surface as PolygonMesh
+from ..field.surface import build_surface
+from ..rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from .mesh_objects import MeshArrays, arrays_of
+
+
+class Surface:
+    """A polygon mesh of V vertices and F faces, on which fields are made and drawn.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array_like, path-like or mesh
+        Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``
+        or ``.stl``), or a mesh of meshio, PyVista, trimesh or Open3D.
+    faces : (F, k) array_like of int, or sequence of sequences of int, optional
+        Vertices of each face, counter-clockwise about the outward normal.
+    name : str, optional
+        For messages; by default the path of the file, or "surface".
+    up : {"y", "z"}, optional
+        The axis that points up in pictures. By default "y" for ``.obj`` and ``.off`` files, otherwise
+        "z".
+    uv : (V, 2) or (C, 2) array_like, optional
+        Texture coordinates of the vertices, or of the corners, face by face. Files in ``.obj`` format
+        and meshes of trimesh have their own.
+    sharp_angle : float, optional
+        Angle in radians between the normals of two faces above which their edge is sharp. Field values
+        and normals do not mix across sharp edges. By default 60 degrees.
+    sharp_edges : (E, 2) array_like of int, optional
+        Pairs of vertices, further sharp edges.
+
+    Attributes
+    ----------
+    mesh : rosyfields.field.surface.Surface
+        The mesh as the other modules of the package use it.
+    name : str
+    up : {"y", "z"}
+
+    Raises
+    ------
+    RosyError
+        If there is no face, an index is out of range, a coordinate is not finite, or a file cannot be
+        read.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> surface = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> surface
+    <Surface 'surface': 1 face, 4 vertices>
+    >>> bunny = rf.Surface("bunny.obj")  # doctest: +SKIP
+    >>> grid = rf.Surface(pyvista.read("flow.vtu"))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike | str | os.PathLike[str] | Any,
+        faces: ArrayLike | Sequence[Sequence[int]] | None = None,
+        *,
+        name: str | None = None,
+        up: str | None = None,
+        uv: ArrayLike | None = None,
+        sharp_angle: float | None = None,
+        sharp_edges: ArrayLike | None = None,
+    ) -> None:
+        self._path: Path | None = None
+        given = MeshArrays()
+        default_up = "z"
+        if faces is None and isinstance(vertices, (str, os.PathLike)):
+            self._path = Path(vertices)
+            self.mesh: PolygonMesh = read_mesh(self._path, sharp_angle=sharp_angle)
+            default_up = UP_AXIS_BY_SUFFIX[self._path.suffix.lower()]
+        else:
+            name = "surface" if name is None else name
+            given = (
+                arrays_of(vertices, name) if faces is None else MeshArrays(vertices, *_flat(faces))
+            )
+            self.mesh = build_surface(
+                _positions(given.vertices, name),
+                given.corner_vertex,
+                given.face_start,
+                name=name,
+                sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
+                sharp_edges=sharp_edges,
+            )
+        self.name = self.mesh.name if name is None else name
+        self.up = default_up if up is None else up
+        if self.up not in UP_AXIS_MATRIX:
+            raise RosyError(f"{self.name}: up is {self.up!r}: choose 'y' or 'z'")
+        uv = given.uv if uv is None else uv
+        self._uv = None if uv is None else self._corner_values(uv, "uv", 2)
+        self._vertex_data, self._face_data = given.vertex_data, given.face_data
+
+    def __repr__(self) -> str:
+        counts = (
+            counted(self.face_count, "face"),
+            counted(len(self.vertices), "vertex", "vertices"),
+        )
+        return f"<Surface {self.name!r}: {', '.join(counts)}>"
+
+    @property
+    def vertices(self) -> NDArray[np.float64]:
+        """(V, 3): the positions."""
+        return self.mesh.vertices
+
+    @property
+    def face_count(self) -> int:
+        """F, the number of faces."""
+        return self.mesh.face_count
+
+    @cached_property
+    def faces(self) -> NDArray[np.int32] | list[NDArray[np.int32]]:
+        """(F, k): the vertices of each face; a list of arrays if faces have different sizes."""
+        sizes = np.diff(self.mesh.face_start)
+        if (sizes == sizes[0]).all():
+            return self.mesh.corner_vertex.reshape(-1, sizes[0])
+        return np.split(self.mesh.corner_vertex, self.mesh.face_start[1:-1])
+
+    @property
+    def face_normals(self) -> NDArray[np.float64]:
+        """(F, 3): unit normals; zero for faces without area."""
+        return self.mesh.face_normal
+
+    @cached_property
+    def face_frames(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The tangent frame of each face: x along its first edge, and y, a quarter turn from it.
+
+        Both are (F, 3). `Field.angles` are measured from x. The frames are those of
+        ``igl.local_basis``.
+        """
+        return face_frames(self.mesh)
+
+    @cached_property
+    def euler_characteristic(self) -> int:
+        """V - E + F: 2 for a sphere, 0 for a torus. Vertices without a face do not count."""
+        return euler_characteristic(self.mesh)
+
+    @cached_property
+    def uv(self) -> NDArray[np.float64] | None:
+        """(C, 2): texture coordinates of the corners, face by face; None without a UV map."""
+        if self._uv is None and self._path is not None and self._path.suffix.lower() == ".obj":
+            return read_uv(self._path)
+        return self._uv
+
+    @cached_property
+    def vertex_data(self) -> Mapping[str, NDArray[Any]]:
+        """Arrays of V rows by their names, from a ``.ply`` file or from the mesh of a library."""
+        if self._path is not None and self._path.suffix.lower() == ".ply":
+            return read_vertex_values(self._path)
+        return self._vertex_data
+
+    @property
+    def face_data(self) -> Mapping[str, NDArray[Any]]:
+        """Arrays of F rows by their names, from the mesh of a library."""
+        return self._face_data
+
+    def _corner_values(self, values: ArrayLike, what: str, columns: int) -> NDArray[np.float64]:
+        """Return values of the corners, given those of the vertices or of the corners."""
+        array = np.asarray(values, dtype=np.float64)
+        counts = len(self.vertices), len(self.mesh.corner_vertex)
+        if array.ndim != 2 or array.shape[1] != columns or len(array) not in counts:
+            raise RosyError(
+                f"{self.name}: {what} needs a row of {columns} numbers for each of the {counts[0]:,} "
+                f"vertices or {counts[1]:,} corners, not an array of shape {array.shape}"
+            )
+        if not np.isfinite(array).all():
+            raise RosyError(f"{self.name}: {what} has values that are not finite")
+        return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
+
+
+def _flat(
+    faces: ArrayLike | Sequence[Sequence[int]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the vertices of all corners, and the first corner of each face."""
+    if isinstance(faces, np.ndarray):
+        rows: Sequence[Any] | NDArray[Any] = faces
+    else:
+        rows = [np.asarray(face) for face in faces]  # type: ignore[union-attr]
+        sizes = {row.shape for row in rows}
+        if len(sizes) == 1:
+            rows = np.array(rows)
+    if isinstance(rows, np.ndarray):
+        if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
+            raise RosyError(
+                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape "
+                f"{rows.shape}"
+            )
+        return rows.ravel(), np.arange(len(rows) + 1) * rows.shape[1]
+    if any(row.ndim != 1 or not np.issubdtype(row.dtype, np.integer) for row in rows):
+        raise RosyError("faces must be whole numbers, one sequence for each face")
+    return np.concatenate(rows), offsets_from_sizes([len(row) for row in rows])
+
+
+def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return (V, 3) positions; those of a flat mesh, (V, 2), get z = 0."""
+    try:
+        array = np.asarray(vertices, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RosyError(f"{name}: vertices must be numbers, one row for each vertex") from None
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise RosyError(f"{name}: vertices must have the shape (V, 3), not {array.shape}")
+    return array if array.shape[1] == 3 else np.pad(array, ((0, 0), (0, 1)))

@@ -1,0 +1,6 @@
+"""What needs other libraries or programs. It is in the Python package, not in the extension for Blender.
+
+Each module says so if something is missing::
+
+    ffmpeg      ffmpeg: videos in .mp4 files
+"""

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from PIL import Image
 
-from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look import Look, colors_magnitude
 from rosy_addon.presets.preview import draw_preview
 from rosy_addon.presets.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 
-#: Sizes of the palettes of pictures with few hues, and with noise of many. They are not visible
-#: at the size of previews, and reduce the files to a third.
-TONES, COLORS = 32, 96
+#: Sizes of the palettes of pictures with the tones of one hue, with colors for the magnitude, and with
+#: noise of many hues. They are not visible at the size of previews, and reduce the files to a quarter.
+TONES, MAGNITUDE_COLORS, NOISE_COLORS = 16, 32, 64
 
 
 def write() -> None:
@@ -23,5 +23,9 @@ def write() -> None:
 
 def _small(look: Look) -> Image.Image:
     shown = Image.fromarray(display(draw_preview(look)))
-    size = COLORS if look.noise == "colour" else TONES
+    size = TONES
+    if colors_magnitude(look):
+        size = MAGNITUDE_COLORS
+    if look.noise == "colour":
+        size = NOISE_COLORS
     return shown.quantize(size, Image.Quantize.MEDIANCUT, kmeans=4, dither=Image.Dither.NONE)

@@ -1,0 +1,243 @@
+"""The functions for scripts and notebooks: what they take, what they return, and what they refuse."""
+
+from __future__ import annotations
+
+import io
+import pkgutil
+
+import numpy as np
+import pytest
+from PIL import Image
+from shapes import icosphere, torus
+
+import rosy_addon as rf
+from rosy_addon import api
+from rosy_addon.cli.parser import main
+from rosy_addon.field.formats.polygons import offsets_from_sizes
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+
+
+def surface_of(mesh, **options):
+    """A surface with the triangles of a mesh of the tests."""
+    return rf.Surface(mesh.vertices, mesh.corner_vertex.reshape(-1, 3), **options)
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return surface_of(icosphere(2), name="sphere")
+
+
+@pytest.fixture(scope="module")
+def field(sphere):
+    return rf.smoothest(sphere)
+
+
+def test_public_names_are_no_modules():
+    """A submodule of the same name would replace a function when it is imported."""
+    modules = {module.name for module in pkgutil.iter_modules(rf.__path__)}
+    assert not modules & set(rf.__all__)
+    assert rf.__all__ == api.__all__
+    assert all(getattr(rf, name) is getattr(api, name) for name in rf.__all__)
+
+
+@pytest.mark.parametrize(
+    ("faces", "sizes"),
+    [
+        ([[0, 1, 2, 3]], [4]),
+        (np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint64), [3, 3]),
+        ([(0, 1, 2), [0, 2, 3]], [3, 3]),
+        ([[0, 1, 2, 3], [0, 1, 4]], [4, 3]),
+    ],
+)
+def test_faces_of_any_kind(faces, sizes):
+    surface = rf.Surface([*SQUARE, [0.5, -1, 0]], faces)
+    assert np.array_equal(surface.mesh.face_start, offsets_from_sizes(sizes))
+    assert [list(face) for face in surface.faces] == [list(map(int, face)) for face in faces]
+    assert [len(face) for face in surface.faces] == sizes
+
+
+def test_a_flat_mesh_needs_no_z():
+    surface = rf.Surface(np.array(SQUARE)[:, :2], [[0, 1, 2, 3]])
+    assert np.array_equal(surface.vertices, SQUARE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "expected"),
+    [
+        ((SQUARE, [[0, 1, 9]]), {}, "surface: "),
+        ((SQUARE, [[0, 1, 2.5]]), {}, "whole numbers"),
+        ((SQUARE, [[0, 1, 2], [3]]), {}, "surface: "),
+        (([[0, 0, 0, 0]], [[0, 0, 0]]), {}, "(V, 3), not (1, 4)"),
+        ((["a"], [[0, 0, 0]]), {}, "must be numbers"),
+        ((SQUARE, [[0, 1, 2]]), {"up": "x"}, "choose 'y' or 'z'"),
+        ((SQUARE, [[0, 1, 2]]), {"uv": [[0, 0]]}, "uv needs a row of 2 numbers"),
+        ((SQUARE, [[0, 1, 2]]), {"uv": [[0, np.nan]] * 4}, "not finite"),
+        ((SQUARE,), {}, "expected vertices and faces"),
+        ((object(),), {}, "not object"),
+        (("none.obj",), {}, "none.obj: cannot be read"),
+    ],
+)
+def test_meshes_that_are_refused(arguments, options, expected, error_of):
+    assert expected in error_of(rf.Surface, *arguments, **options)
+
+
+def test_angles_are_those_of_the_frames(sphere):
+    angle = np.linspace(-3.1, 3.1, sphere.face_count)
+    field = rf.from_angles(sphere, angle, degree=3)
+    assert np.allclose(field.angles, angle)
+    x, _ = sphere.face_frames
+    first_edge = sphere.vertices[sphere.faces[:, 1]] - sphere.vertices[sphere.faces[:, 0]]
+    assert np.allclose(x, first_edge / np.linalg.norm(first_edge, axis=1, keepdims=True))
+    assert field.degree == 3 and np.allclose(field.magnitude, 1)
+    assert np.allclose(rf.from_angles(sphere, angle, magnitude=angle**2).magnitude, angle**2)
+
+
+def test_difference_of_a_rotated_field(sphere, field):
+    difference = field.difference(field.rotated(np.radians(20)))
+    assert np.allclose(difference.angle, np.radians(20))
+    assert np.allclose((difference.mean, difference.rms, difference.max), np.radians(20))
+    assert difference.compared == 1
+    # Beyond 45 degrees, another member is nearer.
+    assert np.allclose(field.difference(field.rotated(np.radians(60))).angle, np.radians(30))
+
+
+def test_singularities_sum_to_the_euler_characteristic(sphere, field):
+    assert sphere.euler_characteristic == 2
+    assert field.singularities.index.sum() == 4 * 2
+    assert field.to_degree(8).singularities.index.sum() == 8 * 2
+
+
+def test_fields_from_directions_and_tensors(sphere, field):
+    again = rf.from_directions(sphere, field.directions)
+    assert again.is_rosy and again.difference(field).max < 1e-6
+    # The larger eigenvalue belongs to the member.
+    unit = field.vectors / field.magnitude[:, None]
+    tensors = 2 * unit[:, :, None] * unit[:, None] - 0.5 * np.eye(3)
+    tensor_field = rf.from_tensors(sphere, tensors)
+    assert tensor_field.degree == 4 and tensor_field.difference(field).max < 1e-6
+
+
+def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
+    for name in ("a.rosy", "a.npy", "a.rawfield"):
+        field.save(tmp_path / name)
+        again = rf.read_field(tmp_path / name, sphere, 4)
+        assert np.array_equal(again.directions, field.directions)
+    vectors = rf.from_vectors(sphere, field.vectors, 4)
+    assert np.array_equal(vectors.vectors, field.vectors)
+
+
+def test_guides_may_be_a_field(sphere, field):
+    vectors = np.where(np.arange(sphere.face_count)[:, None] < 40, field.vectors, 0)
+    guided = rf.guided(sphere, vectors=rf.from_vectors(sphere, vectors))
+    assert np.nanmax(guided.difference(field).angle[:40]) < 1e-3
+    with pytest.raises(rf.RosyError, match="to_degree"):
+        rf.guided(sphere, 2, vectors=field)
+
+
+def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
+    other = surface_of(icosphere(2), name="other")
+    for function in (rf.render, rf.strokes):
+        assert error_of(function, other, field).startswith("other: the field is on another surface")
+
+
+def test_warnings_name_the_surface():
+    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], name="square")
+    with pytest.warns(
+        rf.RosyWarning, match="square: axis gives no direction on any face"
+    ) as caught:
+        rf.along_axis(square)
+    assert caught[0].filename == __file__
+
+
+def test_a_picture_is_an_array_and_a_png(sphere, field, tmp_path):
+    picture = rf.render(sphere, field, view=(0, 0), size=(60, 40))
+    array = np.asarray(picture)
+    assert array.shape == (40, 60, 4) and array.dtype == np.uint8
+    assert np.array_equal(array, np.asarray(Image.open(io.BytesIO(picture._repr_png_()))))
+    picture.save(tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes() == picture._repr_png_()
+    with pytest.raises(rf.RosyError, match=r"must end in \.png"):
+        picture.save(tmp_path / "a.jpg")
+
+
+def test_the_command_draws_the_same_picture(tmp_path):
+    mesh = torus(24, 12)
+    rows = [f"v {x} {y} {z}\n" for x, y, z in mesh.vertices.tolist()]
+    faces = np.split(mesh.corner_vertex + 1, mesh.face_start[1:-1])
+    rows += [f"f {' '.join(map(str, face))}\n" for face in faces]
+    (tmp_path / "torus.obj").write_text("".join(rows))
+    words = ["--size", "64x48", "--preset", "plaid", "--set", "seed=3", "--generate", "smoothest"]
+    out = tmp_path / "command.png"
+    assert main(["render", str(tmp_path / "torus.obj"), "-o", str(out), *words]) == 0
+    surface = rf.Surface(tmp_path / "torus.obj")
+    field = rf.smoothest(surface)
+    picture = rf.render(surface, field, size=(64, 48), preset="plaid", seed=3)
+    assert out.read_bytes() == picture._repr_png_()
+    same = rf.Surface(surface.vertices, surface.faces, up="y")
+    again = rf.render(same, rf.smoothest(same), size=(64, 48), preset="plaid", seed=3)
+    assert again._repr_png_() == picture._repr_png_()
+
+
+def test_sources_of_the_tone(sphere, field, error_of):
+    """Light to the left: the same from values, from a picture and from an array."""
+    look = {"view": (0, 0), "size": (64, 64), "orthographic": True, "preset": "pen-and-ink"}
+    values = (sphere.vertices[:, 0] < 0).astype(float)
+    by_values = np.asarray(rf.render(sphere, field, tone_values=values, **look))[..., :3].mean(
+        axis=2
+    )
+    assert by_values[:, :24].mean() > by_values[:, -24:].mean() + 50
+    tone = np.zeros((64, 64, 3), dtype=np.uint8)
+    tone[:, :32] = 255
+    by_array = rf.render(sphere, field, tone_picture=tone, **look)
+    rgba = np.ones((64, 64, 4), dtype=np.float32)
+    rgba[..., :3] = tone / 255
+    by_picture = rf.render(sphere, field, tone_picture=rf.Picture(rgba), **look)
+    assert np.array_equal(np.asarray(by_array), np.asarray(by_picture))
+    for keywords, expected in (
+        ({"tone_values": values[1:]}, "sphere: tone_values must be"),
+        ({"tone_values": values * np.nan}, "not finite"),
+        ({"tone_values": "ink"}, "sphere: has no vertex attributes"),
+        ({"tone_image": tone}, "sphere: has no UV map"),
+        ({"tone_values": values, "tone_image": tone}, "one source"),
+        ({"preset": "none"}, "there is no preset 'none'"),
+        ({"lenght": 3}, "lenght"),
+        ({"size": (0, 10)}, "size 0x10"),
+    ):
+        assert expected in error_of(rf.render, sphere, field, **keywords)
+
+
+def test_an_image_on_the_uv_map(error_of):
+    """The left half is dark."""
+    uv = np.array(SQUARE)[:, :2]
+    square = rf.Surface(SQUARE, [[0, 1, 2, 3]], uv=uv)
+    field = rf.along_uv(square)
+    image = np.array([[0, 255]], dtype=np.uint8)
+    picture = rf.render(
+        square, field, view=(0, 90), size=(64, 64), preset="pen-and-ink", tone_image=image
+    )
+    gray = np.asarray(picture)[..., :3].mean(axis=2)
+    assert gray[16:48, 8:24].mean() < gray[16:48, 40:56].mean() - 50
+
+
+def test_a_drawing_is_svg(sphere, field, tmp_path, error_of):
+    drawing = rf.strokes(sphere, field, view=(0, 0), size=(100, 100), spacing=12, colors=["navy"])
+    drawing.save(tmp_path / "a.svg")
+    assert (tmp_path / "a.svg").read_text() == drawing.svg == drawing._repr_svg_()
+    assert 'stroke="navy"' in drawing.svg
+    assert len(drawing.polylines) == len(drawing) == len(drawing.family_names)
+    assert np.allclose(np.linalg.norm(drawing.polylines[0], axis=1), 1, atol=0.05)
+    dense = rf.strokes(sphere, field, view=(0, 0), size=(100, 100), distance=0.1)
+    assert len(dense) > len(drawing)
+    assert "unknown setting 'spacng'" in error_of(rf.strokes, sphere, field, spacng=3)
+
+
+def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
+    numbers = []
+    path = rf.turntable(
+        sphere, field, path=tmp_path / "a.gif", pictures=3, size=(32, 32), on_picture=numbers.append
+    )
+    assert numbers == [1, 2, 3]
+    assert Image.open(path).n_frames == 3
+    with pytest.raises(rf.RosyError, match="2 or more"):
+        rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)

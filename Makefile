@@ -12,6 +12,7 @@
 #   make fuzz-readers  the readers of all file formats, guided by coverage
 #   make monkey    random actions in a full Blender: make monkey BLENDER=/path/to/blender
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
+#   make dist      all files of a release: zip, wheel, sdist and dist/SHA256SUMS
 #   make gallery   the pictures of docs/gallery
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
 #   make clean     remove what was made here, but not the environments (make distclean: these too)
@@ -24,15 +25,21 @@ FUZZ_SECONDS ?= 600
 FUZZ_SEED    ?= 1
 PYTEST  = -m pytest -p no:cacheprovider --numprocesses $(JOBS) --dist worksteal
 
-UNIT  = .venv/bin/python
-BPY42 = .venv-bpy42/bin/python
+# The folder of programs in an environment.
+ifeq ($(OS),Windows_NT)
+BIN = Scripts
+else
+BIN = bin
+endif
+UNIT  = .venv/$(BIN)/python
+BPY42 = .venv-bpy42/$(BIN)/python
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long fuzz fuzz-readers zip monkey gallery bench \
-        clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric fuzz fuzz-readers zip dist \
+        check-tag monkey gallery bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -56,21 +63,32 @@ test-old-numpy: .venv-bpy42/ready
 	$(BPY42) $(PYTEST) -m "not slow and not long" tests/unit
 
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
-	.venv-bpy$*/bin/python $(PYTEST) tests/bpy
+	.venv-bpy$*/$(BIN)/python $(PYTEST) tests/bpy
 
 smoke-bpy45 smoke-bpy50: smoke-bpy%: .venv-bpy%/ready
-	.venv-bpy$*/bin/python $(PYTEST) --numprocesses 0 tests/bpy/test_smoke.py
+	.venv-bpy$*/$(BIN)/python $(PYTEST) --numprocesses 0 tests/bpy/test_smoke.py
+
+# The rooms that need only numpy, on systems without Blender's module.
+NUMERIC_ROOMS = field projection compositor line_drawing image_io presets
+test-numeric: .venv/ready
+	$(UNIT) $(PYTEST) -m "not slow and not long" $(NUMERIC_ROOMS:%=tests/unit/%)
 
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit
 
 lint: .venv/ready
-	.venv/bin/ruff format --check .
-	.venv/bin/ruff check .
+	.venv/$(BIN)/ruff format --check .
+	.venv/$(BIN)/ruff check .
+	$(UNIT) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(UNIT) -m check_jsonschema --builtin-schema vendor.github-issue-config \
+		.github/ISSUE_TEMPLATE/config.yml
+	$(UNIT) -m check_jsonschema --builtin-schema vendor.github-issue-forms \
+		$(filter-out %/config.yml,$(wildcard .github/ISSUE_TEMPLATE/*.yml))
+	$(UNIT) -m check_jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 
 format: .venv/ready
-	.venv/bin/ruff format .
-	.venv/bin/ruff check --fix .
+	.venv/$(BIN)/ruff format .
+	.venv/$(BIN)/ruff check --fix .
 
 fuzz: .venv/ready .venv-bpy42/ready
 	$(UNIT) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2))
@@ -81,11 +99,23 @@ fuzz: .venv/ready .venv-bpy42/ready
 READER_KINDS = .obj .off .ply .stl .rosy .rawfield .txt .npy .sings guides.txt .png .json
 fuzz-readers: $(READER_KINDS:%=fuzz-reader-%)
 fuzz-reader-%: .venv-fuzz/ready
-	.venv-fuzz/bin/python -m tests.fuzz.readers $* dist/fuzz-readers/$* -max_len=3000 \
+	.venv-fuzz/$(BIN)/python -m tests.fuzz.readers $* dist/fuzz-readers/$* -max_len=3000 \
 		-max_total_time=$$(($(FUZZ_SECONDS) / 12)) -artifact_prefix=dist/fuzz-readers/fault-$*-
 
 zip: .venv-bpy42/ready
 	$(BPY42) tools/build_zip.py dist
+
+# Before a release: make check-tag TAG=vVERSION
+check-tag:
+	$(PYTHON) tools/check_tag.py "$(TAG)"
+
+# The same commit gives the same bytes, in any folder: all files in the archives have a fixed time.
+dist: .venv-dist/ready .venv-bpy42/ready
+	rm -f dist/*.zip dist/*.whl dist/*.tar.gz dist/SHA256SUMS
+	$(BPY42) tools/build_zip.py dist
+	.venv-dist/$(BIN)/python -m build --no-isolation --outdir dist .
+	.venv-dist/$(BIN)/python -m twine check --strict dist/*.whl dist/*.tar.gz
+	cd dist && LC_ALL=C sha256sum *.zip *.whl *.tar.gz > SHA256SUMS
 
 # Seeds MONKEY_SEED, MONKEY_SEED + 1 and so on; MONKEY_OPTIONS=--window for a window.
 MONKEY_SEED    ?= 1
@@ -95,14 +125,14 @@ MONKEY_OPTIONS ?=
 BLENDER        ?= blender
 
 monkey: zip
-	.venv-bpy42/bin/python tests/blender/monkey.py dist/*.zip --blender "$(BLENDER)" \
+	.venv-bpy42/$(BIN)/python tests/blender/monkey.py dist/*.zip --blender "$(BLENDER)" \
 	    --seed $(MONKEY_SEED) --seeds $(MONKEY_SEEDS) --steps $(MONKEY_STEPS) $(MONKEY_OPTIONS)
 
 gallery: .venv-gallery/ready
-	.venv-gallery/bin/python -m tools.gallery
+	.venv-gallery/$(BIN)/python -m tools.gallery
 
 bench: .venv-bench/ready
-	.venv-bench/bin/python bench/run.py --json dist/bench.json
+	.venv-bench/$(BIN)/python bench/run.py --json dist/bench.json
 
 # An environment is ready once all that its list of requirements names is installed.
 .venv/ready: tools/requirements/unit.txt
@@ -115,7 +145,7 @@ define make-environment
 	@$(PYTHON) tools/check_python.py $<
 	rm -rf $(@D)
 	$(PYTHON) -m venv $(@D)
-	$(@D)/bin/python -m pip install --quiet --requirement $<
+	$(@D)/$(BIN)/python -m pip install --quiet --requirement $<
 	touch $@
 endef
 

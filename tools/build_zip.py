@@ -1,32 +1,62 @@
-"""Build the extension into a folder, with the builder that comes with bpy, and validate it."""
+"""Build the extension into a folder, with the builder that comes with bpy, and validate it.
+
+The builder stores the times and permissions of the files, in the order of the file system. They are
+replaced, so that the same files give the same bytes.
+"""
 
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
+import time
 import tomllib
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+
+#: Time of all files in the zip, in seconds since 1970: that of the files in the wheel, unless the
+#: variable SOURCE_DATE_EPOCH sets another one for both.
+DEFAULT_TIME = 1580601600
+
+#: Permissions of all files in the zip: a regular file that its owner can write.
+PERMISSIONS = 0o100644
 
 
 def main() -> int:
     """Write FOLDER/rosy-VERSION.zip and print its path."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     target = folder / f"{manifest['id']}-{manifest['version']}.zip"
-    builder = _builder()
-    for arguments in (
-        ["build", "--source-dir", str(ROOT), "--output-filepath", str(target)],
-        ["validate", str(target)],
-    ):
-        completed = subprocess.run([sys.executable, builder, *arguments], check=False)
-        if completed.returncode:
-            return completed.returncode
+    if status := _run("build", "--source-dir", str(ROOT), "--output-filepath", str(target)):
+        return status
+    make_reproducible(target)
+    if status := _run("validate", str(target)):
+        return status
     print(target)
     return 0
+
+
+def make_reproducible(path: Path) -> None:
+    """Rewrite a zip with its files in the order of their names, at one time, without folders."""
+    with zipfile.ZipFile(path) as zipped:
+        files = {name: zipped.read(name) for name in zipped.namelist() if not name.endswith("/")}
+    seconds = int(os.environ.get("SOURCE_DATE_EPOCH", DEFAULT_TIME))
+    date = time.gmtime(seconds)[:6]
+    with zipfile.ZipFile(path, "w") as zipped:
+        for name in sorted(files):
+            entry = zipfile.ZipInfo(name, date)
+            entry.create_system = 3  # Unix, whose permissions follow
+            entry.external_attr = PERMISSIONS << 16
+            zipped.writestr(entry, files[name], zipfile.ZIP_DEFLATED, compresslevel=9)
+
+
+def _run(*arguments: str) -> int:
+    """Run a command of Blender's builder, and return its exit status."""
+    return subprocess.run([sys.executable, _builder(), *arguments], check=False).returncode
 
 
 def _builder() -> str:

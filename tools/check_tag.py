@@ -1,0 +1,46 @@
+"""Check that a release is tagged with its version and has a date, and print why not in one line.
+
+tools/check_tag.py vVERSION
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def main() -> int:
+    """Check the tag of the command line. The exit status is 0 only if it can be released."""
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    fault = fault_of(sys.argv[1], manifest["version"], changes)
+    if fault:
+        print(fault)
+    return 1 if fault else 0
+
+
+def fault_of(tag: str, version: str, changes: str) -> str:
+    """Return what is wrong with a tag, or nothing.
+
+    Parameters
+    ----------
+    tag : str
+    version : str
+        The version in blender_manifest.toml.
+    changes : str
+        The text of CHANGELOG.md, whose first section is of this version.
+    """
+    if tag != f"v{version}":
+        return f"the tag is {tag}, but blender_manifest.toml has the version {version}"
+    sections = re.findall(r"(?m)^## (.*)$", changes)
+    if not sections or not re.fullmatch(rf"{re.escape(version)}, \d{{4}}-\d\d-\d\d", sections[0]):
+        return f"the first section of CHANGELOG.md is not '## {version}, YEAR-MONTH-DAY'"
+    return ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

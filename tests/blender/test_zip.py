@@ -50,7 +50,9 @@ FILES_WITH_PATHS = {
 
 REFUSED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint", "input"}
 REFUSED_ATTRIBUTES = {("os", "system"), ("os", "popen"), ("os", "startfile"), ("sys", "path")}
-REFUSED_TEXT = re.compile(r"PYTHONPATH|pip install|https?://(?!www\.inkscape|www\.w3|sodipodi)")
+REFUSED_TEXT = re.compile(
+    r"PYTHONPATH|pip install|https?://(?!www\.inkscape|www\.w3|sodipodi)|bl_ext\b"
+)
 
 #: Tags of the platform for add-ons.
 TAGS = {
@@ -97,6 +99,9 @@ def test_manifest(files):
     texts = [manifest["tagline"], *manifest["permissions"].values()]
     for text in texts:
         assert len(text) <= 64 and text[0].isupper() and text[-1] not in ".!?", text
+    assert all(manifest.values()), "the platform refuses empty values"
+    assert re.fullmatch(r"\d+\.\d+\.\d+", manifest["version"])
+    assert all(re.fullmatch(r"\d{4}(-\d{4})? \S.*", holder) for holder in manifest["copyright"])
     assert set(manifest["permissions"]) == {"files"}
     assert set(manifest["tags"]) <= TAGS
     assert set(manifest["license"]) == {"SPDX:GPL-3.0-or-later", "SPDX:CC0-1.0"}
@@ -125,6 +130,8 @@ def test_calls_paths_and_texts(sources):
                     # Workers look for modules where Blender does.
                     is_refused &= name != "rendering/band_workers.py"
                     assert not is_refused, f"{name} uses {owner}.{attribute}"
+                case ast.Subscript(value=ast.Attribute(attr="modules"), ctx=ast.Store() | ast.Del()):
+                    raise AssertionError(f"{name} changes the modules that are loaded")
                 case ast.Name(id="__file__") | ast.Attribute(attr="__file__"):
                     assert name in FILES_WITH_PATHS, f"{name} uses __file__"
                 case ast.Constant(value=str(text)) if node not in docstrings:

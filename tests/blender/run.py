@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -36,7 +37,11 @@ WINDOWS = {
     "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
     "live": ("window_live.py", 1000, 720, ()),
     "first-bake": ("window_first_bake.py", 1000, 800, ()),
+    "listing": ("window_listing.py", 1922, 1200, ()),
 }
+
+#: Size of the screen that `real-blender gui` makes. Larger windows get a screen of their own.
+SCREEN = 1400, 900
 
 
 def main() -> int:
@@ -140,14 +145,23 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         for script, width, height, further_options in windows:
             results_file = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(results_file)
-            time_limit = 900 if "ROSY_LIVE_MANY" in environment else 420
+            is_large = width > SCREEN[0] or height > SCREEN[1]
+            time_limit = 900 if is_large or "ROSY_LIVE_MANY" in environment else 420
+            arguments = [
+                *backend, "--window-geometry", "0", "0", str(width), str(height), *further_options,
+                "--python-exit-code", "1", "-P", str(HERE / script),
+            ]  # fmt: skip
+            command = ["gui", "-s", str(time_limit), *arguments]
+            if is_large:
+                screen = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
+                command = ["sh", shlex.join([*screen, "blender", *arguments])]
             process = blender(
-                "gui", "-s", str(time_limit), *backend,
-                "--window-geometry", "0", "0", str(width), str(height),
-                *further_options, "--python-exit-code", "1",
-                "-P", str(HERE / script),
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=time_limit + 60.0,
-            )  # fmt: skip
+                *command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=time_limit + 60.0,
+            )
             add_window(counts, results_file)
             # Errors in the drawing of a panel appear on the terminal alone.
             if "Traceback" in process.stdout:

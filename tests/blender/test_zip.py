@@ -130,7 +130,9 @@ def test_calls_paths_and_texts(sources):
                     # Workers look for modules where Blender does.
                     is_refused &= name != "rendering/band_workers.py"
                     assert not is_refused, f"{name} uses {owner}.{attribute}"
-                case ast.Subscript(value=ast.Attribute(attr="modules"), ctx=ast.Store() | ast.Del()):
+                case ast.Subscript(
+                    value=ast.Attribute(attr="modules"), ctx=ast.Store() | ast.Del()
+                ):
                     raise AssertionError(f"{name} changes the modules that are loaded")
                 case ast.Name(id="__file__") | ast.Attribute(attr="__file__"):
                     assert name in FILES_WITH_PATHS, f"{name} uses __file__"

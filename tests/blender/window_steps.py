@@ -92,9 +92,9 @@ def in_view():
     return bpy.context.temp_override(window=window, area=area, region=region)
 
 
-def wait_until(condition):
+def wait_until(condition, seconds=TIMEOUT_SECONDS):
     """Yield until a condition holds."""
-    deadline = time.monotonic() + TIMEOUT_SECONDS
+    deadline = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > deadline:
             raise AssertionError("timed out")

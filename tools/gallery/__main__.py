@@ -28,6 +28,7 @@ OTHERS = (
     "strokes-page",
     "fields-page",
     "turntable",
+    "listing",
     "performance",
 )
 

@@ -1,0 +1,110 @@
+"""Screenshots for docs/listing, of a large window: a live field, and its picture.
+
+Run by run.py, only where it is asked for: ``--only-window --windows listing --shots FOLDER``.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+from mathutils import Euler, Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from window_steps import (
+    SHOTS,
+    capture,
+    in_view,
+    preferences,
+    rosy,
+    run_steps,
+    save_part,
+    view,
+    wait_until,
+)
+
+#: Size of the pictures. The view is a little larger.
+SIZE = 1920, 1080
+
+#: Seconds to wait for a picture: software draws the large view.
+PATIENCE = 360
+
+#: Scale of the interface, so that it can be read when the screenshot is small.
+SCALE = 1.5
+
+#: Direction of the view as Euler angles, its distance, and its displacement to the left of the sidebar.
+VIEW, DISTANCE, SIDEBAR = (1.36, 0.0, 0.42), 4.6, 0.55
+
+
+def save_view(name):
+    """Save the 3D view as NAME.png. The bar above it shows Blender's logo, which pages must not."""
+    yield 1.5
+    _, area, region, _ = view()
+    assert area.width >= SIZE[0] and area.height >= SIZE[1], (area.width, area.height)
+    capture(f"screen-{name}", region)
+    bottom = area.y + area.height - SIZE[1]
+    save_part(f"screen-{name}", name, area.x, bottom, *SIZE)
+    (SHOTS / f"screen-{name}.png").unlink()
+
+
+def open_tab():
+    """Show the tab of RoSy. It takes several redraws to be there."""
+    view()[1].spaces.active.show_region_ui = True
+    for _ in range(4):
+        yield 0.4
+        if view()[3].width > 1:
+            view()[3].active_panel_category = "RoSy"
+        view()[1].tag_redraw()
+
+
+def live():
+    """Suzanne with a live field."""
+    preferences().live_first_field = True
+    bpy.context.preferences.view.ui_scale = SCALE
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 1.0
+    with in_view():
+        bpy.ops.screen.screen_full_area()
+    yield 1.0
+    with in_view():
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 3
+        bpy.ops.object.shade_smooth()
+    yield from open_tab()
+    with in_view():
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="form", degree=4)
+    turn_view()
+    session = rosy("rosy_addon.viewport.session")
+    yield 2.0
+    yield from wait_until(lambda: not session.messages(view()[1]), PATIENCE)
+    yield 4.0
+    yield from save_view("window-live")
+
+
+def baked():
+    """The same mesh with a picture in ink, on its paper."""
+    with in_view():
+        bpy.ops.rosy.preset_apply(preset="engraving")
+    scene = bpy.context.scene
+    scene.rosy.camera = "VIEW"
+    scene.view_settings.view_transform = "Standard"
+    with in_view():
+        bpy.ops.rosy.bake("INVOKE_DEFAULT")
+    yield from wait_until(lambda: len(scene.rosy.bakes), PATIENCE)
+    with in_view():
+        bpy.ops.rosy.show_here()
+    yield 10.0
+    yield from save_view("window-baked")
+
+
+def turn_view():
+    space = view()[1].spaces.active
+    rotation = Euler(VIEW).to_quaternion()
+    space.region_3d.view_rotation = rotation
+    space.region_3d.view_location = rotation @ Vector((SIDEBAR, 0.0, 0.0))
+    space.region_3d.view_distance = DISTANCE
+
+
+run_steps(live, baked)

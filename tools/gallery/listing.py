@@ -1,0 +1,164 @@
+"""The pictures of docs/listing, for the page of the extension on the Extensions platform."""
+
+from __future__ import annotations
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from rosy_addon.color import from_hex
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.curvature import curvature_field
+from rosy_addon.field.generate import generate
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface
+from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+
+from .figure_11 import smoothed_a_little
+from .page import ROOT
+from .presets_page import on_paper
+from .shapes import sphere, suzanne, torus, triple_torus
+from .sheet import display, font
+from .solid import around_field, harmonic_field, icosahedron_axes, smoothed
+
+FOLDER = ROOT / "docs" / "listing"
+
+#: The platform shows the featured picture at 16:9, and asks for at least this size.
+SIZE = (1920, 1080)
+
+#: Bands of the featured picture from the left: preset, color behind the model, and the right end of the
+#: band at half the height, as a fraction of the width.
+BANDS = (
+    ("engraving", "#f6efdf", 0.39),
+    ("plaid", "#b4c3c9", 0.58),
+    ("white-on-black", "#0c0c10", 1.1),
+)
+#: Azimuth and elevation of the featured picture in degrees: each eye is in a band of its own.
+VIEW = (-14.0, 4.0)
+#: Displacement of the edges between bands to the right, per pixel upward.
+SLANT = 0.22
+
+#: Settings in pixels, which are enlarged so that lines are visible in a small picture.
+LENGTHS = ("length", "grain", "high_pass", "outline", "overshoot")
+ENLARGED = 1.6
+
+#: Looks of the picture of fields: gray streaks, and a plaid.
+STREAKS = Look(length=80, grain=2.6, gain=2.8, shading=0.85, supersampling=2)
+WEAVE = STREAKS.with_settings({"noise": "colour", "grain": 4.0, "gain": 3.0})
+
+#: Size of the captions, and their color.
+CAPTION, INK = 34, (40, 40, 40)
+
+
+def write() -> None:
+    """Draw and save the pictures."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    monkey = suzanne()
+    form = generate(monkey, "form", 4)
+    _save(_featured(monkey, form), "featured", 256)
+    _save(_presets(monkey, form), "presets", 128)
+    _save(_fields(monkey), "fields", 96)
+
+
+def _featured(monkey: Surface, form: RosyField) -> Image.Image:
+    """Draw Suzanne in three presets, one in each band of the picture."""
+    canvas = Image.new("RGB", SIZE)
+    left = -1.0
+    for name, background, right in BANDS:
+        look = load_preset(name).look
+        settings = {key: getattr(look, key) * ENLARGED for key in LENGTHS}
+        settings["length"] = round(settings["length"])
+        look = look.with_settings({**settings, "supersampling": 2})
+        shown = _draw(monkey, form, look, VIEW, SIZE, 0.03, background)
+        canvas.paste(Image.fromarray(shown), (0, 0), _band(left, right))
+        left = right
+    return canvas
+
+
+def _band(left: float, right: float) -> Image.Image:
+    """Return the mask of a slanted band, with antialiased edges."""
+    width, height = SIZE
+    across, down = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    position = across + (down - height / 2) * SLANT
+    cover = np.clip(position - left * width + 0.5, 0, 1)
+    # The next band covers the right edge.
+    cover *= position < right * width + 1
+    return Image.fromarray(np.rint(cover * 255).astype(np.uint8))
+
+
+def _presets(monkey: Surface, form: RosyField) -> Image.Image:
+    """Draw Suzanne in every preset, with their names."""
+    columns, caption = 4, CAPTION + 14
+    names = preset_keys()
+    rows = -(-len(names) // columns)
+    width, height = SIZE[0] // columns, SIZE[1] // rows
+    curved = curvature_field(monkey, 4)
+    canvas = Image.new("RGB", SIZE, (255, 255, 255))
+    pen = ImageDraw.Draw(canvas)
+    for index, name in enumerate(names):
+        preset = load_preset(name)
+        look = preset.look.with_settings({"supersampling": 2})
+        field = form if look.magnitude == "none" else curved
+        paper = look.paper_colour if look.ink == "hatch" else "#ffffff"
+        size = (width, height - caption)
+        shown = _draw(monkey, field, look, (-26.0, 6.0), size, 0.04, paper)
+        left, top = index % columns * width, index // columns * height
+        canvas.paste(Image.fromarray(shown), (left, top))
+        middle = (left + width / 2, top + height - caption / 2)
+        pen.text(middle, preset.name, INK, font(CAPTION * 3 // 4), anchor="mm")
+    return canvas
+
+
+def _fields(monkey: Surface) -> Image.Image:
+    """Draw fields of degrees 1 to 6 on shapes, with their degrees."""
+    rings, ring, ball = triple_torus(), torus(), sphere(64)
+    crossing = smoothed_a_little(monkey, curvature_field(monkey, 4))
+    along_rings = smoothed(rings, curvature_field(rings, 4), 200)
+    shots = (
+        (monkey, generate(monkey, "smoothest", 1), STREAKS, (-26.0, 6.0), "1: vectors"),
+        (monkey, generate(monkey, "smoothest", 2), STREAKS, (-26.0, 6.0), "2: lines"),
+        (monkey, crossing, STREAKS, (-26.0, 6.0), "4: crosses"),
+        (rings, along_rings, WEAVE, (14.0, 52.0), "4, with colored noise"),
+        (ball, harmonic_field(ball, 6, icosahedron_axes()), STREAKS, (20.0, 20.0), "6"),
+        (ring, around_field(ring, 6), WEAVE, (20.0, 42.0), "6, with colored noise"),
+    )
+    columns, caption = 3, CAPTION + 26
+    width, height = SIZE[0] // columns, SIZE[1] // 2
+    canvas = Image.new("RGB", SIZE, (255, 255, 255))
+    pen = ImageDraw.Draw(canvas)
+    for index, (surface, field, look, angles, text) in enumerate(shots):
+        shown = _draw(surface, field, look, angles, (width, height - caption), 0.02, "#ffffff")
+        left, top = index % columns * width, index // columns * height
+        canvas.paste(Image.fromarray(shown), (left, top))
+        middle = (left + width / 2, top + height - caption / 2)
+        pen.text(middle, f"N = {text}", INK, font(CAPTION), anchor="mm")
+    return canvas
+
+
+def _draw(
+    surface: Surface,
+    field: RosyField,
+    look: Look,
+    angles: tuple[float, float],
+    size: tuple[int, int],
+    margin: float,
+    background: str,
+) -> np.ndarray:
+    """Return a picture on a plain background, (H, W, 3) uint8 with rows from the top."""
+    width, height = (look.supersampling * side for side in size)
+    camera = orbit_camera(surface.vertices, *angles, width, height, margin=margin)
+    instance = MeshInstance(surface, np.eye(4), field)
+    rgba = on_paper(compose(project([instance], camera, look.display), look).rgba, look)
+    color = np.rint(np.asarray(from_hex(background)) * 255)
+    alpha = rgba[::-1, :, 3:]
+    opaque = display(np.concatenate([rgba[..., :3], np.ones_like(rgba[..., 3:])], axis=-1))
+    return np.rint(opaque * alpha + color * (1 - alpha)).astype(np.uint8)
+
+
+def _save(image: Image.Image, name: str, colors: int) -> None:
+    """Write a .png with a palette."""
+    image = image.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE)
+    image.save(FOLDER / f"{name}.png", optimize=True)

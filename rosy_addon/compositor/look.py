@@ -263,7 +263,7 @@ class Look:
     magnitude_range: float = number(
         0.0,
         0.0,
-        1e9,
+        1e30,
         "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
         panel="colour",
         panel_label="Top Value",

@@ -236,7 +236,7 @@ def test_magnitude_is_colored():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("magnitude_range", [0.0, 1e-30, 5e-324, 1e9])
+@pytest.mark.parametrize("magnitude_range", [0.0, 1e-30, 5e-324, 1e9, 1e30])
 def test_magnitudes_of_any_scale(magnitude_range):
     surface = plane(4, 4)
     rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]

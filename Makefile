@@ -5,6 +5,7 @@
 #   make check     check format and lint, and run the quick unit tests
 #   make test      all unit tests, the quick ones with old numpy as well, and the tests with
 #                  Blender 4.2's Python module
+#   make test-extras  the tests of what needs other libraries: the files of simulations
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-long further cases of some tests, which take minutes
@@ -38,8 +39,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric fuzz fuzz-readers zip dist \
-        check-tag monkey gallery bench clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric fuzz fuzz-readers zip dist check-tag monkey gallery bench clean distclean test-extras
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -64,6 +64,9 @@ test-old-numpy: .venv-bpy42/ready
 
 test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/$(BIN)/python $(PYTEST) tests/bpy
+
+test-extras: .venv-extras/ready
+	.venv-extras/$(BIN)/python $(PYTEST) tests/extras
 
 smoke-bpy45 smoke-bpy50: smoke-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/$(BIN)/python $(PYTEST) --numprocesses 0 tests/bpy/test_smoke.py

@@ -2,5 +2,6 @@
 
 Each module says so if something is missing::
 
-    ffmpeg      ffmpeg: videos in .mp4 files
+    ffmpeg            ffmpeg: videos in .mp4 files
+    simulation_files  pyvista and meshio: meshes and fields in the files of simulations
 """

@@ -146,9 +146,9 @@ def load_field_task(
     task = _source_surface_task(path, raw, surface, mesh)
     source_surface = yield from subtask(task, 0.5, 0.6)
     if source_surface is None:
-        task = _field_from_raw_task(raw, surface, degree, str(path), nonfinite)
+        task = field_from_raw_task(raw, surface, degree, str(path), nonfinite)
         return LoadedField((yield from subtask(task, 0.6, 1.0)), "")
-    task = _field_from_raw_task(raw, source_surface, degree, str(path), nonfinite)
+    task = field_from_raw_task(raw, source_surface, degree, str(path), nonfinite)
     field = yield from subtask(task, 0.6, 0.7)
     task = transfer_field_task(source_surface, field, surface, str(path))
     field = yield from subtask(task, 0.7, 1.0)
@@ -160,10 +160,26 @@ def load_field_task(
     )
 
 
-def _field_from_raw_task(
+def field_from_raw_task(
     raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
 ) -> Task[RosyField]:
-    """Make a field from raw rows, on the surface that the rows refer to."""
+    """Make a field from raw rows, on the surface that the rows refer to.
+
+    Parameters
+    ----------
+    raw : RawField
+    surface : Surface
+    degree : int or None
+        Of rows with one member that state no degree; `DEFAULT_DEGREE` if None.
+    source : str
+        Name of the file, for messages.
+    nonfinite : {"error", "zero"}
+
+    Raises
+    ------
+    RosyError
+        As of `load_field_task`.
+    """
     _check_count(raw, surface, source)
     values = raw.values
     if raw.tensors:

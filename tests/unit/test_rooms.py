@@ -75,7 +75,7 @@ MAY_IMPORT = {
         "bake",
         "viewport",
     },
-    "external": BASE_ROOMS | {"turntable_video"},
+    "external": BASE_ROOMS | {"field", "turntable_video"},
     "api": BASE_ROOMS
     | {
         "field",
@@ -107,7 +107,18 @@ MAY_IMPORT = {
         "image_io",
         "presets",
     },
-    "extras": BASE_ROOMS | {"cli", "frame_workers"},
+    "extras": BASE_ROOMS
+    | {
+        "field",
+        "projection",
+        "compositor",
+        "rendering",
+        "turntable_video",
+        "external",
+        "api",
+        "cli",
+        "frame_workers",
+    },
     "__main__": {"extras"},
     "__init__": {"api"},
 }
@@ -125,7 +136,7 @@ NUMPY_ROOMS = (
 BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
-EXTRA_LIBRARIES = {"distributed", "imageio_ffmpeg"}
+EXTRA_LIBRARIES = {"distributed", "imageio_ffmpeg", "meshio", "pyvista", "vtkmodules"}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -1,0 +1,148 @@
+"""Steps of series, one by one."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+
+import meshio
+import numpy as np
+import pytest
+import pyvista as pv
+from extras.exodus import write_exodus
+from extras.rotations import rotation
+
+from rosy_addon.external.simulation_files import list_steps, read_simulation, simulation_steps
+
+#: The times of the steps. The rotation has the speed 1 + time.
+TIMES = [0.0, 0.5, 10.0]
+
+
+def write_files(folder, mesh, suffix="vtu"):
+    mesh = mesh.cast_to_unstructured_grid()
+    vectors = mesh["rotation"]
+    for number, time in enumerate(TIMES):
+        mesh["rotation"] = (1 + time) * vectors
+        mesh.save(folder / f"step_{5 * number}.{suffix}")
+
+
+def write_pvd(folder, mesh):
+    write_files(folder, mesh)
+    entries = [
+        f'<DataSet timestep="{time}" file="step_{5 * k}.vtu"/>' for k, time in enumerate(TIMES)
+    ]
+    text = f'<VTKFile type="Collection"><Collection>{"".join(entries)}</Collection></VTKFile>'
+    (folder / "a.pvd").write_text(text)
+    return [folder / "a.pvd"]
+
+
+def write_series(folder, mesh):
+    write_files(folder, mesh, "vtk")
+    files = [{"name": f"step_{5 * k}.vtk", "time": time} for k, time in enumerate(TIMES)]
+    text = json.dumps({"file-series-version": "1.0", "files": files})
+    (folder / "a.vtk.series").write_text(text)
+    return [folder / "a.vtk.series"]
+
+
+def write_xdmf(folder, mesh, **options):
+    path = folder / "a.xdmf"
+    # The writer puts the HDF5 file into the current folder.
+    with contextlib.chdir(folder), meshio.xdmf.TimeSeriesWriter(path, **options) as writer:
+        writer.write_points_cells(np.asarray(mesh.points), [("triangle", mesh.regular_faces)])
+        for time in TIMES:
+            writer.write_data(time, point_data={"rotation": (1 + time) * mesh["rotation"]})
+    return [path]
+
+
+def write_text_xdmf(folder, mesh):
+    return write_xdmf(folder, mesh, data_format="XML")
+
+
+def write_numbered(folder, mesh):
+    """As a shell sorts the names: step_10 before step_5."""
+    write_files(folder, mesh)
+    return sorted(folder.glob("step_*.vtu"))
+
+
+@pytest.mark.parametrize(
+    "write", [write_pvd, write_series, write_xdmf, write_text_xdmf, write_numbered]
+)
+def test_series(write, tmp_path, sphere):
+    paths = write(tmp_path, sphere)
+    times = [None] * 3 if write is write_numbered else TIMES
+    steps = list_steps(paths)
+    assert [step.time for step in steps] == times
+    for (step, mesh), time in zip(simulation_steps(paths), TIMES, strict=True):
+        assert mesh.time == step.time
+        speed = mesh.point_arrays["rotation"] / (1 + time)
+        assert speed == pytest.approx(rotation(mesh.polygons.vertices), abs=1e-5)
+
+
+def test_hdf5_file_of_a_series(tmp_path, sphere, error_of):
+    """VTK would crash without it."""
+    (path,) = write_xdmf(tmp_path, sphere)
+    (tmp_path / "a.h5").write_bytes(b"hello")
+    assert "a.h5: is not an HDF5 file" in error_of(list_steps, [path])
+    (tmp_path / "a.h5").unlink()
+    assert "a.h5: cannot be read: no such file" in error_of(read_simulation, path)
+
+
+def test_exodus_series(tmp_path, box):
+    points = np.asarray(box.points, dtype=np.float64)
+    velocity = np.stack([(1 + time) * points for time in TIMES])
+    tetrahedra = box.cells_dict[pv.CellType.TETRA]
+    write_exodus(tmp_path / "a.exo", points, tetrahedra, TIMES, velocity)
+    for (step, mesh), time in zip(simulation_steps([tmp_path / "a.exo"]), TIMES, strict=True):
+        assert step.time == time and mesh.polygons.face_count == 108
+        expected = (1 + time) * mesh.polygons.vertices
+        assert mesh.point_arrays["velocity_"] == pytest.approx(expected, abs=1e-5)
+
+
+def test_one_step_of_a_series(tmp_path, sphere, error_of):
+    """The last one, unless a number is given."""
+    (path,) = write_pvd(tmp_path, sphere)
+    mesh = read_simulation(path)
+    assert mesh.time == 10.0 and mesh.note == f"{path}: step 3 of 3, time 10"
+    assert read_simulation(path, 1).time == 0.0
+    assert "has no step 4, only 3 steps" in error_of(read_simulation, path, 4)
+
+
+def test_steps_in_parts(tmp_path, sphere):
+    """Files of a .pvd file with the same time are one step."""
+    halves = [sphere.clip("z", invert=invert) for invert in (True, False)]
+    entries = ""
+    for part, half in enumerate(halves):
+        half.cast_to_unstructured_grid().save(tmp_path / f"{part}.vtu")
+        entries += f'<DataSet timestep="1" part="{part}" file="{part}.vtu"/>'
+    text = f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>'
+    (tmp_path / "a.pvd").write_text(text)
+    (step,) = list_steps([tmp_path / "a.pvd"])
+    mesh = step.read()
+    assert mesh.polygons.face_count == sum(half.n_cells for half in halves)
+    assert len(mesh.polygons.vertices) < sum(half.n_points for half in halves), (
+        "the rims are joined"
+    )
+
+
+def test_order_of_files(tmp_path):
+    """Numbers sort names that differ in nothing else; other names stay in the given order."""
+    names = ["b_2.vtu", "b_10.vtu", "a_1.vtu"]
+    for name in names:
+        (tmp_path / name).touch()
+
+    def order(*names):
+        return [step.paths[0].name for step in list_steps([tmp_path / name for name in names])]
+
+    assert order("b_10.vtu", "b_2.vtu") == ["b_2.vtu", "b_10.vtu"]
+    assert order(*names) == names
+
+
+def test_series_without_files(tmp_path, error_of):
+    for name, text in (
+        ("a.pvd", '<VTKFile type="Collection"><Collection/></VTKFile>'),
+        ("a.vtu.series", '{"files": []}'),
+    ):
+        (tmp_path / name).write_text(text)
+        assert error_of(list_steps, [tmp_path / name]).endswith(f"{name}: lists no files")
+    (tmp_path / "a.vtu.series").write_text('{"files": [{"name": "none.vtu", "time": 0}]}')
+    assert "none.vtu: cannot be read" in error_of(list_steps, [tmp_path / "a.vtu.series"])

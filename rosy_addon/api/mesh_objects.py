@@ -45,13 +45,15 @@ class MeshArrays:
 
 
 def arrays_of(mesh: Any, name: str) -> MeshArrays:
-    """Return the arrays of a mesh of meshio, PyVista, trimesh or Open3D.
+    """Return the arrays of a mesh of meshio, PyVista, trimesh or Open3D. `MeshArrays` stay as they are.
 
     Raises
     ------
     RosyError
         If the object is no such mesh, or it has no surface.
     """
+    if isinstance(mesh, MeshArrays):
+        return mesh
     if hasattr(mesh, "points") and isinstance(getattr(mesh, "cells", None), list):
         return _from_meshio(mesh, name)
     if hasattr(mesh, "extract_surface"):

@@ -4,6 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..api import Field, Surface
+
+
+class LoadedSimulation(NamedTuple):
+    """The contents of the file of a simulation.
+
+    Attributes
+    ----------
+    surface : Surface
+    note : str
+        How the file was read; may be empty.
+    field : function
+        Makes a field, given the name of an array or None, the degree or None, and what happens to
+        vectors that are not finite: "error" or "zero".
+    """
+
+    surface: Surface
+    note: str
+    field: Callable[[str | None, int | None, str], Field]
 
 
 @dataclass(frozen=True)
@@ -17,10 +39,20 @@ class Extras:
     run_on_cluster : function, optional
         Runs a command for frames on a cluster, given the command, the frames and the address of the
         cluster, and yields the lines that it prints.
+    simulation_suffixes : tuple of str
+        Of the files of simulations that can be read.
+    load_simulation : function, optional
+        Reads one of them, given the path, the number of the step or None for the last, and the upward
+        axis or None.
+    add_commands : tuple of function
+        Each adds a command to the subparsers.
     """
 
     program: tuple[str, ...] = ()
     run_on_cluster: Callable[[Sequence[str], Sequence[int], str], Iterator[str]] | None = None
+    simulation_suffixes: tuple[str, ...] = ()
+    load_simulation: Callable[[Path, int | None, str | None], LoadedSimulation] | None = None
+    add_commands: tuple[Callable[[Any], None], ...] = ()
 
 
 NO_EXTRAS = Extras()

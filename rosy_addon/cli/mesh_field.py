@@ -17,15 +17,20 @@ from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.generate import GENERATORS
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .options import float_between, float_tuple, print_note
+from .extras import Extras
+from .options import float_between, float_tuple, int_between, print_note
 
 
-def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = False) -> None:
+def add_mesh_options(
+    parser: argparse.ArgumentParser, extras: Extras, *, allow_scene: bool = False
+) -> None:
     """Add MESH, FIELD and the options that generate a field.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
+    extras : Extras
+        MESH may also be the file of a simulation, if they can read it.
     allow_scene : bool
         Whether MESH may be a .blend file, or absent.
     """
@@ -101,6 +106,28 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
     )
+    _add_simulation_options(parser, extras)
+
+
+def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> None:
+    """Add the options for files of simulations, if these can be read."""
+    parser.set_defaults(array=None, step=None)
+    if extras.load_simulation is None:
+        return
+    suffixes = ", ".join(extras.simulation_suffixes)
+    parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
+    parser.add_argument(
+        "--array",
+        metavar="NAME",
+        help="array of the file of a simulation that is the field; by default the only one of vectors "
+        "or tensors",
+    )
+    parser.add_argument(
+        "--step",
+        type=int_between(1, 10**9),
+        metavar="N",
+        help="step of the file of a simulation, from 1; by default the last one",
+    )
 
 
 def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
@@ -109,11 +136,39 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
+    if options.mesh.suffix.lower() in options.extras.simulation_suffixes:
+        return _load_simulation(options)
+    for name in ("array", "step"):
+        if getattr(options, name) is not None:
+            raise RosyError(
+                f"{options.mesh}: --{name} applies only to files of simulations, such as .vtu"
+            )
     surface = api.Surface(options.mesh, up=getattr(options, "up", None))
     with printed_warnings():
         if options.field is not None:
             return surface, read_field(options, options.field, surface, options.degree)
         return surface, _generate_field(options, surface)
+
+
+def _load_simulation(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
+    """Read the file of a simulation. The field is one of its arrays, unless the options name another."""
+    sources = (options.field, options.generate, options.strokes, options.guides)
+    has_source = options.uv or any(source is not None for source in sources)
+    if options.array is not None and has_source:
+        raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
+    loaded = options.extras.load_simulation(
+        options.mesh, options.step, getattr(options, "up", None)
+    )
+    print_note(loaded.note)
+    with printed_warnings():
+        if options.field is not None:
+            field = read_field(options, options.field, loaded.surface, options.degree)
+        elif has_source:
+            field = _generate_field(options, loaded.surface)
+        else:
+            nonfinite = "zero" if options.undefined else "error"
+            field = loaded.field(options.array, options.degree, nonfinite)
+    return loaded.surface, field
 
 
 def read_field(

@@ -82,15 +82,16 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentPar
     parser = _Parser(prog=prog, description="Draw N-way rotational symmetry fields on meshes.")
     parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
-    add_bake_command(subparsers, extras)
     for add_command in (
+        add_bake_command,
         add_render_command,
         add_strokes_command,
         add_turntable_command,
         add_field_command,
         add_info_command,
-        add_presets_command,
     ):
+        add_command(subparsers, extras)
+    for add_command in (*extras.add_commands, add_presets_command):
         add_command(subparsers)
     return parser
 

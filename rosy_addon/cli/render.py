@@ -11,6 +11,7 @@ from .. import api
 from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIDEO_SIZE, find_ffmpeg
 from ..errors import RosyError
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
+from .extras import Extras
 from .look import add_look_options, add_tone_options, picture_arguments
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
@@ -24,10 +25,10 @@ from .streams import print_line
 from .view import add_view_options
 
 
-def add_render_command(subparsers: Any) -> None:
+def add_render_command(subparsers: Any, extras: Extras) -> None:
     """Add the command `render`."""
     parser = add_subcommand(subparsers, "render", run_render)
-    add_mesh_options(parser)
+    add_mesh_options(parser, extras)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
     add_view_options(parser, DEFAULT_SIZE)
     add_workers_option(parser)
@@ -50,10 +51,10 @@ def run_render(options: argparse.Namespace) -> None:
     picture.save(options.output)
 
 
-def add_turntable_command(subparsers: Any) -> None:
+def add_turntable_command(subparsers: Any, extras: Extras) -> None:
     """Add the command `turntable`."""
     parser = add_subcommand(subparsers, "turntable", run_turntable)
-    add_mesh_options(parser)
+    add_mesh_options(parser, extras)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
     parser.add_argument(
         "--pictures",

@@ -16,6 +16,7 @@ from ..frame_workers import parse_frames
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..rendering.mesh_view import check_light
+from .extras import Extras
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import add_object_option, add_subcommand, check_output
 from .scene import find_camera, open_scene, print_warnings, requested_objects
@@ -32,17 +33,18 @@ from .view import add_view_options, requested_size
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
+    **dict.fromkeys(("array", "step")),
     **dict.fromkeys(("uv", "undefined", "ortho"), False),
     "view": DEFAULT_VIEW,
 }
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
 
-def add_strokes_command(subparsers: Any) -> None:
+def add_strokes_command(subparsers: Any, extras: Extras) -> None:
     """Add the command `strokes`."""
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
-    add_mesh_options(parser, allow_scene=True)
+    add_mesh_options(parser, extras, allow_scene=True)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
     add_view_options(parser, None)
     add_object_option(parser, "objects of a .blend file; by default all with a field")

@@ -452,6 +452,44 @@ def orbit_camera(
     return perspective_camera(view, width, height, fov=fov, clip=clip, name=name)
 
 
+def framing_points(
+    points: np.ndarray,
+    azimuth: float,
+    elevation: float,
+    width: int,
+    height: int,
+    *,
+    perspective: bool = True,
+    fov: float = 2 * np.arctan(DEFAULT_SENSOR_WIDTH / (2 * DEFAULT_FOCAL_LENGTH)),
+    margin: float = 0.04,
+) -> np.ndarray:
+    """Return the few points that determine `orbit_camera`.
+
+    The camera that frames them frames all points. The points of a long animation can so be joined
+    step by step.
+
+    Parameters
+    ----------
+    points : (V, 3) ndarray
+        World space; at least one.
+    azimuth, elevation, width, height, perspective, fov, margin
+        As for `orbit_camera`.
+
+    Returns
+    -------
+    (n, 3) ndarray
+        At most 10 of the points.
+    """
+    u, v, w = (points @ orbit_basis(azimuth, elevation).T).T
+    extremes = [u, -u, v, -v, w, -w]
+    if perspective:
+        slope = np.tan(fov / 2) * (1 - 2 * margin)
+        for coordinate, side in ((u, width), (v, height)):
+            back = slope * side / max(width, height) * w
+            extremes += [back + coordinate, back - coordinate]
+    return points[np.unique([np.argmax(values) for values in extremes])]
+
+
 def _framing_eye(coordinate: np.ndarray, back: np.ndarray, slope: float) -> tuple[float, float]:
     """Return the position, across and back, of the nearest eye that sees all points.
 

@@ -194,7 +194,7 @@ def test_a_kind_without_directions_is_noted(tmp_path, capsys):
 REFUSED = {
     "no mesh": (["render", "none.off", "-o", "{out}"], "none.off: cannot be read"),
     "no field": (["render", "{mesh}", "none.rosy", "-o", "{out}"], "none.rosy: cannot be read"),
-    "kind of mesh": (["info", "a.vtk"], "a.vtk: is not a mesh file"),
+    "kind of mesh": (["info", "a.gltf"], "a.gltf: is not a mesh file"),
     "degree 0": (["render", "{mesh}", "-o", "{out}", "--degree", "0"], "degree 0 is not"),
     "degree -1": (["field", "{mesh}", "-o", "{out}", "--degree", "-1"], "degree -1 is not"),
     "degree 1000": (["info", "{mesh}", "--degree", "1000"], "degree 1000 is not"),

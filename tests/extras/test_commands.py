@@ -1,0 +1,205 @@
+"""The commands of the Python package with files of simulations, and without the libraries."""
+
+from __future__ import annotations
+
+import gc
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from rosy_addon.cli.parser import main as cli_main
+from rosy_addon.compositor.look import Look
+from rosy_addon.external.simulation_files import (
+    SimulationMesh,
+    build_surface,
+    list_steps,
+    make_field,
+    read_simulation,
+)
+from rosy_addon.extras.film import Film
+from rosy_addon.progress import run_to_completion
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def files(tmp_path, sphere):
+    """A folder with the sphere and its rotation in several files."""
+    sphere.save(tmp_path / "a.vtp")
+    sphere.save(tmp_path / "a.ply")
+    np.save(tmp_path / "rotation.npy", sphere["rotation"])
+    sphere["height"] = (1 + np.asarray(sphere.points)[:, 2]) / 2
+    sphere["velocity"] = np.asarray(sphere.points)
+    sphere.save(tmp_path / "b.vtp")
+    return tmp_path
+
+
+def test_render(rosy, files):
+    """The picture of an array is that of the mesh and the field in other files, to the last byte."""
+    view = ("--size", "90x80", "--degree", 2, "-o")
+    commands = {
+        "array": ("a.vtp",),
+        "named": ("b.vtp", "--array", "rotation"),
+        "field": ("b.vtp", files / "rotation.npy"),
+        "other files": ("a.ply", files / "rotation.npy"),
+    }
+    pictures = set()
+    for name, (mesh, *words) in commands.items():
+        output = files / f"{name}.png"
+        assert rosy("render", files / mesh, *words, *view, output) == (0, "", "")
+        pictures.add(output.read_bytes())
+    assert len(pictures) == 1
+    rosy("render", files / "b.vtp", "--generate", "form", *view, files / "form.png")
+    assert (files / "form.png").read_bytes() not in pictures
+
+
+def test_other_commands(rosy, files):
+    status, output, _ = rosy("info", files / "b.vtp", "--array", "rotation", "--degree", 1)
+    assert status == 0 and "degree 1\n1,280 faces, 642 vertices, Euler" in output
+    field = ("field", files / "b.vtp", "--array", "rotation", "-o", files / "out.rosy")
+    assert rosy(*field) == (0, "", "")
+    strokes = ("strokes", files / "a.vtp", "-o", files / "a.svg", "--size", "60x60")
+    strokes += ("--spacing", 12)
+    assert rosy(*strokes) == (0, "", "")
+    assert "<path" in (files / "a.svg").read_text()
+
+
+def test_tone_from_an_array(rosy, files):
+    words = ("render", files / "b.vtp", "--array", "rotation", "--preset", "engraving")
+    words += ("--size", "90x90", "-o", files / "tone.png")
+    assert rosy(*words, "--tone-attribute", "height") == (0, "", "")
+    with Image.open(files / "tone.png") as picture:
+        tone = np.asarray(picture.convert("LA"), dtype=float)
+    ink = (255 - tone[..., 0]) * (tone[..., 1] > 0)
+    assert ink[:30].sum() < 0.5 * ink[-30:].sum(), "the sphere is light at the top"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("b.vtp",), "b.vtp: 2 arrays can be a field: choose one with --array: 'rotation' "),
+        (("b.vtp", "--array", "U"), "b.vtp: there is no array 'U', only '"),
+        (("b.vtp", "--array", "height"), "b.vtp: array 'height' has scalars, a field needs vectors"),
+        (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
+        (("a.ply", "--array", "rotation"), "a.ply: --array applies only to files of simulations"),
+        (("a.vtp", "--step", 2), "a.vtp: has no step 2, only 1 step"),
+        (("none.vtu",), "none.vtu: cannot be read: no such file"),
+    ],
+)  # fmt: skip
+def test_errors(rosy, files, words, message, monkeypatch):
+    monkeypatch.chdir(files)
+    status, output, errors = rosy("render", *words, "-o", "out.png")
+    assert (status, output) == (2, "")
+    assert message in errors and errors.count("\n") == 1
+
+
+def test_the_extension_has_none_of_it(files, capfd):
+    """Without the extras, --array and film are unknown, and the files are no mesh files."""
+    for words, message in (
+        (("render", "a.ply", "--array", "x", "-o", "a.png"), "unrecognized arguments: --array"),
+        (("film", "a.vtu", "-o", "a.gif"), "invalid choice: 'film'"),
+        (("render", "a.vtu", "-o", "a.png"), "a.vtu: is not a mesh file"),
+    ):
+        assert cli_main([str(word) for word in words]) == 2
+        assert message in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("library", ["pyvista", "meshio", "h5py"])
+def test_missing_libraries(library, tmp_path):
+    """One line that says what to install; other files need no library."""
+    code = (
+        f"import sys; sys.modules[{library!r}] = None\n"
+        "from rosy_addon.extras.command_line import main; sys.exit(main())"
+    )
+    suffix = {"pyvista": "vtu", "meshio": "msh", "h5py": "med"}[library]
+    (tmp_path / f"a.{suffix}").write_text("x")
+    words = ("render", f"a.{suffix}", "-o", "a.png")
+    run = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(ROOT), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    message = f"rosy: a.{suffix}: needs {library}: pip install rosyfields[io]\n"
+    assert (run.returncode, run.stdout, run.stderr) == (2, "", message)
+
+
+@pytest.fixture
+def growing(tmp_path, sphere):
+    """20 steps of a sphere that grows and rotates faster."""
+    points, vectors = np.array(sphere.points), np.array(sphere["rotation"])
+    for number in range(1, 21):
+        sphere.points = points * (1 + number / 20)
+        sphere["rotation"] = vectors * number
+        sphere.save(tmp_path / f"step{number}.vtp")
+    return sorted(tmp_path.glob("step*.vtp"))
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4"])
+def test_film(suffix, rosy, growing, tmp_path):
+    """20 frames in the order of the numbers: the sphere grows in the fixed frame."""
+    output = tmp_path / f"film{suffix}"
+    words = ("--size", "64x64", "--rate", 10, "--degree", 1, "--workers", 1)
+    status, lines, errors = rosy("film", *growing, "-o", output, *words)
+    assert (status, errors) == (0, "")
+    assert lines.splitlines() == [f"step {number} of 20" for number in range(1, 21)]
+    if suffix == ".gif":
+        with Image.open(output) as gif:
+            assert gif.n_frames == 20 and gif.info["duration"] == 100
+            frames = [_seek(gif, number) for number in range(20)]
+    else:
+        reader = imageio_ffmpeg.read_frames(str(output))
+        assert next(reader)["size"] == (64, 64)
+        frames = [np.frombuffer(data, np.uint8).reshape(64, 64, 3) for data in reader]
+    covered = [np.count_nonzero(frame.min(axis=2) < 230) for frame in frames]
+    assert len(covered) == 20 and (np.diff(covered) > 0).all()
+
+
+def _seek(gif, number):
+    gif.seek(number)
+    return np.asarray(gif.convert("RGB"))
+
+
+def test_film_has_one_camera_and_one_range(growing):
+    """The largest step fills the frame. The range is the largest magnitude of all steps."""
+    look = Look(length=8, magnitude="colour")
+    steps = list_steps(growing)[::-1]
+    views = list(Film(steps, look, (30.0, 20.0), (60, 50), degree=1).views())
+    assert len({id(view.camera) for view in views}) == 1
+    fields = [view.instances[0].field for view in views]
+    assert {view.look.magnitude_range for view in views} == {fields[0].magnitude.max()}
+    mesh = read_simulation(steps[0].paths[0])
+    surface = build_surface(mesh)
+    instance = mesh_instance(surface, make_field(mesh, surface, degree=1), "z")
+    look = views[0].look
+    expected = mesh_view(instance, look, (30.0, 20.0), (60, 50))
+    assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)
+    pictures = [run_to_completion(CpuRenderer().render_task(v)) for v in (views[0], expected)]
+    assert pictures[0].rgba == pytest.approx(pictures[1].rgba, abs=1e-4)
+    given = Look(magnitude="length", magnitude_range=3.0)
+    film = Film(steps[:2], given, (0.0, 0.0), (60, 50))
+    assert {view.look.magnitude_range for view in film.views()} == {3.0}
+
+
+def test_film_keeps_one_step_in_memory(growing):
+    for _ in Film(list_steps(growing), Look(), (0.0, 0.0), (60, 50)).views():
+        meshes = [found for found in gc.get_objects() if isinstance(found, SimulationMesh)]
+        assert sum(bool(mesh.point_arrays) for mesh in meshes) <= 1
+
+
+def test_film_errors(rosy, growing, tmp_path):
+    status, _, errors = rosy("film", growing[0], "-o", tmp_path / "a.gif")
+    assert status == 2 and "has one step only: draw it with the command render" in errors
+    status, _, errors = rosy("film", *growing, "-o", tmp_path / "a.avi")
+    assert status == 2 and "must end in .mp4 or .gif" in errors
+    status, output, errors = rosy("film", *growing, "-o", tmp_path / "a.gif", "--array", "U")
+    assert (status, output) == (2, "") and "step1.vtp: there is no array 'U'" in errors

@@ -29,6 +29,7 @@ OTHERS = (
     "fields-page",
     "turntable",
     "listing",
+    "simulations-page",
     "performance",
 )
 

@@ -1,0 +1,46 @@
+"""The picture of docs/simulations.md: the stress at the boundary of a beam, from a .vtu file."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+
+from rosy_addon.extras.command_line import main
+
+from .page import ROOT
+
+#: The picture.
+PICTURE = ROOT / "docs" / "images" / "simulations-beam.png"
+
+#: Length, width and height of the beam, and cells along each.
+SIZES, CELLS = (4.0, 1.0, 1.0), (40, 10, 10)
+
+#: Bending at the clamped end, shear force, and torsion, in units of the largest bending stress.
+BENDING, SHEAR, TORSION = 1.0, 0.17, 0.08
+
+
+def write() -> None:
+    """Draw the picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "beam.vtu"
+        _beam().save(path)
+        words = ["render", str(path), "-o", str(PICTURE)]
+        words += ["--array", "stress", "--size", "640x360", "--set", "magnitude=colour"]
+        assert main(words) == 0
+
+
+def _beam() -> pv.UnstructuredGrid:
+    """Tetrahedra with the stress of a beam that is clamped on the left, bent and twisted."""
+    spacing = np.divide(SIZES, CELLS)
+    mesh = pv.ImageData(dimensions=np.add(CELLS, 1), spacing=spacing).to_tetrahedra(5)
+    mesh.clear_data()
+    x, y, z = (np.asarray(mesh.points, dtype=np.float64) - [0.0, 0.5, 0.5]).T
+    stress = np.zeros((len(x), 6))
+    stress[:, 0] = BENDING * (1 - x / SIZES[0]) * 2 * z
+    stress[:, 3] = -TORSION * 2 * z
+    stress[:, 5] = TORSION * 2 * y + SHEAR / 2 * (1 - 4 * z**2)
+    mesh.point_data["stress"] = stress
+    return mesh

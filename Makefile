@@ -15,6 +15,7 @@
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make dist      all files of a release: zip, wheel, sdist and dist/SHA256SUMS
 #   make gallery   the pictures of docs/gallery
+#   make site      the site of the documentation: dist/site
 #   make bench     every claim about speed, measured: minutes; dist/bench.json
 #   make clean     remove what was made here, but not the environments (make distclean: these too)
 
@@ -39,7 +40,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric fuzz fuzz-readers zip dist check-tag monkey gallery bench clean distclean test-extras
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-extras fuzz fuzz- \
+        readers monkey zip dist check-tag gallery site bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -133,6 +135,12 @@ monkey: zip
 
 gallery: .venv-gallery/ready
 	.venv-gallery/$(BIN)/python -m tools.gallery
+
+# The reference is that of the package as users install it.
+site: .venv-site/ready
+	.venv-site/$(BIN)/python -m pip install --quiet --force-reinstall --no-deps --no-build-isolation .
+	NO_MKDOCS_2_WARNING=1 .venv-site/$(BIN)/python -m mkdocs build --quiet --strict
+	.venv-site/$(BIN)/python tools/site/check.py dist/site
 
 bench: .venv-bench/ready
 	.venv-bench/$(BIN)/python bench/run.py --json dist/bench.json

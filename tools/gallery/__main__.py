@@ -22,6 +22,8 @@ PAGES = {
 OTHERS = (
     "preset-pictures",
     "hero",
+    "logo",
+    "start-pages",
     "looks-page",
     "hatching-page",
     "peers",

@@ -1,0 +1,29 @@
+"""The picture of docs/start/scripters.md, drawn by the script on that page."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+import rosy_addon
+
+from .page import ROOT
+
+PAGE = ROOT / "docs" / "start" / "scripters.md"
+
+
+def write() -> None:
+    """Run the script of the page, and keep its picture as docs/images/start-torus.png."""
+    script = PAGE.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    # The name of the package when it is installed.
+    sys.modules["rosyfields"] = rosy_addon
+    with tempfile.TemporaryDirectory() as folder:
+        with contextlib.chdir(folder):
+            exec(compile(script, str(PAGE), "exec"), {})
+        # The picture is gray: two channels instead of four.
+        picture = Image.open(Path(folder) / "torus.png").convert("LA")
+        picture.save(ROOT / "docs" / "images" / "start-torus.png", optimize=True)

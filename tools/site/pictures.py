@@ -1,0 +1,39 @@
+"""Hook of MkDocs: pictures have their size, so that pages do not jump, and open at full size."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import struct
+
+_IMAGE = re.compile(
+    r'(?P<link><a\b[^>]*>\s*)?<img (?P<attributes>[^>]*?src="(?P<source>[^"]+)"[^>]*?) ?/?>'
+)
+
+
+def on_page_content(html: str, *, page, config, files) -> str:
+    """Complete the pictures of a page. Pictures that are links already stay links."""
+
+    def completed(match: re.Match[str]) -> str:
+        source = match["source"]
+        address = posixpath.normpath(posixpath.join(posixpath.dirname(page.file.dest_uri), source))
+        file = next((file for file in files.media_files() if file.dest_uri == address), None)
+        size = file and picture_size(file.content_bytes)
+        attributes = match["attributes"]
+        if size:
+            attributes += f' width="{size[0]}" height="{size[1]}" loading="lazy"'
+        image = f"<img {attributes}>"
+        if match["link"]:
+            return match["link"] + image
+        return f'<a class="picture" href="{source}">{image}</a>'
+
+    return _IMAGE.sub(completed, html)
+
+
+def picture_size(content: bytes) -> tuple[int, int] | None:
+    """Return the width and the height of a .png or .gif in pixels, None for other files."""
+    if content.startswith(b"\x89PNG"):
+        return struct.unpack(">II", content[16:24])
+    if content.startswith(b"GIF8"):
+        return struct.unpack("<HH", content[6:10])
+    return None

@@ -139,7 +139,7 @@ gallery: .venv-gallery/ready
 # The reference is that of the package as users install it.
 site: .venv-site/ready
 	.venv-site/$(BIN)/python -m pip install --quiet --force-reinstall --no-deps --no-build-isolation .
-	NO_MKDOCS_2_WARNING=1 .venv-site/$(BIN)/python -m mkdocs build --quiet --strict
+	NO_MKDOCS_2_WARNING=1 .venv-site/$(BIN)/python -m mkdocs build --strict
 	.venv-site/$(BIN)/python tools/site/check.py dist/site
 
 bench: .venv-bench/ready

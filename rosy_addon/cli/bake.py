@@ -76,11 +76,11 @@ def run_bake(options: argparse.Namespace) -> None:
     _check_bake_options(options)
     if options.out is None and not options.save:
         raise RosyError("the pictures would not be saved: give --out DIR, --save, or both")
-    if uses_workers(options):
+    if uses_workers(options) and not options.extras.frames_are_drawn:
         run_workers(options)
         if not options.save:
             return
-    scene = open_scene("bake", options.scene)
+    scene = open_scene(options, "bake", options.scene)
     import bpy
 
     from ..bake import bake as bake_scene

@@ -32,19 +32,19 @@ def run_workers(options: argparse.Namespace) -> None:
             )
         scene = Path(blend_data.filepath)
     check_readable(scene)
-    real_path = os.path.realpath(scene)
-    if blender_path:
-        command = [blender_path, "-b", real_path, "--command", "rosy", "bake"]
-    elif not options.extras.program:
-        raise RosyError("--jobs needs Blender, or the command line of the Python package")
-    else:
-        command = [*options.extras.program, "bake", real_path]
-    command += _forwarded_args(options)
+    real_path, arguments = os.path.realpath(scene), _forwarded_args(options)
     frames = parse_frames(options.frames)
     if options.scheduler is not None:
-        output_lines = options.extras.run_on_cluster(command, frames, options.scheduler)
+        arguments = ["bake", real_path, *arguments]
+        output_lines = options.extras.run_on_cluster(arguments, frames, options.scheduler)
     else:
-        output_lines = run_local(command, frames, options.jobs)
+        if blender_path:
+            command = [blender_path, "-b", real_path, "--command", "rosy", "bake"]
+        elif options.extras.program:
+            command = [*options.extras.program, "bake", real_path]
+        else:
+            raise RosyError("--jobs needs Blender, or the command line of the Python package")
+        output_lines = run_local([*command, *arguments], frames, options.jobs)
     for line in output_lines:
         if line.startswith("frame "):
             print_line(line)
@@ -68,6 +68,8 @@ def _forwarded_args(options: argparse.Namespace) -> list[str]:
     if options.device is not None:
         arguments.append(f"--device={options.device}")
     arguments += [f"--set={setting}" for setting in options.set]
+    if options.extras.run_in_blender is not None and options.blender is not None:
+        arguments.append(f"--blender={_forwarded_program(options.blender)}")
     # The processes for frames use all cores already.
     arguments.append(f"--workers={options.workers or 1}")
     return arguments
@@ -80,3 +82,8 @@ def _forwarded_preset(preset: str) -> str:
     """
     path = find_preset_file(preset, user_presets_folder())
     return path.stem if path.parent == SHIPPED_FOLDER else os.path.realpath(path)
+
+
+def _forwarded_program(program: str) -> str:
+    """Return the path of a program, which may be a link, or a name that is looked up on the PATH."""
+    return os.path.abspath(program) if os.path.exists(program) else program

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..api import Field, Surface
+from ..turntable_video import Encoder
 
 
 class LoadedSimulation(NamedTuple):
@@ -37,7 +39,7 @@ class Extras:
     program : tuple of str
         The program that runs the commands and its first arguments.
     run_on_cluster : function, optional
-        Runs a command for frames on a cluster, given the command, the frames and the address of the
+        Runs a command for frames on a cluster, given its arguments, the frames and the address of the
         cluster, and yields the lines that it prints.
     simulation_suffixes : tuple of str
         Of the files of simulations that can be read.
@@ -46,6 +48,14 @@ class Extras:
         axis or None.
     add_commands : tuple of function
         Each adds a command to the subparsers.
+    find_blender_encoder : function, optional
+        Returns an encoder of videos by a Blender, or None, given the Blender that the user named, or
+        None.
+    run_in_blender : function, optional
+        Runs the command in a Blender and exits with its status, given the options, the verb and the
+        .blend file. Returns if the command can run in this process.
+    frames_are_drawn : bool
+        Whether other processes have drawn the frames of this command.
     """
 
     program: tuple[str, ...] = ()
@@ -53,6 +63,9 @@ class Extras:
     simulation_suffixes: tuple[str, ...] = ()
     load_simulation: Callable[[Path, int | None, str | None], LoadedSimulation] | None = None
     add_commands: tuple[Callable[[Any], None], ...] = ()
+    find_blender_encoder: Callable[[str | None], Encoder | None] | None = None
+    run_in_blender: Callable[[argparse.Namespace, str, Path | None], None] | None = None
+    frames_are_drawn: bool = False
 
 
 NO_EXTRAS = Extras()

@@ -14,11 +14,14 @@ from .extras import NO_EXTRAS, Extras
 from .field import add_field_command, add_info_command
 from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
-from .streams import discard_output, print_error, print_line
+from .streams import discard_output, output_stream, print_error, print_line
 from .strokes import add_strokes_command
 
 #: Options whose values may begin with a minus sign.
 NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")
+
+#: Commands that may need Blender.
+BLENDER_VERBS = {"bake", "strokes", "turntable", "film"}
 
 #: Exit statuses: success, standard output failed, an error in the user's input, interrupted by
 #: Ctrl-C, and standard output was closed.
@@ -50,7 +53,7 @@ def main(
     try:
         options = _build_parser(prog, extras).parse_args(_join_negative_values(arguments))
         options.run(options)
-        sys.stdout.flush()
+        output_stream().flush()
     except REPORTED_ERRORS as error:
         print_error(error_text(error))
         return EXIT_USER_ERROR
@@ -93,6 +96,13 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentPar
         add_command(subparsers, extras)
     for add_command in (*extras.add_commands, add_presets_command):
         add_command(subparsers)
+    if extras.run_in_blender is not None:
+        for verb in BLENDER_VERBS & subparsers.choices.keys():
+            subparsers.choices[verb].add_argument(
+                "--blender",
+                metavar="PATH",
+                help="Blender to run; by default Python's module bpy, or a Blender that is installed",
+            )
     return parser
 
 

@@ -44,7 +44,7 @@ def run_presets(options: argparse.Namespace) -> None:
 
 def user_presets_folder() -> Path:
     """Return the folder of the user's presets: in Blender, the one of the extension."""
-    if "bpy" not in sys.modules:
+    if sys.modules.get("bpy") is None:
         return default_user_folder()
     from ..scene.paths import user_presets_folder
 

@@ -83,7 +83,7 @@ def run_turntable(options: argparse.Namespace) -> None:
     if options.pictures < 2:
         raise RosyError("a turntable needs 2 or more --pictures")
     arguments = picture_arguments(options)
-    encode = video_encoder(options.output)
+    encode = video_encoder(options)
     surface, field = load_mesh_and_field(options)
     api.turntable(
         surface,
@@ -97,20 +97,26 @@ def run_turntable(options: argparse.Namespace) -> None:
     )
 
 
-def video_encoder(path: Path) -> Encoder | None:
-    """Return ffmpeg's or Blender's encoder for an .mp4; None for a .gif.
+def video_encoder(options: argparse.Namespace) -> Encoder | None:
+    """Return ffmpeg's or Blender's encoder for an .mp4 as the output; None for a .gif.
 
     Raises
     ------
     RosyError
         If there is no encoder.
     """
-    if path.suffix.lower() != ".mp4":
+    if options.output.suffix.lower() != ".mp4":
         return None
-    encode = find_ffmpeg()
+    find_blender_encoder, encode = options.extras.find_blender_encoder, None
+    if find_blender_encoder is not None and options.blender is not None:
+        encode = find_blender_encoder(options.blender)
+    if encode is None:
+        encode = find_ffmpeg()
     if encode is None:
         with suppress(ImportError):
             from ..scene.video import encode_video_task as encode
+    if encode is None and find_blender_encoder is not None:
+        encode = find_blender_encoder(None)
     if encode is None:
-        raise RosyError(f"{path}: {NO_ENCODER}")
+        raise RosyError(f"{options.output}: {NO_ENCODER}")
     return encode

@@ -11,14 +11,18 @@ from ..errors import RosyError
 from .streams import print_error
 
 
-def open_scene(command: str, path: Path | None) -> Any:
+def open_scene(options: argparse.Namespace, command: str, path: Path | None) -> Any:
     """Open a Blender file, if one is given, and return the scene.
+
+    The Python package may run the command in a Blender instead, and exit.
 
     Raises
     ------
     RosyError
         If this is not Blender, or the file cannot be read.
     """
+    if options.extras.run_in_blender is not None:
+        options.extras.run_in_blender(options, command, path)
     try:
         import bpy
     except ImportError:

@@ -8,6 +8,20 @@ from typing import TextIO
 
 from ..errors import escape_unsafe
 
+#: Where commands print, if that is not `sys.stdout`.
+_own_output: TextIO | None = None
+
+
+def output_stream() -> TextIO:
+    """Return the stream that commands print to: standard output, or that of `use_output`."""
+    return sys.stdout if _own_output is None else _own_output
+
+
+def use_output(stream: TextIO) -> None:
+    """Let commands print to a stream of their own: Blender prints to `sys.stdout` as well."""
+    global _own_output
+    _own_output = stream
+
 
 def printable(text: str, encoding: str | None = None) -> str:
     """Return a text with escapes, such as ``\\x1b``, for what a terminal acts on or cannot encode.
@@ -29,7 +43,7 @@ def printable(text: str, encoding: str | None = None) -> str:
 
 def print_line(text: str, file: TextIO | None = None) -> None:
     """Print a text, escaped by `printable`, to standard output or another stream, at once."""
-    file = sys.stdout if file is None else file
+    file = output_stream() if file is None else file
     print(printable(text, getattr(file, "encoding", None)), file=file, flush=True)
 
 
@@ -41,5 +55,5 @@ def print_error(text: str) -> None:
 def discard_output() -> None:
     """Send standard output to nowhere, as what is left in its buffer cannot be written."""
     descriptor = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(descriptor, sys.stdout.fileno())
+    os.dup2(descriptor, output_stream().fileno())
     os.close(descriptor)

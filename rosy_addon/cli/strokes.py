@@ -108,7 +108,7 @@ def _draw_scene_strokes(options: argparse.Namespace) -> None:
         raise RosyError(
             f"{options.output}: several frames need # in the file name for the frame number"
         )
-    scene = open_scene("strokes", options.mesh)
+    scene = open_scene(options, "strokes", options.mesh)
     for frame in frames:
         if frame is None:
             _draw_frame_strokes(options, scene, options.output)

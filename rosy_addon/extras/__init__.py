@@ -4,4 +4,5 @@ command_line   the commands
 simulations    MESH in the files of simulations
 film           the command `film`: the steps of a simulation as a video
 cluster        Dask: frames on a cluster
+blender        Blender: .blend files, and videos
 """

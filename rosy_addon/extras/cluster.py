@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -17,17 +16,21 @@ FRAMES_PER_TASK = 8
 MAX_RETRIES = 3
 
 
-def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
-    """Run a command for all frames on the workers of a Dask cluster.
+#: Name of the package, which workers have as well.
+PACKAGE = __package__.split(".")[0]
 
-    Workers need the same program and files under the same paths. If a worker is lost, its frames
-    are given to another one. If a task of several frames fails, its frames are run again one by
-    one.
+
+def run_on_cluster(arguments: Sequence[str], frames: Sequence[int], address: str) -> Iterator[str]:
+    """Run a command of RoSy for all frames on the workers of a Dask cluster.
+
+    Workers run it with their own Python, in which RoSy is installed. Files have the same paths on all
+    machines. If a worker is lost, its frames are given to another one. If a task of several frames
+    fails, its frames are run again one by one. If this process ends early, workers stop.
 
     Parameters
     ----------
-    command : sequence of str
-        Without ``--frames``, which is added.
+    arguments : sequence of str
+        Of the command, without ``--frames``, which is added.
     frames : sequence of int
     address : str
         Address of the scheduler.
@@ -52,18 +55,48 @@ def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) 
     except (OSError, ValueError) as reason:
         raise RosyError(f"--scheduler {address}: cannot connect: {reason}") from None
     failures = []
+
+    # Dask sends a local function by value, so that the scheduler does not need RoSy.
+    def run_chunk(package: str, arguments: list[str], key: str) -> tuple[int, str, str]:
+        """Run the command on a worker, and return its exit status, output and errors."""
+        import subprocess
+        import sys
+
+        from distributed import get_worker
+
+        tasks = get_worker().state.tasks
+        with subprocess.Popen(
+            [sys.executable, "-m", package, *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        ) as process:
+            # If the client ends, it does not want the result any more.
+            while key in tasks and tasks[key].state != "cancelled":
+                try:
+                    output, errors = process.communicate(timeout=1.0)
+                    return process.returncode, output, errors
+                except subprocess.TimeoutExpired:
+                    continue
+            process.terminate()
+            output, errors = process.communicate()
+            return process.returncode, output, errors
+
     with client:
         frames = list(frames)
         pending = {}
 
         def submit(chunk: list[int]) -> Any:
             text = format_frames(chunk)
+            key = f"rosy-{text}-{time.time_ns()}"
             future = client.submit(
-                subprocess.run,
-                [*command, f"--frames={text}"],
-                capture_output=True,
-                text=True,
-                key=f"rosy-{text}-{time.time_ns()}",
+                run_chunk,
+                PACKAGE,
+                [*arguments, f"--frames={text}"],
+                key,
+                key=key,
                 retries=MAX_RETRIES,
                 pure=False,
             )
@@ -78,18 +111,15 @@ def run_on_cluster(command: Sequence[str], frames: Sequence[int], address: str) 
         for future in futures:
             chunk = pending.pop(future)
             worker_lost = future.status == "error"
-            if not worker_lost and not future.result().returncode:
-                yield from future.result().stdout.splitlines()
+            status, output, errors = (1, "", "") if worker_lost else future.result()
+            if not status:
+                yield from output.splitlines()
             elif len(chunk) > 1:
                 # Run the frames one by one, to find the one that fails and to complete the others.
                 for frame in chunk:
                     futures.add(submit([frame]))
             else:
-                cause = (
-                    repr(future.exception())
-                    if worker_lost
-                    else error_line(future.result().stderr.splitlines())
-                )
+                cause = repr(future.exception()) if worker_lost else error_line(errors.splitlines())
                 failures.append((chunk[0], cause))
     if failures:
         raise RosyError("; ".join(f"frame {frame}: {cause}" for frame, cause in sorted(failures)))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 from ..cli.extras import Extras
 from ..cli.parser import main as cli_main
+from ..cli.streams import use_output
 from ..external.simulation_files import SUFFIXES
+from .blender import PACKAGE, BlenderRunner, blender_encoder
 from .cluster import run_on_cluster
 from .film import add_film_command
 from .simulations import load_simulation
@@ -15,12 +18,37 @@ from .simulations import load_simulation
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command, and return its exit status. See `cli.parser.main`."""
-    package = __package__.split(".")[0]
+    arguments = sys.argv[1:] if argv is None else argv
     extras = Extras(
-        program=(sys.executable, "-m", package),
+        program=(sys.executable, "-m", PACKAGE),
         run_on_cluster=run_on_cluster,
         simulation_suffixes=SUFFIXES,
         load_simulation=load_simulation,
         add_commands=(add_film_command,),
+        find_blender_encoder=blender_encoder,
+        run_in_blender=BlenderRunner(arguments),
     )
-    return cli_main(argv, f"python -m {package}", extras)
+    return cli_main(arguments, f"python -m {PACKAGE}", extras)
+
+
+def main_in_blender(argv: Sequence[str], output: TextIO, frames_are_drawn: bool) -> int:
+    """Run a command of `main` in the Blender that it has started, and return the exit status.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        The arguments of `main`.
+    output : text file
+        Standard output of the command. Blender prints reports of operators to `sys.stdout`.
+    frames_are_drawn : bool
+        Whether other processes have drawn the frames already.
+    """
+    use_output(output)
+    extras = Extras(
+        run_on_cluster=run_on_cluster,
+        simulation_suffixes=SUFFIXES,
+        load_simulation=load_simulation,
+        run_in_blender=lambda *_: None,
+        frames_are_drawn=frames_are_drawn,
+    )
+    return cli_main(argv, f"python -m {PACKAGE}", extras)

@@ -78,7 +78,7 @@ def run_film(options: argparse.Namespace) -> None:
     check_video_path(options.output)
     if options.degree is not None:
         check_degree(options.degree)
-    encode = video_encoder(options.output)
+    encode = video_encoder(options)
     name = str(options.series[0])
     look = picture_look(name, requested_preset(options), requested_settings(options), {})
     steps = list_steps(options.series)

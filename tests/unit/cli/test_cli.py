@@ -335,8 +335,10 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
 
 def test_bake_without_blender_is_an_error(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
+    assert parser.main(["bake", "--save"]) == 2
+    assert "bake needs Blender: run `blender" in capsys.readouterr().err
     assert main(["bake", "--save"]) == 2
-    assert "bake needs Blender" in capsys.readouterr().err
+    assert "bake: no input: give SCENE.blend" in capsys.readouterr().err
 
 
 def test_bake_without_an_output_is_refused(capsys):
@@ -354,6 +356,7 @@ def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     scene.touch()
     words = [f"--out={tmp_path}", "--object=-a", "--object=b", "--object=--save", "--camera=-x"]
     words += ["--size=8x8", "--preset=plaid", "--device=cpu", "--set=gain=2", "--set=-1=-1"]
+    words += ["--blender=-no such program"]
     for arguments in (
         words,
         ["--object=-a", "--object", "b", "--object=--save", *words[:1], *words[4:]],

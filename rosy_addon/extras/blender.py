@@ -1,0 +1,435 @@
+"""Running a command in a Blender, where Python has no module ``bpy``.
+
+Blender prints messages of its own, from its first line with the version to its last one, some of them
+from C code. They must not mix with the output of the command. So Blender starts with its standard
+output and error in a log file, and the command inside writes to copies of the streams of this process.
+These are the real streams: a terminal stays a terminal, and the command notices a closed pipe.
+
+The command reports its exit status in a file, because Blender cannot end in order with any other
+status than 0. If there is no report, Blender failed, and its log says why.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO, TextIO
+
+from ..cli.bake_workers import uses_workers
+from ..cli.presets import user_presets_folder
+from ..errors import RosyError
+from ..processes import process_task
+from ..progress import Task
+from ..turntable_video import Encoder
+
+#: The oldest version of Blender that RoSy runs in.
+OLDEST_VERSION = (4, 2)
+
+#: Environment variable with the Blender to run. The option --blender comes before it.
+BLENDER_VARIABLE = "ROSY_BLENDER"
+
+#: Folder of the package, and its name.
+PACKAGE_FOLDER = Path(__file__).resolve().parents[1]
+PACKAGE = __package__.split(".")[0]
+
+#: The script that Blender runs.
+SCRIPT = Path(__file__).resolve().with_name("blender_script.py")
+
+#: How Blender is started: without the user's settings and add-ons, and without scripts in .blend files.
+BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-exit-code", "1")
+
+#: Names of Blender on the PATH. The second one is that of Flatpak.
+PROGRAM_NAMES = ("blender", "org.blender.Blender")
+
+#: Where installers and users put Blender, by `sys.platform`. ``{...}`` is an environment variable.
+USUAL_PLACES = {
+    "darwin": (
+        "/Applications/Blender*.app",
+        "/Applications/Blender*/Blender*.app",
+        "~/Applications/Blender*.app",
+        "~/Library/Application Support/Steam/steamapps/common/Blender/Blender.app",
+    ),
+    "win32": (
+        "{ProgramFiles}/Blender Foundation/Blender*/blender.exe",
+        "{LOCALAPPDATA}/Programs/Blender*/blender.exe",
+        "{ProgramFiles(x86)}/Steam/steamapps/common/Blender/blender.exe",
+    ),
+    "linux": (
+        "/opt/blender*/blender",
+        "/usr/local/blender*/blender",
+        "~/blender*/blender",
+        "~/.local/blender*/blender",
+        "~/.steam/steam/steamapps/common/Blender/blender",
+        "/snap/bin/blender",
+        "/var/lib/flatpak/exports/bin/org.blender.Blender",
+        "~/.local/share/flatpak/exports/bin/org.blender.Blender",
+    ),
+}
+
+#: Seconds that Blender has to print its version, and to end after an interrupt before it is killed.
+VERSION_SECONDS, STOP_SECONDS = 60.0, 5.0
+
+
+def find_blender(requested: str | None = None) -> str:
+    """Return the program of the Blender to run.
+
+    Parameters
+    ----------
+    requested : str, optional
+        A program, its name on the PATH, or a folder that holds it. By default it is the environment
+        variable ROSY_BLENDER. If that is not set either, it is ``blender`` on the PATH, or else the
+        newest one in the usual places.
+
+    Raises
+    ------
+    RosyError
+        If there is no Blender, or it is too old.
+    """
+    for named, source in (
+        (requested, "--blender "),
+        (os.environ.get(BLENDER_VARIABLE), f"{BLENDER_VARIABLE}="),
+    ):
+        if named:
+            return _checked_blender(named, source)
+    outdated = []
+    for program in installed_blenders():
+        version = blender_version(program)
+        if version is not None and version >= OLDEST_VERSION:
+            return program
+        if version is not None:
+            outdated.append(f"; {program} is {_version_text(version)}")
+    raise RosyError(
+        f"no version {_version_text(OLDEST_VERSION)} or later is on the PATH or in "
+        f"{', '.join(_usual_places())}{''.join(outdated)}: install it, give --blender PATH or set "
+        f"{BLENDER_VARIABLE}, or install the Python module bpy"
+    )
+
+
+def _checked_blender(named: str, source: str) -> str:
+    """Return the program of a Blender that the user named; `source` is where, for the errors."""
+    program = shutil.which(named) or _program(Path(named).expanduser())
+    if program is None:
+        raise RosyError(f"{source}{named}: there is no such program")
+    version = blender_version(program)
+    if version is None:
+        raise RosyError(f"{source}{named}: is not Blender, or does not start")
+    if version < OLDEST_VERSION:
+        raise RosyError(
+            f"{source}{named}: is Blender {_version_text(version)}, but RoSy needs "
+            f"{_version_text(OLDEST_VERSION)} or later"
+        )
+    return program
+
+
+def _version_text(version: Sequence[int]) -> str:
+    return ".".join(map(str, version))
+
+
+def installed_blenders() -> Iterator[str]:
+    """Yield the programs of Blender on the PATH and in the usual places, newest first in these.
+
+    The numbers in the names of their folders are taken for versions.
+    """
+    for name in PROGRAM_NAMES:
+        program = shutil.which(name)
+        if program is not None:
+            yield program
+    found = []
+    for place in _usual_places():
+        folder = Path(place).expanduser()
+        found += map(_program, folder.parents[-1].glob(str(folder.relative_to(folder.anchor))))
+    yield from sorted(filter(None, found), key=_numbers, reverse=True)
+
+
+def _usual_places() -> list[str]:
+    """Return the patterns of paths where Blender may be on this system."""
+    places = USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"])
+    variables = dict.fromkeys(re.findall(r"{(.*?)}", " ".join(places)))
+    values = {name: os.environ.get(name) for name in variables}
+    return [
+        re.sub(r"{(.*?)}", lambda match: values[match[1]], place)
+        for place in places
+        if all(values[name] for name in re.findall(r"{(.*?)}", place))
+    ]
+
+
+def _numbers(path: str) -> list[int]:
+    """Return the numbers in those parts of a path that are named after Blender."""
+    names = " ".join(part for part in Path(path).parts if "blender" in part.lower())
+    return [int(number) for number in re.findall(r"\d+", names)]
+
+
+def _program(path: Path) -> str | None:
+    """Return the program under a path: itself, or that in a folder or in a bundle of macOS."""
+    for part in (".", "blender", "blender.exe", "Contents/MacOS/Blender"):
+        if os.access(path / part, os.X_OK) and (path / part).is_file():
+            return str((path / part).absolute())
+    return None
+
+
+def blender_version(program: str) -> tuple[int, ...] | None:
+    """Return the version of a Blender, such as (4, 2, 1), or None if it is not Blender."""
+    try:
+        done = subprocess.run(
+            [program, "-b", "--version"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=VERSION_SECONDS,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    match = re.search(rb"^Blender (\d+)\.(\d+)(?:\.(\d+))?", done.stdout, re.MULTILINE)
+    return tuple(int(part) for part in match.groups(b"0")) if match else None
+
+
+def has_bpy() -> bool:
+    """Return whether Python has Blender's module."""
+    try:
+        importlib.import_module("bpy")
+    except ImportError:
+        return False
+    return True
+
+
+class BlenderRunner:
+    """Runs a command again in a Blender.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        The arguments of the command.
+    """
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        self._arguments = list(arguments)
+
+    def __call__(self, options: argparse.Namespace, command: str, path: Path | None) -> None:
+        """Run the command in a Blender and exit with its status.
+
+        Return if the option --blender is not set and Python has the module ``bpy``.
+
+        Parameters
+        ----------
+        options : argparse.Namespace
+            The options of the command.
+        command : str
+            The verb.
+        path : Path or None
+            The .blend file.
+
+        Raises
+        ------
+        SystemExit
+            With the status of the command.
+        RosyError
+            If there is no file, no Blender, or Blender failed.
+        """
+        if options.blender is None and has_bpy():
+            return
+        if path is None:
+            raise RosyError(f"{command}: no input: give SCENE.blend")
+        try:
+            program = find_blender(options.blender)
+        except RosyError as error:
+            raise RosyError(f"{command} needs Blender: {error}") from None
+        job = {
+            "package": PACKAGE,
+            "folder": str(PACKAGE_FOLDER),
+            "arguments": self._arguments,
+            "frames_are_drawn": command == "bake" and uses_workers(options),
+        }
+        raise SystemExit(run_job(program, job))
+
+
+def run_job(program: str, job: dict[str, Any]) -> int:
+    """Run `blender_script.py` in a Blender, and return the exit status of its command.
+
+    Parameters
+    ----------
+    program : str
+        Of Blender.
+    job : dict
+        What the script needs, besides its streams.
+
+    Raises
+    ------
+    RosyError
+        If Blender ended before the command did.
+    KeyboardInterrupt
+        If the user stopped it before the command began, or it did not end at once.
+    """
+    with ExitStack() as stack:
+        log = stack.enter_context(tempfile.TemporaryFile())
+        report = stack.enter_context(tempfile.TemporaryFile("a+b", buffering=0))
+        descriptors = [_copy(sys.stdout, 1, stack), _copy(sys.stderr, 2, stack), report.fileno()]
+        handles, inheritance = _inheritance(descriptors)
+        job = job | {
+            "handles": handles,
+            "encodings": [_encoding(sys.stdout), _encoding(sys.stderr)],
+        }
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                stream.flush()
+        process = subprocess.Popen(
+            [program, *BLENDER_OPTIONS, "--python", str(SCRIPT), "--", json.dumps(job)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            # Sandboxes of Blender have other folders of user data.
+            env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
+            **inheritance,
+        )
+        try:
+            with _signals_as_exceptions():
+                process.wait()
+        except KeyboardInterrupt:
+            _stop(process, report)
+            if _reported_status(report) is None:
+                raise
+        finally:
+            _stop(process, report)
+        status = _reported_status(report)
+        if status is None:
+            raise RosyError(f"{program}: {_failure(process.returncode, log)}")
+        return status
+
+
+def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
+    """Return a copy of the descriptor of a stream; of a default one if it has none."""
+    try:
+        descriptor = stream.fileno()
+    except (AttributeError, OSError, ValueError):
+        descriptor = default
+    copied = os.dup(descriptor)
+    stack.callback(os.close, copied)
+    return copied
+
+
+def _encoding(stream: TextIO | None) -> tuple[str, str]:
+    """Return the encoding of a stream, and what it does with errors."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    return encoding, getattr(stream, "errors", None) or "backslashreplace"
+
+
+def _inheritance(descriptors: Sequence[int]) -> tuple[list[int], dict[str, Any]]:
+    """Return descriptors as a child process gets them, and arguments of `subprocess.Popen`."""
+    if sys.platform != "win32":
+        return list(descriptors), {"pass_fds": tuple(descriptors)}
+    import msvcrt
+
+    handles = [msvcrt.get_osfhandle(descriptor) for descriptor in descriptors]
+    for handle in handles:
+        os.set_handle_inheritable(handle, True)
+    startup = subprocess.STARTUPINFO(lpAttributeList={"handle_list": handles})
+    return handles, {"startupinfo": startup}
+
+
+@contextmanager
+def _signals_as_exceptions() -> Iterator[None]:
+    """Raise SystemExit for signals that would end this process and leave Blender behind."""
+
+    def leave(number: int, _frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    changed = []
+    try:
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+                signal.signal(number, leave)
+                changed.append(number)
+    except ValueError:  # not the main thread
+        pass
+    try:
+        yield
+    finally:
+        for number in changed:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
+    """End Blender if it still runs: interrupt the command, and kill it if that does not help.
+
+    Before the command has begun, Blender ignores interrupts.
+    """
+    if process.poll() is not None:
+        return
+    if _report_lines(report):
+        if sys.platform != "win32":  # where Ctrl-C reaches Blender, and nothing else is a signal
+            process.send_signal(signal.SIGINT)
+        try:
+            process.wait(STOP_SECONDS)
+        except (subprocess.TimeoutExpired, KeyboardInterrupt):
+            pass
+        else:
+            return
+    process.kill()
+    process.wait()
+
+
+def _report_lines(report: BinaryIO) -> list[bytes]:
+    """Return what the script has reported: that it began, and the exit status of the command."""
+    report.seek(0)
+    return report.read().split()
+
+
+def _reported_status(report: BinaryIO) -> int | None:
+    lines = _report_lines(report)
+    return int(lines[1]) if len(lines) > 1 else None
+
+
+def _failure(status: int, log: BinaryIO) -> str:
+    """Return in one line how Blender failed."""
+    log.seek(0)
+    lines = [line.strip() for line in log.read().decode(errors="replace").splitlines()]
+    last_line = next((line for line in reversed(lines) if line), "it printed nothing")
+    ending = f"by signal {-status}" if status < 0 else f"with status {status}"
+    return f"Blender ended {ending} before the command did: {last_line}"
+
+
+def blender_encoder(requested: str | None) -> Encoder | None:
+    """Return an encoder of .mp4 files that runs Blender, or None if none is installed.
+
+    Parameters
+    ----------
+    requested : str, optional
+        As of `find_blender`.
+
+    Raises
+    ------
+    RosyError
+        If the Blender that the user named cannot be used.
+    """
+    try:
+        program = find_blender(requested)
+    except RosyError:
+        if requested or os.environ.get(BLENDER_VARIABLE):
+            raise
+        return None
+    script = PACKAGE_FOLDER / "scene" / "video_encoding.py"
+
+    def encode_task(
+        folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
+    ) -> Task[None]:
+        """Encode the pictures of a folder. See `Encoder`."""
+        command = [program, *BLENDER_OPTIONS, "--python", str(script), "--"]
+        command += map(str, (folder, count, *size, repr(fps), path))
+        status, output = yield from process_task(command, "encoding the video")
+        if status or not path.is_file():
+            message = (output.strip().splitlines() or ["it failed"])[-1]
+            raise RosyError(f"{path}: {program} cannot encode a video: {message}")
+
+    return encode_task

@@ -1,0 +1,89 @@
+"""The script that runs a command of the Python package in a Blender; see `extras.blender`.
+
+It loads the package from its folder. The folder around the package is not added to the path of
+modules, because what else is installed there is for another Python::
+
+    blender -b --factory-startup --python blender_script.py -- JOB
+
+JOB is a JSON object:
+
+package, folder
+    Name of the package, and its folder.
+arguments
+    Of the command.
+frames_are_drawn
+    Whether other processes have drawn the frames.
+handles
+    Descriptors for the output of the command, for its errors, and for the report: the word "begun",
+    and then the exit status. On Windows they are handles.
+encodings
+    Encoding of the output and of the errors, each with the way to handle errors.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import Any, TextIO
+
+
+def run(job: dict[str, Any]) -> None:
+    """Run the command of a job, and report its exit status."""
+    *descriptors, report = map(own_descriptor, job["handles"])
+    output, errors = (
+        os.fdopen(descriptor, "w", encoding=encoding, errors=handling)
+        for descriptor, (encoding, handling) in zip(descriptors, job["encodings"], strict=True)
+    )
+    blender_errors, sys.stderr = sys.stderr, errors
+    signal.signal(signal.SIGINT, interrupt)
+    if hasattr(signal, "SIGPIPE"):  # as in Python outside of Blender: a closed pipe is an OSError
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    os.write(report, b"begun\n")
+    try:
+        status = run_command(job, output)
+    except BaseException:
+        traceback.print_exc()
+        status = 1
+    # A Ctrl-C does nothing from here on.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.write(report, b"%d\n" % status)
+    sys.stderr = blender_errors
+
+
+def own_descriptor(handle: int) -> int:
+    """Return the descriptor of a stream of this process, which its children do not inherit."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        handle = msvcrt.open_osfhandle(handle, os.O_APPEND)
+    os.set_inheritable(handle, False)
+    return handle
+
+
+def interrupt(_number: int, _frame: object) -> None:
+    """Stop the command, once: a Ctrl-C reaches Blender from the terminal and from `extras.blender`."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def run_command(job: dict[str, Any], output: TextIO) -> int:
+    """Import the package and run the command, which prints to `output`."""
+    name, folder = job["package"], Path(job["folder"])
+    spec = importlib.util.spec_from_file_location(
+        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
+    package = importlib.util.module_from_spec(spec)
+    sys.modules[name] = package
+    spec.loader.exec_module(package)
+    command_line = importlib.import_module(f"{name}.extras.command_line")
+    return command_line.main_in_blender(job["arguments"], output, job["frames_are_drawn"])
+
+
+if __name__ == "__main__":
+    run(json.loads(sys.argv[sys.argv.index("--") + 1]))

@@ -1,0 +1,102 @@
+"""The command line of the Python package, in a Python without bpy: it runs this Blender."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def start(*arguments):
+    """Start ``python -m rosy_addon`` in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "rosy_addon", *map(str, arguments)],
+        cwd=ROOT,
+        env=os.environ | {"ROSY_BLENDER": bpy.app.binary_path},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        start_new_session=True,
+    )
+
+
+def run(*arguments):
+    """Run a command, and return its exit status, its output and its errors."""
+    process = start(*arguments)
+    output, errors = process.communicate(timeout=240)
+    return process.returncode, output, errors
+
+
+def group_ends(process):
+    """Return whether all processes of the group of an ended process end soon as well."""
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.fixture
+def saved(with_field, tmp_path):
+    """A .blend file whose names have spaces, dashes and other letters than those of ASCII."""
+    bpy.data.objects["Camera"].name = "-Seite \N{LATIN SMALL LETTER E WITH ACUTE}"
+    folder = tmp_path / "a b \N{CYRILLIC SMALL LETTER ZHE}"
+    folder.mkdir()
+    path = folder / "suzanne.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_strokes_are_those_of_the_button_and_nothing_else_is_printed(saved):
+    bpy.ops.rosy.strokes(kind="SVG", filepath=str(saved.with_name("button.svg")))
+    out = saved.with_name("out.svg")
+    camera = bpy.context.scene.camera.name
+    assert run("strokes", saved, "-o", out) == (0, f"{camera}: {out}\n", "")
+    assert out.read_bytes() == saved.with_name("button.svg").read_bytes()
+
+
+def test_jobs_draw_frames_and_save(saved):
+    out, camera = saved.with_name("-out"), bpy.context.scene.camera.name
+    arguments = ["--out", out, f"--camera={camera}", "--frames", "1-3", "--jobs", "2", "--save"]
+    status, output, errors = run("bake", saved, *arguments)
+    assert (status, errors) == (0, "")
+    *frames, last, file = output.splitlines()
+    assert all(re.match(r"frame [123]\b|2 frames of ", line) for line in frames), output
+    assert str(out) in last and file == str(saved)
+    assert len(list(out.glob("*.png"))) == 3
+    bpy.ops.wm.open_mainfile(filepath=str(saved))
+    assert [bake.frames for bake in bpy.context.scene.rosy.bakes] == ["1 to 3"]
+
+
+def test_bad_input_is_one_line_and_status_2(saved, tmp_path):
+    status, output, errors = run("bake", saved, "--out", tmp_path, "--object=-x")
+    assert (status, output) == (2, "")
+    assert errors == "rosy: there is no object '-x': check its name\n"
+
+
+def test_ctrl_c_and_closed_pipes_end_blender_as_well(saved, tmp_path):
+    arguments = ("bake", saved, "--frames", "1-90", "--size", "800x800", "--out")
+    interrupted = start(*arguments, tmp_path / "interrupted")
+    assert interrupted.stdout.readline().startswith("frame ")
+    os.killpg(interrupted.pid, signal.SIGINT)
+    closed = start(*arguments, tmp_path / "closed")
+    assert closed.stdout.readline().startswith("frame ")
+    closed.stdout.close()
+    _, errors = interrupted.communicate(timeout=60)
+    assert (interrupted.returncode, errors) == (130, "rosy: stopped\n")
+    assert closed.wait(timeout=60) == 141
+    assert closed.stderr.read() == ""
+    assert group_ends(interrupted) and group_ends(closed)

@@ -1,0 +1,87 @@
+"""Finding a Blender, with small programs in its place. tests/blender runs commands in a real one."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import pytest
+
+from rosy_addon.errors import RosyError
+from rosy_addon.extras import blender
+from rosy_addon.extras.command_line import main
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="the programs are shell scripts")
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Return a function that installs a Blender of a version. At first there is none."""
+    monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.delenv("ROSY_BLENDER", raising=False)
+    places = (f"{tmp_path}/opt/blender*/blender", f"{tmp_path}/Applications/Blender*.app")
+    monkeypatch.setattr(blender, "USUAL_PLACES", {"linux": places, sys.platform: places})
+
+    def install(path, version, rest="exit 1"):
+        program = tmp_path / path
+        program.parent.mkdir(parents=True, exist_ok=True)
+        program.write_text(
+            f'#!/bin/sh\n[ "$2" = --version ] && echo warning && echo "{version}" && exit\n{rest}\n'
+        )
+        program.chmod(0o755)
+        return str(program)
+
+    return install
+
+
+def test_the_one_on_the_path_comes_first_and_then_the_newest(install, tmp_path):
+    with pytest.raises(
+        RosyError, match=r"^no version 4\.2 or later is on the PATH or in .*/opt/bl"
+    ):
+        blender.find_blender()
+    install("opt/blender-4.9/blender", "Blender 4.9.0")
+    newest = install("opt/blender-4.10/blender", "Blender 4.10.1 LTS")
+    install("opt/blender-9/blender", "Not Blender 9.0")
+    assert blender.find_blender() == newest
+    bundled = install("Applications/Blender 5.app/Contents/MacOS/Blender", "Blender 5.0.0")
+    assert blender.find_blender() == bundled
+    on_path = install("bin/blender", "Blender 4.2.0")
+    assert blender.find_blender() == on_path
+    install("bin/blender", "Blender 4.1.9")
+    assert blender.find_blender() == bundled
+
+
+def test_old_ones_are_named(install):
+    old = install("bin/blender", "Blender 3.6.12")
+    with pytest.raises(RosyError, match=rf"; {old} is 3\.6\.12: install it"):
+        blender.find_blender()
+
+
+def test_the_user_names_one(install, tmp_path, monkeypatch):
+    install("bin/blender", "Blender 4.3.0")
+    named = install("an other/blender", "Blender 4.2.3")
+    assert blender.find_blender(named) == blender.find_blender(f"{tmp_path}/an other") == named
+    install("bin/blender-4.5", "Blender 4.5.0")
+    assert blender.find_blender("blender-4.5") == f"{tmp_path}/bin/blender-4.5"
+    monkeypatch.setenv("ROSY_BLENDER", named)
+    assert blender.find_blender() == named
+    assert blender.find_blender("blender").endswith("bin/blender")
+    for version, reason in (
+        ("Blender 4.1.1", "is Blender 4.1.1, but RoSy needs 4.2 or later"),
+        ("Krita 5.2.2", "is not Blender, or does not start"),
+    ):
+        install("an other/blender", version)
+        with pytest.raises(RosyError, match=f"^ROSY_BLENDER={named}: {reason}$"):
+            blender.find_blender()
+    with pytest.raises(RosyError, match=r"^--blender /nowhere: there is no such program$"):
+        blender.find_blender("/nowhere")
+
+
+def test_a_blender_that_fails_is_one_line(install, tmp_path, capfd):
+    program = install("bin/blender", "Blender 4.2.0", "echo hello; echo no library >&2; kill -9 $$")
+    assert main(["bake", str(tmp_path / "a.blend"), "--save"]) == 2
+    output, errors = capfd.readouterr()
+    assert output == ""
+    expected = f"rosy: {program}: Blender ended by signal 9 before the command did: no library\n"
+    assert errors == expected

@@ -67,7 +67,7 @@ def write(folder: Path) -> None:
         pieces += [
             f"## {preset.name}",
             f"![{preset.name} on sixteen meshes](images/{path.name})",
-            f"    python -m rosy_addon render mesh.obj -o mesh.png --preset {name} --size {SIDE}x{SIDE}",
+            f"    rosyfields render mesh.obj -o mesh.png --preset {name} --size {SIDE}x{SIDE}",
         ]
     PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
 

@@ -54,7 +54,7 @@ OWN = (
     "Your presets are in the extension's folder among Blender's user files. An update of RoSy "
     "keeps this folder. `blender -b --command rosy presets` lists all presets with their "
     "descriptions and prints the folder. Plain Python, without Blender, keeps its presets in the "
-    "user's data folder; `python -m rosy_addon presets` prints it. The environment variable "
+    "user's data folder; `rosyfields presets` prints it. The environment variable "
     "`ROSY_PRESETS` sets one folder for both.",
     "`--preset` takes a name from the output of `presets`, a name as shown in the panel, or the "
     "path of a file.",

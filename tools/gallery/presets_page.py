@@ -89,7 +89,7 @@ def write(folder: Path) -> None:
         "script. In the panel, use *Make Field*, *Look* and *Bake*. The view transform *Standard* "
         "shows ink and paper as they were drawn.",
         "With a mesh file and without Blender:",
-        "    python -m rosy_addon render bunny.obj -o bunny.png --preset engraving --size 1600x1200",
+        "    rosyfields render bunny.obj -o bunny.png --preset engraving --size 1600x1200",
         "Lengths are in pixels of the finished picture. A picture of twice the size shows twice as "
         "many lines, not broader ones. `python -m tools.gallery.presets_page FOLDER` draws this "
         "page, given a folder with `meshes/spot.obj` and `meshes/stanford-bunny.obj`.",

@@ -19,6 +19,9 @@ MESHIO_CORNERS = {
     "quad": 4, "quad8": 4, "quad9": 4,
 }  # fmt: skip
 
+#: VTK's types of faces: triangle, polygon, quad.
+VTK_FACES = (5, 7, 9)
+
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
@@ -31,7 +34,7 @@ class MeshArrays:
         Vertices of the corners, face by face.
     face_start : (F + 1,) int ndarray
         First corner of each face, and C.
-    uv : (V, 2) ndarray or None
+    uv : (V, 2) or (C, 2) ndarray or None
     vertex_data, face_data : mapping of str to ndarray
         Arrays of V and of F rows.
     """
@@ -58,6 +61,10 @@ def arrays_of(mesh: Any, name: str) -> MeshArrays:
         return _from_meshio(mesh, name)
     if hasattr(mesh, "extract_surface"):
         return _from_pyvista(mesh, name)
+    # A scene of trimesh, and a mesh of Open3D's tensors.
+    for conversion in ("to_mesh", "to_legacy"):
+        if hasattr(mesh, conversion):
+            mesh = getattr(mesh, conversion)()
     faces = getattr(mesh, "faces", getattr(mesh, "triangles", None))
     if hasattr(mesh, "vertices") and faces is not None:
         return _from_triangles(mesh, np.asarray(faces))
@@ -70,17 +77,30 @@ def arrays_of(mesh: Any, name: str) -> MeshArrays:
 def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
     """Return the arrays of a mesh of trimesh or Open3D."""
     vertices = np.asarray(mesh.vertices)
-    uv = getattr(getattr(mesh, "visual", None), "uv", None)
-    if uv is not None and np.shape(uv) != (len(vertices), 2):
-        uv = None
+    faces = faces.reshape(-1, 3)
+    visual = getattr(mesh, "visual", None)
+    uv = np.asarray(getattr(mesh, "triangle_uvs", getattr(visual, "uv", None)))
+    is_uv = uv.shape in ((len(vertices), 2), (faces.size, 2))
+    vertex_data = dict(getattr(mesh, "vertex_attributes", {}))
+    colors = _vertex_colors(mesh)
+    if colors.shape[0] == len(vertices):
+        vertex_data.update(zip(("red", "green", "blue"), colors.T, strict=False))
     return MeshArrays(
         vertices,
         faces.ravel(),
-        np.arange(len(faces) + 1) * faces.shape[1],
-        None if uv is None else np.asarray(uv),
-        dict(getattr(mesh, "vertex_attributes", {})),
+        np.arange(len(faces) + 1) * 3,
+        uv if is_uv and len(uv) else None,
+        vertex_data,
         dict(getattr(mesh, "face_attributes", {})),
     )
+
+
+def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
+    """Return the (V, 3) or (V, 4) colors of vertices, 0 to 1; an empty array if there are none."""
+    visual = getattr(mesh, "visual", None)
+    if getattr(visual, "kind", None) == "vertex":
+        return np.asarray(visual.vertex_colors) / 255.0
+    return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
 
 
 def _from_meshio(mesh: Any, name: str) -> MeshArrays:
@@ -114,39 +134,34 @@ def _from_meshio(mesh: Any, name: str) -> MeshArrays:
 
 def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
     """Return the surface of a data set of PyVista: of a volume, its boundary."""
-    surface = mesh
-    if not hasattr(mesh, "faces") or getattr(mesh, "n_strips", 0):
-        surface = mesh.extract_surface()
-    flat = np.asarray(surface.faces)
-    sizes = _run_sizes(flat)
-    if not len(sizes):
+    surface = mesh if hasattr(mesh, "faces") else _extracted_surface(mesh)
+    if surface.n_strips:
+        surface = surface.triangulate()
+    # The unstructured grid has the offsets of faces of different sizes, and says which cells are lines.
+    cells = surface.cast_to_unstructured_grid()
+    is_face = np.isin(cells.celltypes, VTK_FACES)
+    if not is_face.any():
         raise RosyError(f"{name}: has no faces")
-    is_size = np.zeros(len(flat), dtype=bool)
-    is_size[np.cumsum(sizes + 1) - sizes - 1] = True
-    face_count = len(sizes)
+    sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
     return MeshArrays(
         np.asarray(surface.points),
-        flat[~is_size],
-        offsets_from_sizes(sizes),
-        None,
-        {key: np.asarray(surface.point_data[key]) for key in surface.point_data},
-        {
-            key: np.asarray(surface.cell_data[key])
-            for key in surface.cell_data
-            if len(surface.cell_data[key]) == face_count
-        },
+        np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
+        offsets_from_sizes(sizes[is_face]),
+        _pyvista_uv(surface),
+        {key: np.asarray(values) for key, values in surface.point_data.items()},
+        {key: np.asarray(values)[is_face] for key, values in surface.cell_data.items()},
     )
 
 
-def _run_sizes(flat: NDArray[Any]) -> NDArray[np.int64]:
-    """Return the sizes of faces that are stored as a size and as many vertices, one after another."""
-    if not len(flat):
-        return np.empty(0, dtype=np.int64)
-    step = int(flat[0]) + 1
-    if len(flat) % step == 0 and (flat[::step] == step - 1).all():
-        return np.full(len(flat) // step, step - 1)
-    sizes, position = [], 0
-    while position < len(flat):
-        sizes.append(int(flat[position]))
-        position += sizes[-1] + 1
-    return np.array(sizes, dtype=np.int64)
+def _extracted_surface(mesh: Any) -> Any:
+    """Return the faces of a grid, and the boundary of its volumes."""
+    try:
+        return mesh.extract_surface(algorithm="dataset_surface")
+    except TypeError:  # before PyVista 0.47, there was no other algorithm
+        return mesh.extract_surface()
+
+
+def _pyvista_uv(surface: Any) -> NDArray[Any] | None:
+    """Return the (V, 2) active texture coordinates of a mesh of PyVista, or None."""
+    uv = getattr(surface, "active_texture_coordinates", None)
+    return None if uv is None or uv.shape[1] != 2 else np.asarray(uv)

@@ -22,7 +22,7 @@ from .field import (
     read_field,
 )
 from .generators import along_axis, along_uv, curvature, features, form, guided, smoothest
-from .pictures import Picture, list_presets, render, turntable
+from .pictures import Picture, ambient_occlusion, list_presets, render, turntable
 from .surface import Surface
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "Surface",
     "along_axis",
     "along_uv",
+    "ambient_occlusion",
     "curvature",
     "features",
     "form",

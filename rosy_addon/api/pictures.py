@@ -1,4 +1,4 @@
-"""`render`: the picture of a field; and `turntable`: a video of it from all sides."""
+"""Pictures: `render`, tones for it such as `ambient_occlusion`, and the video of a `turntable`."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from ..errors import RosyError
 from ..image_io.png import png_task, read_png, to_srgb_uint8, write_png
 from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
 from ..progress import run_to_completion
+from ..projection.ambient_occlusion import DIRECTION_COUNT
+from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
 from ..projection.camera import check_size
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
@@ -107,6 +109,36 @@ def list_presets() -> dict[str, str]:
     return found
 
 
+def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> NDArray[np.float32]:
+    """Return how much of the sky each corner of a surface sees, as a tone for `render`.
+
+    Parameters
+    ----------
+    surface : Surface
+    directions : int
+        Number of directions of light, spread evenly over the sphere.
+
+    Returns
+    -------
+    (C,) float32 ndarray
+        Visible part of the hemisphere over each corner, face by face, weighted by the cosine to the
+        normal: 1 is fully open, 0 fully occluded.
+
+    Raises
+    ------
+    RosyError
+        If `directions` is less than 1.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> square = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> rf.ambient_occlusion(square, directions=16)
+    array([1., 1., 1., 1.], dtype=float32)
+    """
+    return corner_occlusion([mesh_instance(surface.mesh, None, surface.up)], 0, directions)
+
+
 def render(
     surface: Surface,
     field: Field | None = None,
@@ -137,9 +169,10 @@ def render(
         Orthographic projection instead of perspective.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
-    tone_values : str or (V,) array_like, optional
-        For hatching: tones of the vertices, linear, 0 is dark and 1 is light. A string names an
-        array of `Surface.vertex_data`; "Color" is the luminance of the colors of a ``.ply`` file.
+    tone_values : str or (V,) or (C,) array_like, optional
+        For hatching: tones of the vertices or corners, linear, 0 is dark and 1 is light, such as
+        `ambient_occlusion`. A string names an array of `Surface.vertex_data`; "Color" is the
+        luminance of the colors of a ``.ply`` file or of a mesh of trimesh or Open3D.
     tone_image : path-like, array_like or Picture, optional
         For hatching: an image on the UV map of the surface, whose luminance is the tone.
     tone_picture : path-like, array_like or Picture, optional
@@ -325,14 +358,17 @@ def _surface_tone(
         if isinstance(values, str):
             values = _named_tone(surface, values)
         array = np.asarray(values, dtype=np.float64)
-        if array.shape != (len(surface.vertices),):
+        counts = len(surface.vertices), len(surface.mesh.corner_vertex)
+        if array.ndim != 1 or len(array) not in counts:
             raise RosyError(
-                f"{surface.name}: tone_values must be {len(surface.vertices):,} numbers, one for each "
-                f"vertex, not an array of shape {array.shape}"
+                f"{surface.name}: tone_values must be {counts[0]:,} numbers, one for each vertex, or "
+                f"{counts[1]:,}, one for each corner, not an array of shape {array.shape}"
             )
         if not np.isfinite(array).all():
             raise RosyError(f"{surface.name}: tone_values has values that are not finite")
-        return SurfaceTone(array[surface.mesh.corner_vertex, None].astype(np.float32))
+        if len(array) == counts[0]:
+            array = array[surface.mesh.corner_vertex]
+        return SurfaceTone(array[:, None].astype(np.float32))
     if image is not None:
         return SurfaceTone(uv_map(surface).astype(np.float32), _image_luminance(image))
     return None

@@ -8,6 +8,7 @@
 #   make test-extras  the tests of what needs other libraries: the files of simulations
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
+#   make test-notebooks  the notebooks, with the package as a user installs it
 #   make test-long further cases of some tests, which take minutes
 #   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
 #   make fuzz-readers  the readers of all file formats, guided by coverage
@@ -40,8 +41,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-extras fuzz fuzz- \
-        readers monkey zip dist check-tag gallery site bench clean distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-extras \
+        test-notebooks fuzz fuzz-readers monkey zip dist check-tag gallery site bench clean \
+        distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -77,6 +79,12 @@ smoke-bpy45 smoke-bpy50: smoke-bpy%: .venv-bpy%/ready
 NUMERIC_ROOMS = field projection compositor line_drawing image_io presets
 test-numeric: .venv/ready
 	$(UNIT) $(PYTEST) -m "not slow and not long" $(NUMERIC_ROOMS:%=tests/unit/%)
+
+# The package is installed as `rosyfields` from the tree.
+test-notebooks: .venv-notebooks/ready
+	.venv-notebooks/$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation \
+		--force-reinstall .
+	.venv-notebooks/$(BIN)/python $(PYTEST) tests/notebooks
 
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit

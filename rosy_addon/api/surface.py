@@ -31,7 +31,7 @@ class Surface:
     ----------
     vertices : (V, 3) array_like, path-like or mesh
         Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``
-        or ``.stl``), or a mesh of meshio, PyVista, trimesh or Open3D.
+        or ``.stl``), or a mesh of meshio, PyVista, trimesh (or its scene) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.
     name : str, optional
@@ -41,7 +41,7 @@ class Surface:
         "z".
     uv : (V, 2) or (C, 2) array_like, optional
         Texture coordinates of the vertices, or of the corners, face by face. Files in ``.obj`` format
-        and meshes of trimesh have their own.
+        and meshes of trimesh, PyVista and Open3D can have their own.
     sharp_angle : float, optional
         Angle in radians between the normals of two faces above which their edge is sharp. Field values
         and normals do not mix across sharp edges. By default 60 degrees.

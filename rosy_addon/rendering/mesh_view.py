@@ -96,5 +96,5 @@ def check_light(light: str, name: str) -> None:
     """
     if light == "scene":
         raise RosyError(
-            f"{name}: has no lights, because it is a mesh file: choose the light 'headlight' or 'lamp'"
+            f"{name}: has no lights, because it is not in a scene: choose the light 'headlight' or 'lamp'"
         )

@@ -81,10 +81,10 @@ test-numeric: .venv/ready
 	$(UNIT) $(PYTEST) -m "not slow and not long" $(NUMERIC_ROOMS:%=tests/unit/%)
 
 # The package is installed as `rosyfields` from the tree.
-test-notebooks: .venv-notebooks/ready
-	.venv-notebooks/$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation \
+test-notebooks: .venv-extras/ready
+	.venv-extras/$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation \
 		--force-reinstall .
-	.venv-notebooks/$(BIN)/python $(PYTEST) tests/notebooks
+	.venv-extras/$(BIN)/python $(PYTEST) tests/notebooks
 
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit
@@ -145,7 +145,7 @@ gallery: .venv-gallery/ready
 	.venv-gallery/$(BIN)/python -m tools.gallery
 
 # The reference is that of the package as users install it.
-site: .venv-site/ready
+site: .venv-site/ready test-notebooks
 	.venv-site/$(BIN)/python -m pip install --quiet --force-reinstall --no-deps --no-build-isolation .
 	NO_MKDOCS_2_WARNING=1 .venv-site/$(BIN)/python -m mkdocs build --strict
 	.venv-site/$(BIN)/python tools/site/check.py dist/site

@@ -1,4 +1,4 @@
-"""Hook of MkDocs: run the notebooks of docs/notebooks, and show them as pages.
+"""Hook of MkDocs: show the notebooks of docs/notebooks as pages, as they were run by the tests.
 
 A notebook is stored without outputs. A cell that shows a picture describes it in its metadata, for
 readers who do not see it: `"alt": "Bunny with a cross field"`.
@@ -12,12 +12,13 @@ from pathlib import Path
 import nbformat
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
-from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
 from nbconvert import MarkdownExporter
 from repository_pages import ROOT
 
 FOLDER = ROOT / "docs" / "notebooks"
+
+#: Where `make test-notebooks` keeps the notebooks with their outputs.
+EXECUTED_FOLDER = ROOT / "dist" / "notebooks"
 
 #: Pictures in the Markdown of nbconvert, by the number of their cell.
 _OUTPUT = re.compile(r"!\[\w+\]\((?P<file>output_(?P<cell>\d+)_\d+\.\w+)\)")
@@ -43,7 +44,7 @@ def on_files(files: Files, *, config) -> Files:
     for path in _notebooks():
         source = f"docs/notebooks/{path.name}"
         files.remove(files.src_uris[source])
-        markdown, pictures = _run(path)
+        markdown, pictures = _markdown(path)
         page = NotebookPage(
             source,
             None,
@@ -73,20 +74,12 @@ def _notebooks() -> list[Path]:
     return sorted(FOLDER.glob("*.ipynb"))
 
 
-def _run(path: Path) -> tuple[str, dict[str, bytes]]:
-    """Run a notebook, and return it as Markdown with the contents of its pictures by their names."""
-    notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
-        notebook,
-        timeout=120,
-        resources={"metadata": {"path": str(FOLDER)}},
-        # It warns that other users of the machine could read the messages of the kernel.
-        extra_arguments=["--IPKernelApp.log_level=ERROR"],
-    )
-    try:
-        client.execute()
-    except CellExecutionError as error:
-        raise PluginError(f"{path.relative_to(ROOT)}: {error}") from error
+def _markdown(path: Path) -> tuple[str, dict[str, bytes]]:
+    """Return a notebook as Markdown, with the contents of its pictures by their names."""
+    executed = EXECUTED_FOLDER / path.name
+    if not executed.exists():
+        raise PluginError(f"{executed.relative_to(ROOT)} is missing: run `make test-notebooks`")
+    notebook = nbformat.read(executed, as_version=4)
     markdown, resources = MarkdownExporter().from_notebook_node(notebook)
 
     def described(match: re.Match[str]) -> str:

@@ -225,6 +225,18 @@ def title(key: str) -> str:
     return label
 
 
+def stored_key(text: str) -> str:
+    """Return the key under which a setting or an option is stored, given its American spelling too.
+
+    Examples
+    --------
+    >>> stored_key("ink_color"), stored_key("gray"), stored_key("gain")
+    ('ink_colour', 'grey', 'gain')
+    """
+    stored = {american.lower(): british.lower() for british, american in AMERICAN_SPELLING.items()}
+    return "_".join(stored.get(word, word) for word in text.split("_"))
+
+
 def check_settings(settings: Any) -> None:
     """Check all values of an object of a settings class.
 

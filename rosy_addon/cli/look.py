@@ -10,7 +10,7 @@ from ..api.pictures import VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..presets.store import find_preset_file, preset_keys, read_preset
-from ..settings import settings_of
+from ..settings import settings_of, stored_key
 from .presets import user_presets_folder
 from .view import requested_size
 
@@ -98,7 +98,7 @@ def picture_arguments(options: argparse.Namespace) -> dict[str, Any]:
 def _parse_setting(text: str) -> tuple[str, Any]:
     """Return the name and the value of NAME=VALUE, converted to the type of the setting."""
     name, separator, value = text.partition("=")
-    settings = settings_of(Look)
+    name, settings = stored_key(name), settings_of(Look)
     if not separator:
         raise RosyError(f"--set {text}: expected NAME=VALUE")
     if name not in settings:

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import RosyError
 from ..settings import (
+    Choice,
     Stage,
     check_settings,
     choice,
@@ -15,6 +16,7 @@ from ..settings import (
     number,
     settings_of,
     stage_key,
+    stored_key,
     switch,
 )
 
@@ -481,15 +483,21 @@ class Look:
     def with_settings(self, settings: dict[str, Any]) -> Look:
         """Return the look with some settings changed.
 
+        Their names and options may be in American spelling, as in the interface; see `stored_key`.
+
         Raises
         ------
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        for name in settings:
-            if name not in settings_of(Look):
-                raise RosyError(f"a look has no setting '{name}'")
-        return replace(self, **settings)
+        known = settings_of(Look)
+        values = {stored_key(name): value for name, value in settings.items()}
+        for name, value in values.items():
+            if name not in known:
+                raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
+            if isinstance(known[name], Choice) and isinstance(value, str):
+                values[name] = stored_key(value)
+        return replace(self, **values)
 
 
 def lic_key(look: Look) -> tuple[Any, ...]:

@@ -243,6 +243,9 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """
     try:
         target = Path(os.path.realpath(path))
+        # From Python 3.14 on, the methods of Path hide errors, such as that of a name that is too long.
+        with suppress(FileNotFoundError, NotADirectoryError):
+            os.lstat(target)
         folder = (target if Path(path).is_symlink() else Path(path)).parent
         if target.is_symlink():  # still, so it leads to itself
             raise RosyError(f"{path}: cannot be written: it is a link to itself")

@@ -2,7 +2,7 @@
 #
 #   make demo      Suzanne with a 4-RoSy field, baked and rendered: demo.png
 #   make format    format the code
-#   make check     check format and lint, and run the quick unit tests
+#   make check     check format, lint and types, and run the quick unit tests
 #   make test      all unit tests, the quick ones with old numpy as well, and the tests with
 #                  Blender 4.2's Python module
 #   make test-extras  the tests of what needs other libraries: the files of simulations
@@ -89,9 +89,10 @@ test-notebooks: .venv-extras/ready
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit
 
-lint: .venv/ready
+lint: .venv/ready .venv-types/ready
 	.venv/$(BIN)/ruff format --check .
 	.venv/$(BIN)/ruff check .
+	.venv-types/$(BIN)/mypy
 	$(UNIT) -m check_jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 	$(UNIT) -m check_jsonschema --builtin-schema vendor.github-issue-config \
 		.github/ISSUE_TEMPLATE/config.yml
@@ -169,7 +170,7 @@ define make-environment
 endef
 
 clean:
-	rm -rf demo.png dist build .ruff_cache .pytest_cache .hypothesis
+	rm -rf demo.png dist build .ruff_cache .mypy_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv*' -prune -exec rm -rf {} +
 
 distclean: clean

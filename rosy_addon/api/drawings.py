@@ -149,5 +149,6 @@ def _style_of(values: dict[str, Any]) -> StrokeStyle:
     unknown = sorted(set(values) - set(known))
     if unknown:
         raise RosyError(f"unknown setting '{unknown[0]}' of strokes: choose {', '.join(known)}")
-    unit = {"unit": "world"} if "distance" in values else {}
-    return replace(StrokeStyle(), **values, **unit)
+    if "distance" in values:
+        values = {**values, "unit": "world"}
+    return replace(StrokeStyle(), **values)

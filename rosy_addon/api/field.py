@@ -34,7 +34,7 @@ class Singularities(NamedTuple):
     """
 
     vertex: NDArray[np.int32]
-    index: NDArray[np.int32]
+    index: NDArray[np.int32]  # type: ignore[assignment]  # hides tuple.index
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,10 @@ class Field:
         """(F,): angle of the stored member from x of `Surface.face_frames`, in radians, -pi to pi."""
         x, y = self.surface.face_frames
         vectors = self.vectors
-        return np.arctan2((vectors * y).sum(axis=1), (vectors * x).sum(axis=1))
+        angles: NDArray[np.float64] = np.arctan2(
+            (vectors * y).sum(axis=1), (vectors * x).sum(axis=1)
+        )
+        return angles
 
     @cached_property
     def singularities(self) -> Singularities:
@@ -234,8 +237,9 @@ def from_vectors(
         If their number fits neither faces nor vertices, a vector is not finite, or vectors do not lie
         on the surface.
     """
+    array = np.asarray(vectors, dtype=np.float64)
     source = f"{surface.name}: vectors"
-    return Field(surface, validated_field(surface.mesh, vectors, degree, source, nonfinite))
+    return Field(surface, validated_field(surface.mesh, array, degree, source, nonfinite))
 
 
 def from_angles(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import RosyError
 from ..field.formats.polygons import offsets_from_sizes
@@ -30,6 +30,7 @@ class MeshArrays:
     Attributes
     ----------
     vertices : (V, 3) or (V, 2) array_like
+        As it was given, not checked.
     corner_vertex : (C,) int ndarray
         Vertices of the corners, face by face.
     face_start : (F + 1,) int ndarray
@@ -39,7 +40,7 @@ class MeshArrays:
         Arrays of V and of F rows.
     """
 
-    vertices: ArrayLike = ()
+    vertices: Any = ()
     corner_vertex: NDArray[Any] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     face_start: NDArray[Any] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
     uv: NDArray[Any] | None = None

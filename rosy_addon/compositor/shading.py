@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -49,8 +50,19 @@ class Light:
 KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
 
-def lights_of(look: Look, lights: Sequence[Light]) -> Sequence[Light]:
-    """Return the lights that a look uses, given those of the scene. Empty for the headlight."""
+class HasLight(Protocol):
+    """A look or a style of strokes."""
+
+    @property
+    def light(self) -> str:
+        """The light: "headlight", "lamp" or "scene"."""
+
+
+def lights_of(look: HasLight, lights: Sequence[Light]) -> Sequence[Light]:
+    """Return the lights that a look or a style of strokes uses, given those of the scene.
+
+    There are none for the headlight.
+    """
     return {"headlight": (), "lamp": (KEY_LIGHT,), "scene": lights}[look.light]
 
 

@@ -112,8 +112,10 @@ def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
     RosyError
         If the folder exists and cannot be read.
     """
+    if user_folder is None:
+        return {}
     try:
-        names = [] if user_folder is None else sorted(os.listdir(user_folder))
+        names = sorted(os.listdir(user_folder))
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
@@ -205,7 +207,7 @@ def write_preset(path: str | os.PathLike[str], preset: Preset) -> None:
         If its name or description is not allowed, or the file cannot be written.
     """
     _validated(preset)
-    data = preset._replace(look=changed_settings(preset.look))._asdict()
+    data = preset._asdict() | {"look": changed_settings(preset.look)}
     text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     write_bytes(path, text.encode("utf-8"))
 

@@ -9,6 +9,8 @@
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-notebooks  the notebooks, with the package as a user installs it
+#   make test-wheel    the Python package as it is installed: make test-wheel PYTHON=python3.13
+#   make test-python   the quick unit tests with another Python: make test-python PYTHON=python3.13
 #   make test-long further cases of some tests, which take minutes
 #   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
 #   make fuzz-readers  the readers of all file formats, guided by coverage
@@ -41,9 +43,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-extras \
-        test-notebooks fuzz fuzz-readers monkey zip dist check-tag gallery site bench clean \
-        distclean
+        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-python test-wheel \
+        test-extras test-notebooks fuzz fuzz-readers monkey zip dist check-tag gallery site \
+        bench clean distclean
 .DELETE_ON_ERROR:
 
 demo: .venv-bpy42/ready
@@ -85,6 +87,25 @@ test-notebooks: .venv-extras/ready
 	.venv-extras/$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation \
 		--force-reinstall .
 	.venv-extras/$(BIN)/python $(PYTEST) tests/notebooks
+# Environments of one version of Python each: .venv-wheel-3.13, .venv-unit-3.13.
+PYTHON_VERSION = $(shell $(PYTHON) -c "import sys; print('%d.%d' % sys.version_info[:2])")
+WHEEL_VENV     = .venv-wheel-$(PYTHON_VERSION)
+UNIT_VENV      = .venv-unit-$(PYTHON_VERSION)
+
+.SECONDEXPANSION:
+# The wheel is built twice, from the tree and from the sdist, and installed with numpy alone. Its tests
+# run outside of the tree. The types are those that the programs of users see.
+test-wheel: .venv-dist/ready .venv-types/ready $$(WHEEL_VENV)/ready
+	rm -rf build/wheel
+	.venv-dist/$(BIN)/python -m build --no-isolation --wheel --outdir build/wheel/tree . >/dev/null
+	.venv-dist/$(BIN)/python -m build --no-isolation --outdir build/wheel/sdist . >/dev/null
+	$(WHEEL_VENV)/$(BIN)/python -m pip uninstall --quiet --yes rosyfields
+	$(WHEEL_VENV)/$(BIN)/python -m pip install --quiet build/wheel/tree/*.whl
+	cd .. && $(abspath $(WHEEL_VENV))/$(BIN)/python -P -m pytest $(abspath tests/wheel)
+	.venv-types/$(BIN)/mypy --strict --config-file= --explicit-package-bases \
+		--python-executable $(WHEEL_VENV)/$(BIN)/python tests/wheel/every_name.py
+test-python: $$(UNIT_VENV)/ready
+	$(UNIT_VENV)/$(BIN)/python $(PYTEST) -m "not slow and not long" tests/unit
 
 check: lint
 	$(UNIT) $(PYTEST) -m "not slow and not long" tests/unit
@@ -157,6 +178,10 @@ bench: .venv-bench/ready
 # An environment is ready once all that its list of requirements names is installed.
 .venv/ready: tools/requirements/unit.txt
 .venv-%/ready: tools/requirements/%.txt
+	$(make-environment)
+.venv-unit-%/ready: tools/requirements/unit.txt
+	$(make-environment)
+.venv-wheel-%/ready: tools/requirements/wheel.txt
 	$(make-environment)
 .venv/ready:
 	$(make-environment)

@@ -1,0 +1,185 @@
+"""The wheel `rosyfields`, installed with numpy and nothing else."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import importlib
+import pkgutil
+import re
+import shutil
+import subprocess
+import sys
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+import rosyfields
+from conftest import ENVIRONMENT, TREE, WHEELS, run
+
+PACKAGE = Path(rosyfields.__file__).parent
+
+#: The wheel is for the package index, and people download it to try it.
+LARGEST_WHEEL = 1_000_000
+
+
+def submodules(package) -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(package.__path__)]
+
+
+def modules_of(statements: str) -> set[str]:
+    """Modules that are loaded after some statements in a new process."""
+    code = f"{statements}\nimport sys; print(*sys.modules)"
+    return set(subprocess.check_output([sys.executable, "-c", code], text=True).split())
+
+
+def test_the_wheel_is_what_is_tested():
+    assert TREE not in PACKAGE.parents or ".venv-" in str(PACKAGE)
+    assert "site-packages" in PACKAGE.parts
+    assert not [folder for folder in sys.path if Path(folder).resolve() == TREE]
+
+
+def test_two_builds_have_the_same_bytes():
+    (first,), (second,) = (list((WHEELS / source).glob("*.whl")) for source in ("tree", "sdist"))
+    assert first.name == second.name
+    assert first.read_bytes() == second.read_bytes()
+    assert first.stat().st_size < LARGEST_WHEEL
+
+
+def test_numpy_is_the_only_requirement():
+    requirements = distribution("rosyfields").requires
+    assert [line for line in requirements if "extra ==" not in line] == ["numpy>=1.24"]
+
+
+@pytest.mark.parametrize("name", submodules(importlib.import_module("rosyfields.api")))
+def test_examples(name):
+    module = importlib.import_module(f"rosyfields.api.{name}")
+    assert doctest.testmod(module).failed == 0
+
+
+def test_examples_are_found():
+    finder = doctest.DocTestFinder()
+    for name in ("Surface", "render", "strokes", "smoothest", "guided", "list_presets"):
+        tests = finder.find(getattr(rosyfields, name), name)
+        assert any(example for test in tests for example in test.examples), name
+
+
+def test_import_loads_nothing_before_a_name_is_used():
+    loaded = modules_of("import rosyfields")
+    assert "numpy" not in loaded
+    assert {name for name in loaded if name.startswith("rosyfields")} == {"rosyfields"}
+    loaded = modules_of("import rosyfields; dir(rosyfields); rosyfields.__all__")
+    assert "rosyfields.api" not in loaded
+    assert {"rosyfields.api", "numpy"} <= modules_of("import rosyfields; rosyfields.render")
+
+
+def test_other_libraries_are_not_loaded():
+    loaded = modules_of("from rosyfields import *")
+    ours = {"numpy", "rosyfields"} | sys.stdlib_module_names
+    # numpy's own helpers, and those of the environment.
+    foreign = {name.split(".")[0] for name in loaded} - ours
+    assert not {name for name in foreign if not name.startswith(("_", "cython_runtime"))}
+
+
+def test_every_public_name():
+    from rosyfields import api
+
+    assert rosyfields.__all__ == sorted(set(rosyfields.__all__)) == api.__all__
+    for name in rosyfields.__all__:
+        assert getattr(rosyfields, name) is getattr(api, name)
+    assert set(rosyfields.__all__) <= set(dir(rosyfields))
+    with pytest.raises(AttributeError, match="'rosyfields' has no attribute 'rendr'"):
+        rosyfields.rendr  # noqa: B018
+    # A submodule of the same name would replace the function once it is imported.
+    assert not {*rosyfields.__all__} & {*submodules(rosyfields)}
+    assert not {*rosyfields.__all__} & {*submodules(api)}
+
+
+def test_star_import():
+    code = "from rosyfields import *\nimport rosyfields\nprint(*(rosyfields.__all__ - globals().keys()))"
+    code = code.replace("rosyfields.__all__ -", "set(rosyfields.__all__) -")
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == ""
+
+
+def test_files_of_the_package():
+    assert (PACKAGE / "py.typed").is_file()
+    presets = {path.name for path in (PACKAGE / "presets" / "shipped").iterdir()}
+    in_tree = {path.name for path in TREE.glob("rosy_addon/presets/shipped/*.json")}
+    assert presets == in_tree and "engraving.json" in presets
+    shaders = {path.name for path in (TREE / "rosy_addon" / "gpu" / "glsl").iterdir()}
+    assert {path.name for path in (PACKAGE / "gpu" / "glsl").iterdir()} == shaders
+    known = rosyfields.list_presets()
+    assert {name.removesuffix(".json") for name in presets} <= known.keys()
+
+
+def test_nothing_imports_the_name_of_the_tree():
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module]
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                # A module to run in another process. Docstrings are sentences.
+                names = [node.value] if re.fullmatch(r"[\w.]+", node.value) else []
+            roots = {name.split(".")[0] for name in names}
+            assert not roots & {"rosy_addon", "operators"}, f"{path}, line {node.lineno}"
+
+
+def test_command():
+    command = shutil.which("rosyfields", path=ENVIRONMENT["PATH"])
+    assert Path(command).parent == Path(sys.executable).parent
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "stream", "text"),
+    [
+        (["--help"], 0, "stdout", "render"),
+        (["render", "--help"], 0, "stdout", "--preset"),
+        ([], 2, "stderr", "usage"),
+        (["render", "no.obj", "-o", "no.png"], 2, "stderr", "no.obj"),
+        (["draw"], 2, "stderr", "draw"),
+    ],
+)
+def test_statuses(arguments, status, stream, text, tmp_path):
+    by_module = run(sys.executable, "-m", "rosyfields", *arguments, folder=tmp_path)
+    assert by_module.returncode == status
+    assert text in getattr(by_module, stream)
+    assert "Traceback" not in by_module.stderr
+
+
+def test_command_draws_the_same_bytes_as_the_tree(sphere, tmp_path):
+    options = ["--size", "200x160", "--preset", "engraving", "--generate", "smoothest"]
+    assert_same_picture(sphere, tmp_path, *options)
+
+
+def test_command_draws_spot_as_the_tree(tmp_path):
+    spot = TREE.parent / "shared" / "data" / "meshes" / "spot.obj"
+    if not spot.is_file():
+        pytest.skip("no ../shared/data/meshes/spot.obj")
+    assert_same_picture(spot, tmp_path, "--size", "256x256")
+
+
+def assert_same_picture(mesh: Path, folder: Path, *options: str) -> None:
+    """Draw a mesh with the installed command and with the tree, and compare the files."""
+    arguments = ["render", mesh, *options, "-o"]
+    installed = run("rosyfields", *arguments, "wheel.png", folder=folder)
+    assert installed.returncode == 0, installed.stderr
+    in_tree = ENVIRONMENT | {"PYTHONPATH": str(TREE)}
+    module = [sys.executable, "-m", "rosy_addon"]
+    assert run(*module, *arguments, "tree.png", folder=folder, env=in_tree).returncode == 0
+    picture = (folder / "wheel.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and picture == (folder / "tree.png").read_bytes()
+
+
+def test_program_that_uses_every_name(tmp_path):
+    path = Path(__file__).with_name("every_name.py")
+    used = {
+        node.attr
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "rf"
+    }
+    assert used == set(rosyfields.__all__)
+    importlib.import_module("every_name").main(tmp_path)
+    assert {"cube.png", "cube.svg", "cube.gif", "cube.rosy"} <= {p.name for p in tmp_path.iterdir()}

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import RosyError, RosyWarning
 from ..field.analysis import angle_errors, dirichlet_energy, error_statistics
+from ..field.array_field import SurfaceArrays, array_field
 from ..field.convert import Conversion, convert
 from ..field.directional_field import field_directions, tensor_field
 from ..field.field_io import load_field, write_field
@@ -65,7 +66,7 @@ class Field:
     """An N-RoSy field on the faces of a surface.
 
     Make one with a generator, such as `smoothest`, or with `from_vectors`, `from_angles`,
-    `from_directions`, `from_tensors` or `read_field`.
+    `from_directions`, `from_tensors`, `from_array` or `read_field`.
 
     Parameters
     ----------
@@ -325,6 +326,57 @@ def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "erro
         )
     apply_nonfinite_policy(array, f"{surface.name}: tensors", "face", nonfinite)
     return Field(surface, tensor_field(surface.mesh, array))
+
+
+def from_array(
+    surface: Surface,
+    name: str | None = None,
+    degree: int | None = None,
+    *,
+    nonfinite: str = "error",
+) -> Field:
+    """Make a field from an array of `Surface.vertex_data` or `Surface.face_data`.
+
+    The count of numbers in each row says what they are:
+
+    | numbers | meaning |
+    | ------- | ------- |
+    | 2 | on a mesh with constant z: a vector, z is 0 |
+    | 3 | a vector: one member of the field |
+    | 6 | a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ |
+    | 9 | a symmetric tensor, 3 x 3 |
+    | 12, 15, ... 36 | all N directions, 3 numbers each |
+
+    Vectors that are not tangent to the surface, such as velocities at the boundary of a volume, are
+    replaced by their tangential components. Of tensors, the field consists of the two principal
+    directions in each face. Values of vertices are averaged onto the faces.
+
+    Parameters
+    ----------
+    surface : Surface
+        From a file of a simulation, from the mesh of another library, or from a ``.ply`` file.
+    name : str, optional
+        Name of the array; "point:NAME" or "cell:NAME" if both vertices and faces have one. It can be
+        left out if a single array of floating-point numbers can be a field. Normals do not count.
+    degree : int, optional
+        N, from 1 to 12; by default 1 for an array of vectors. Tensors have degree 4.
+    nonfinite : {"error", "zero"}
+        Raise an error if a number is not finite, or treat the vector or tensor as undefined.
+
+    Raises
+    ------
+    RosyError
+        If there is no such array, it holds scalars or tensors that are not symmetric, has another
+        degree, or has numbers that are not finite.
+
+    Examples
+    --------
+    >>> surface = rf.Surface("flow.vtu")  # doctest: +SKIP
+    >>> velocity = rf.from_array(surface, "velocity")  # doctest: +SKIP
+    >>> stress = rf.from_array(rf.Surface(pyvista.read("beam.vtu")), "stress")  # doctest: +SKIP
+    """
+    arrays = SurfaceArrays(surface.name, surface.mesh, surface.vertex_data, surface.face_data)
+    return Field(surface, array_field(arrays, name, degree, nonfinite))
 
 
 def read_field(

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RosyError, counted
+from ..errors import RosyError, RosyWarning, counted
 from ..field.formats.obj import read_uv
 from ..field.formats.ply import read_vertex_values
 from ..field.formats.polygons import offsets_from_sizes
-from ..field.mesh_io import SHARP_ANGLE, read_mesh
+from ..field.mesh_io import READERS, SHARP_ANGLE, read_mesh
 from ..field.representation import face_frames
 from ..field.singularities import euler_characteristic
 from ..field.surface import Surface as PolygonMesh
@@ -30,8 +31,9 @@ class Surface:
     Parameters
     ----------
     vertices : (V, 3) array_like, path-like or mesh
-        Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``
-        or ``.stl``), or a mesh of meshio, PyVista, trimesh (or its scene) or Open3D.
+        Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``,
+        ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh of meshio, PyVista, trimesh
+        (or its scene) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.
     name : str, optional
@@ -47,6 +49,8 @@ class Surface:
         and normals do not mix across sharp edges. By default 60 degrees.
     sharp_edges : (E, 2) array_like of int, optional
         Pairs of vertices, further sharp edges.
+    step : int, optional
+        Number of the step in the file of a simulation with several, from 1. By default the last one.
 
     Attributes
     ----------
@@ -55,11 +59,16 @@ class Surface:
     name : str
     up : {"y", "z"}
 
+    Warns
+    -----
+    RosyWarning
+        If a file has several steps, and `step` is not given.
+
     Raises
     ------
     RosyError
         If there is no face, an index is out of range, a coordinate is not finite, or a file cannot be
-        read.
+        read. Files of simulations need ``pip install rosyfields[io]``.
 
     Examples
     --------
@@ -68,6 +77,7 @@ class Surface:
     >>> surface
     <Surface 'surface': 1 face, 4 vertices>
     >>> bunny = rf.Surface("bunny.obj")  # doctest: +SKIP
+    >>> flow = rf.Surface("flow.vtu")  # doctest: +SKIP
     >>> grid = rf.Surface(pyvista.read("flow.vtu"))  # doctest: +SKIP
     """
 
@@ -81,15 +91,20 @@ class Surface:
         uv: ArrayLike | None = None,
         sharp_angle: float | None = None,
         sharp_edges: ArrayLike | None = None,
+        step: int | None = None,
     ) -> None:
-        self._path: Path | None = None
+        is_file = faces is None and isinstance(vertices, (str, os.PathLike))
+        self._path = Path(vertices) if is_file else None
+        simulation = _read_simulation(self._path, step)
         given = MeshArrays()
         default_up = "z"
-        if faces is None and isinstance(vertices, (str, os.PathLike)):
-            self._path = Path(vertices)
+        if self._path is not None and simulation is None:
             self.mesh: PolygonMesh = read_mesh(self._path, sharp_angle=sharp_angle)
             default_up = UP_AXIS_BY_SUFFIX[self._path.suffix.lower()]
         else:
+            if simulation is not None:
+                vertices = simulation.arrays
+                name = simulation.name if name is None else name
             name = "surface" if name is None else name
             given = (
                 arrays_of(vertices, name) if faces is None else MeshArrays(vertices, *_flat(faces))
@@ -163,14 +178,17 @@ class Surface:
 
     @cached_property
     def vertex_data(self) -> Mapping[str, NDArray[Any]]:
-        """Arrays of V rows by their names, from a ``.ply`` file or from the mesh of a library."""
+        """Arrays of V rows by their names, from a file or from the mesh of a library.
+
+        Those of ``.ply`` files and of files of simulations are read.
+        """
         if self._path is not None and self._path.suffix.lower() == ".ply":
             return read_vertex_values(self._path)
         return self._vertex_data
 
     @property
     def face_data(self) -> Mapping[str, NDArray[Any]]:
-        """Arrays of F rows by their names, from the mesh of a library."""
+        """Arrays of F rows by their names, from the file of a simulation or the mesh of a library."""
         return self._face_data
 
     def _corner_values(self, values: ArrayLike, what: str, columns: int) -> NDArray[np.float64]:
@@ -185,6 +203,42 @@ class Surface:
         if not np.isfinite(array).all():
             raise RosyError(f"{self.name}: {what} has values that are not finite")
         return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
+
+
+class _Simulation(NamedTuple):
+    """The mesh in the file of a simulation, and its name."""
+
+    arrays: MeshArrays
+    name: str
+
+
+def _read_simulation(path: Path | None, step: int | None) -> _Simulation | None:
+    """Read the file of a simulation, and issue a `RosyWarning` if it is one step of several.
+
+    Returns
+    -------
+    _Simulation or None
+        None if there is no path, if it is that of a plain mesh file, and in the extension for Blender.
+    """
+    if path is None or path.suffix.lower() in READERS:
+        if step is not None:
+            where = "" if path is None else f"{path}: "
+            raise RosyError(f"{where}step applies only to files of simulations, such as .vtu")
+        return None
+    try:
+        from ..external.simulation_files import SUFFIXES, read_simulation
+    except ImportError:  # the extension for Blender
+        return None
+    if path.suffix.lower() not in SUFFIXES:
+        *suffixes, last = (*READERS, *SUFFIXES)
+        raise RosyError(
+            f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
+        )
+    mesh = read_simulation(path, step)
+    if mesh.note:
+        warnings.warn(mesh.note, RosyWarning, stacklevel=3)
+    data = {"vertex_data": mesh.point_arrays, "face_data": mesh.cell_arrays}
+    return _Simulation(MeshArrays(*mesh.polygons, **data), mesh.name)
 
 
 def _flat(

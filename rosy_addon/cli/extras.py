@@ -6,28 +6,9 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from ..api import Field, Surface
 from ..turntable_video import Encoder
-
-
-class LoadedSimulation(NamedTuple):
-    """The contents of the file of a simulation.
-
-    Attributes
-    ----------
-    surface : Surface
-    note : str
-        How the file was read; may be empty.
-    field : function
-        Makes a field, given the name of an array or None, the degree or None, and what happens to
-        vectors that are not finite: "error" or "zero".
-    """
-
-    surface: Surface
-    note: str
-    field: Callable[[str | None, int | None, str], Field]
 
 
 @dataclass(frozen=True)
@@ -43,9 +24,6 @@ class Extras:
         cluster, and yields the lines that it prints.
     simulation_suffixes : tuple of str
         Of the files of simulations that can be read.
-    load_simulation : function, optional
-        Reads one of them, given the path, the number of the step or None for the last, and the upward
-        axis or None.
     add_commands : tuple of function
         Each adds a command to the subparsers.
     find_blender_encoder : function, optional
@@ -61,7 +39,6 @@ class Extras:
     program: tuple[str, ...] = ()
     run_on_cluster: Callable[[Sequence[str], Sequence[int], str], Iterator[str]] | None = None
     simulation_suffixes: tuple[str, ...] = ()
-    load_simulation: Callable[[Path, int | None, str | None], LoadedSimulation] | None = None
     add_commands: tuple[Callable[[Any], None], ...] = ()
     find_blender_encoder: Callable[[str | None], Encoder | None] | None = None
     run_in_blender: Callable[[argparse.Namespace, str, Path | None], None] | None = None

@@ -46,11 +46,12 @@ def add_mesh_options(
     parser.add_argument(
         "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
     )
+    of_array = ", 1 for an array of vectors" if extras.simulation_suffixes else ""
     parser.add_argument(
         "--degree",
         type=int,
         metavar="N",
-        help="degree of the field, 1 to 12; by default that of the field file, or 4",
+        help=f"degree of the field, 1 to 12; by default that of the field file{of_array}, or 4",
     )
     parser.add_argument(
         "--generate",
@@ -112,7 +113,7 @@ def add_mesh_options(
 def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> None:
     """Add the options for files of simulations, if these can be read."""
     parser.set_defaults(array=None, step=None)
-    if extras.load_simulation is None:
+    if not extras.simulation_suffixes:
         return
     suffixes = ", ".join(extras.simulation_suffixes)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
@@ -131,44 +132,34 @@ def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> 
 
 
 def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
-    """Read the mesh; read the field, or generate one."""
+    """Read the mesh; read the field, or generate one.
+
+    In the file of a simulation, the field is one of its arrays, unless the options name another.
+    """
     if options.degree is not None:
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    if options.mesh.suffix.lower() in options.extras.simulation_suffixes:
-        return _load_simulation(options)
+    is_simulation = options.mesh.suffix.lower() in options.extras.simulation_suffixes
+    sources = (options.field, options.generate, options.strokes, options.guides)
+    has_source = options.uv or any(source is not None for source in sources)
     for name in ("array", "step"):
-        if getattr(options, name) is not None:
+        if getattr(options, name) is not None and not is_simulation:
             raise RosyError(
                 f"{options.mesh}: --{name} applies only to files of simulations, such as .vtu"
             )
-    surface = api.Surface(options.mesh, up=getattr(options, "up", None))
-    with printed_warnings():
-        if options.field is not None:
-            return surface, read_field(options, options.field, surface, options.degree)
-        return surface, _generate_field(options, surface)
-
-
-def _load_simulation(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
-    """Read the file of a simulation. The field is one of its arrays, unless the options name another."""
-    sources = (options.field, options.generate, options.strokes, options.guides)
-    has_source = options.uv or any(source is not None for source in sources)
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    loaded = options.extras.load_simulation(
-        options.mesh, options.step, getattr(options, "up", None)
-    )
-    print_note(loaded.note)
     with printed_warnings():
+        surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
         if options.field is not None:
-            field = read_field(options, options.field, loaded.surface, options.degree)
-        elif has_source:
-            field = _generate_field(options, loaded.surface)
-        else:
+            field = read_field(options, options.field, surface, options.degree)
+        elif is_simulation and not has_source:
             nonfinite = "zero" if options.undefined else "error"
-            field = loaded.field(options.array, options.degree, nonfinite)
-    return loaded.surface, field
+            field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
+        else:
+            field = _generate_field(options, surface)
+        return surface, field
 
 
 def read_field(

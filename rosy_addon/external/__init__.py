@@ -3,5 +3,5 @@
 Each module says so if something is missing::
 
     ffmpeg            ffmpeg: videos in .mp4 files
-    simulation_files  pyvista and meshio: meshes and fields in the files of simulations
+    simulation_files  pyvista and meshio: meshes with arrays in the files of simulations
 """

@@ -1,7 +1,7 @@
-"""Meshes and fields in the files of simulations, read with pyvista and meshio.
+"""Meshes with arrays in the files of simulations, read with pyvista and meshio.
 
 Every file becomes a `SimulationMesh`: the polygons of a surface, with arrays at its points and cells.
-`field_task` makes a field from one of the arrays.
+`field.array_field` makes a field from one of the arrays.
 """
 
 from __future__ import annotations
@@ -17,30 +17,18 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ..errors import RosyError, counted
-from ..field.field_io import DEFAULT_DEGREE, field_from_raw_task
 from ..field.formats.polygons import Polygons, offsets_from_sizes
-from ..field.formats.raw_field import RawField
 from ..field.frames import dot
 from ..field.mesh_io import SHARP_ANGLE
-from ..field.representation import face_frames, from_representation, to_representation
-from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface, face_area_vectors, mean_per_face, surface_task
-from ..field.validate import (
-    FACE_TOLERANCE_DEG,
-    MAX_OUTLIER_FRACTION,
-    VERTEX_TOLERANCE_DEG,
-    apply_nonfinite_policy,
-    as_float64,
-    tangent_normals_task,
-)
 from ..file_io import check_readable, open_file, read_bytes
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import run_to_completion
 
 #: Files that VTK reads, and among them those that may hold several steps of time.
 VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")
@@ -86,17 +74,6 @@ _INTERNAL_ARRAYS = (
 
 #: The first bytes of an HDF5 file.
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
-#: Order of the six numbers of a symmetric tensor in VTK, XX YY ZZ XY YZ XZ, as entries of the matrix.
-_SYMMETRIC_ENTRIES = [0, 3, 5, 3, 1, 4, 5, 4, 2]
-
-#: Largest difference between a tensor and its transpose, relative to the largest entry of the array.
-_ASYMMETRY_TOLERANCE = 1e-3
-
-#: Length of the tangential part of a vector, relative to its length, that is only rounding error.
-_NORMAL_VECTOR_SINE = 1e-6
-
-_LABEL = "reading the field"
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,10 +184,10 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Si
         raise RosyError(f"{path}: has no step {step}, only {counted(len(steps), 'step')}, from 1")
     number = len(steps) if step is None else step
     mesh = steps[number - 1].read()
-    if len(steps) == 1:
+    if len(steps) == 1 or step is not None:
         return mesh
     time = "" if mesh.time is None else f", time {mesh.time:g}"
-    return replace(mesh, note=f"{path}: step {number} of {len(steps)}{time}")
+    return replace(mesh, note=f"{path}: the last of {len(steps)} steps was read{time}")
 
 
 def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
@@ -252,6 +229,11 @@ def simulation_steps(
     """
     for step in list_steps(paths):
         yield step, step.read()
+
+
+def build_surface(mesh: SimulationMesh) -> Surface:
+    """Return the surface of a mesh. As for other mesh files, edges are sharp above `SHARP_ANGLE`."""
+    return run_to_completion(surface_task(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE))
 
 
 def _in_order(paths: list[Path]) -> list[Path]:
@@ -639,261 +621,3 @@ def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray,
     connectivity = np.asarray(grid.cell_connectivity)[first + np.maximum(position, 0)]
     connectivity[start[:-1]] = sizes
     return cells, pyvista.UnstructuredGrid(connectivity, linear_type, np.asarray(grid.points))
-
-
-# Fields
-
-
-class FieldArray(NamedTuple):
-    """An array at the points or the cells of a mesh.
-
-    Attributes
-    ----------
-    name : str
-    domain : {"vertex", "face"}
-    values : (n, ...) ndarray
-    """
-
-    name: str
-    domain: str
-    values: np.ndarray
-
-    @property
-    def columns(self) -> int:
-        """Count of numbers at each point or cell."""
-        return int(np.prod(self.values.shape[1:]))
-
-    def __str__(self) -> str:
-        where = "points" if self.domain == "vertex" else "cells"
-        return f"'{self.name}' ({len(self.values):,} {where} x {self.columns})"
-
-
-def build_surface(mesh: SimulationMesh) -> Surface:
-    """Return the surface of a mesh. As for other mesh files, edges are sharp above `SHARP_ANGLE`."""
-    return run_to_completion(surface_task(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE))
-
-
-def find_array(mesh: SimulationMesh, name: str | None = None) -> FieldArray:
-    """Return the array of a mesh that a field is made from.
-
-    Parameters
-    ----------
-    mesh : SimulationMesh
-    name : str, optional
-        Its name, or "point:NAME" or "cell:NAME" if both have one. If not given, there must be a
-        single array that can be a field: see `field_task`. Without a name, only arrays of
-        floating-point numbers count, as integers are usually labels or colors.
-
-    Raises
-    ------
-    RosyError
-        If there is no such array, or several. The message lists the arrays that there are.
-    """
-    arrays = _all_arrays(mesh)
-    if name is not None:
-        return _array_of_name(mesh, arrays, name)
-    candidates = [
-        array
-        for array in arrays
-        if array.values.dtype.kind == "f" and _can_be_field(mesh, array.columns)
-    ]
-    if len(candidates) == 1:
-        return candidates[0]
-    if candidates:
-        raise RosyError(
-            f"{mesh.name}: {len(candidates)} arrays can be a field: choose one with --array: "
-            f"{_listed(candidates)}"
-        )
-    raise RosyError(
-        f"{mesh.name}: has no array of vectors or tensors, only {_listed(arrays)}: give a field file, "
-        "or --generate"
-    )
-
-
-def _all_arrays(mesh: SimulationMesh) -> list[FieldArray]:
-    """Return the arrays at the points, then those at the cells."""
-    at_points = [FieldArray(name, "vertex", array) for name, array in mesh.point_arrays.items()]
-    return at_points + [FieldArray(name, "face", array) for name, array in mesh.cell_arrays.items()]
-
-
-def _array_of_name(mesh: SimulationMesh, arrays: list[FieldArray], name: str) -> FieldArray:
-    """Return the array of a name."""
-    found = [array for array in arrays if array.name == name]
-    prefix, _, rest = name.partition(":")
-    if not found and prefix in ("point", "cell"):
-        domain = "vertex" if prefix == "point" else "face"
-        found = [array for array in arrays if (array.name, array.domain) == (rest, domain)]
-    if len(found) > 1:
-        raise RosyError(
-            f"{mesh.name}: both points and cells have an array '{name}': choose 'point:{name}' or "
-            f"'cell:{name}'"
-        )
-    if not found:
-        raise RosyError(f"{mesh.name}: there is no array '{name}', only {_listed(arrays)}")
-    return found[0]
-
-
-def _listed(arrays: list[FieldArray]) -> str:
-    """Return the names and shapes of arrays as text."""
-    return ", ".join(map(str, arrays)) or "the mesh"
-
-
-def _can_be_field(mesh: SimulationMesh, columns: int) -> bool:
-    """Return whether a field can be made from an array with this count of numbers per element."""
-    if columns == 2:
-        return _is_flat(mesh)
-    return columns % 3 == 0 and 3 <= columns <= 3 * MAX_DEGREE
-
-
-def _is_flat(mesh: SimulationMesh) -> bool:
-    """Return whether all vertices have the same z."""
-    return not np.ptp(mesh.polygons.vertices[:, 2])
-
-
-def make_field(
-    mesh: SimulationMesh,
-    surface: Surface,
-    array: str | None = None,
-    degree: int | None = None,
-    nonfinite: str = "error",
-) -> RosyField:
-    """Run `field_task` to its end.
-
-    Examples
-    --------
-    >>> mesh = read_simulation("flow.vtu")
-    >>> field = make_field(mesh, build_surface(mesh), "velocity", degree=2)
-    """
-    return run_to_completion(field_task(mesh, surface, array, degree, nonfinite))
-
-
-def field_task(
-    mesh: SimulationMesh,
-    surface: Surface,
-    array: str | None = None,
-    degree: int | None = None,
-    nonfinite: str = "error",
-) -> Task[RosyField]:
-    """Make a field from an array of a mesh.
-
-    The count of numbers at each point or cell says what they are:
-
-    =======  ====================================================================================
-    2        on a mesh with constant z: a member vector, z is 0
-    3        a member vector
-    6        a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ
-    9        a symmetric tensor, 3 x 3
-    12 ...   3 N numbers: all N directions
-    =======  ====================================================================================
-
-    Vectors that are tangent to the surface are treated as those of a field file, see
-    `field.validate.validated_field`. Other vectors, such as velocities at the boundary of a volume,
-    are replaced by their tangential components. Those at points are projected to each face at the
-    point, and then averaged over the corners of the face as RoSys. Tensors are restricted to the
-    tangent planes; those at points are averaged over the corners.
-
-    Parameters
-    ----------
-    mesh : SimulationMesh
-    surface : Surface
-        From `build_surface`.
-    array : str, optional
-        See `find_array`.
-    degree : int, optional
-        The degree N; `DEFAULT_DEGREE` for member vectors if not given. Tensors have degree 4.
-    nonfinite : {"error", "zero"}
-        Raise an error if a number is not finite, or treat the vector or tensor as undefined.
-
-    Returns
-    -------
-    RosyField
-
-    Raises
-    ------
-    RosyError
-        If there is no such array, it holds scalars or tensors that are not symmetric, has another
-        degree, or has numbers that are not finite. For the deformation gradient or the gradient of a
-        velocity, use the symmetric tensor that is of interest, such as the rate of strain.
-    """
-    found = find_array(mesh, array)
-    source = f"{mesh.name}: array '{found.name}'"
-    if not _can_be_field(mesh, found.columns):
-        kind = "scalars" if found.columns == 1 else f"{found.columns} numbers for each element"
-        raise RosyError(
-            f"{source} has {kind}, a field needs vectors or tensors; the arrays are "
-            f"{_listed(_all_arrays(mesh))}"
-        )
-    raw = _raw_field(found, source)
-    if degree is not None:
-        check_degree(degree)
-        if raw.degree not in (None, degree):
-            raise RosyError(
-                f"{source} gives a field of degree {raw.degree}, but degree {degree} was requested"
-            )
-    yield Progress(0.0, _LABEL)
-    if raw.tensors and raw.domain == "vertex":
-        apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
-        corner_values = raw.values.reshape(-1, 9)[surface.corner_vertex]
-        means = mean_per_face(corner_values, surface.face_start)
-        raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
-    elif not raw.tensors and raw.values.shape[1] == 1:
-        vectors = raw.values[:, 0]
-        apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        task = _tangential_task(surface, vectors, raw.domain, degree or DEFAULT_DEGREE)
-        tangential = yield from subtask(task, 0.0, 0.5, _LABEL)
-        if tangential is not None:
-            raw = replace(raw, values=tangential[:, None], domain="face")
-    task = field_from_raw_task(raw, surface, degree, source, nonfinite)
-    return (yield from subtask(task, 0.5, 1.0))
-
-
-def _raw_field(array: FieldArray, source: str) -> RawField:
-    """Return the rows of an array as vectors, directions or tensors."""
-    count, columns = len(array.values), array.columns
-    values = as_float64(array.values.reshape(count, columns))
-    if columns == 2:
-        values = np.pad(values, ((0, 0), (0, 1)))
-    if columns == 6:
-        values = values[:, _SYMMETRIC_ENTRIES]
-    matrices = np.ascontiguousarray(values.reshape(count, -1, 3))
-    if columns not in (6, 9):
-        degree = None if matrices.shape[1] == 1 else matrices.shape[1]
-        return RawField(matrices, degree, domain=array.domain)
-    finite = matrices[np.isfinite(matrices).all(axis=(1, 2))]
-    transposed = finite.swapaxes(1, 2)
-    asymmetry, size = np.abs(finite - transposed).max(initial=0.0), np.abs(finite).max(initial=0.0)
-    if asymmetry > _ASYMMETRY_TOLERANCE * size:
-        raise RosyError(
-            f"{source} has tensors that are not symmetric, by up to {asymmetry:.3g} of {size:.3g}: store "
-            "the symmetric tensors or the vectors to draw"
-        )
-    matrices = (matrices + matrices.swapaxes(1, 2)) / 2
-    return RawField(matrices, 4, domain=array.domain, tensors=True)
-
-
-def _tangential_task(
-    surface: Surface, vectors: np.ndarray, domain: str, degree: int
-) -> Task[np.ndarray | None]:
-    """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
-    normal = yield from tangent_normals_task(surface, domain)
-    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
-    length = np.sqrt(dot(vectors, vectors))
-    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(tolerance_deg)) * length
-    if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
-        return None
-    yield Progress(0.5, _LABEL)
-    if domain == "face":
-        return _tangential(vectors, surface.face_normal)
-    vectors = vectors[surface.corner_vertex]
-    tangential = _tangential(vectors, surface.face_normal[surface.corner_face])
-    x, y = face_frames(surface)
-    frames = x[surface.corner_face], y[surface.corner_face]
-    mean = mean_per_face(to_representation(tangential, *frames, degree), surface.face_start)
-    return from_representation(mean, x, y, degree)
-
-
-def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return the components of (n, 3) vectors in the planes of (n, 3) unit normals."""
-    tangential = vectors - dot(vectors, normal)[:, None] * normal
-    is_parallel = dot(tangential, tangential) <= _NORMAL_VECTOR_SINE**2 * dot(vectors, vectors)
-    return np.where(is_parallel[:, None] | ~normal.any(axis=1)[:, None], 0.0, tangential)

@@ -1,7 +1,6 @@
 """The command line of the Python package, and what it has besides those of the extension for Blender.
 
 command_line   the commands
-simulations    MESH in the files of simulations
 film           the command `film`: the steps of a simulation as a video
 cluster        Dask: frames on a cluster
 blender        Blender: .blend files, and videos

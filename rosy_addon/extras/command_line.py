@@ -13,7 +13,6 @@ from ..external.simulation_files import SUFFIXES
 from .blender import PACKAGE, BlenderRunner, blender_encoder
 from .cluster import run_on_cluster
 from .film import add_film_command
-from .simulations import load_simulation
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -23,7 +22,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         program=(sys.executable, "-m", PACKAGE),
         run_on_cluster=run_on_cluster,
         simulation_suffixes=SUFFIXES,
-        load_simulation=load_simulation,
         add_commands=(add_film_command,),
         find_blender_encoder=blender_encoder,
         run_in_blender=BlenderRunner(arguments),
@@ -47,7 +45,6 @@ def main_in_blender(argv: Sequence[str], output: TextIO, frames_are_drawn: bool)
     extras = Extras(
         run_on_cluster=run_on_cluster,
         simulation_suffixes=SUFFIXES,
-        load_simulation=load_simulation,
         run_in_blender=lambda *_: None,
         frames_are_drawn=frames_are_drawn,
     )

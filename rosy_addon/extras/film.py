@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..api import Surface
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
 from ..cli.look import add_look_options, requested_preset, requested_settings
 from ..cli.options import add_subcommand, add_workers_option, check_output, float_between
@@ -19,8 +18,10 @@ from ..cli.streams import print_line
 from ..cli.view import add_view_options, requested_size
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..external.simulation_files import SUFFIXES, SimulationMesh, Step, list_steps, make_field
+from ..external.simulation_files import SUFFIXES, SimulationMesh, Step, build_surface, list_steps
+from ..field.array_field import SurfaceArrays, array_field
 from ..field.rosy_field import RosyField, check_degree
+from ..field.surface import Surface
 from ..progress import run_to_completion
 from ..projection.camera import framing_points, orbit_camera
 from ..projection.gbuffer import MeshInstance
@@ -29,7 +30,6 @@ from ..rendering.cpu import CpuRenderer
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
 from ..turntable_video import check_video_path, turntable_task
-from .simulations import surface_of
 
 
 def add_film_command(subparsers: Any) -> None:
@@ -55,7 +55,7 @@ def add_film_command(subparsers: Any) -> None:
         "--degree",
         type=int,
         metavar="N",
-        help="degree of a field of vectors, 1 to 12; by default 4",
+        help="degree of a field of vectors, 1 to 12; by default 1",
     )
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
@@ -123,7 +123,7 @@ class Film:
     size : (int, int)
         Pixels.
     array, degree, nonfinite
-        See `simulation_files.field_task`.
+        See `field.array_field.array_field_task`.
     up : {"y", "z"}
         The upward axis of the meshes.
     perspective : bool
@@ -178,7 +178,7 @@ class Film:
     def _instance(self, step: Step) -> MeshInstance:
         """Read a step."""
         surface, field = self._read(step)
-        return mesh_instance(surface.mesh, field, self._up)
+        return mesh_instance(surface, field, self._up)
 
     def _read(self, step: Step) -> tuple[Surface, RosyField]:
         """Read a step. If the mesh is that of the last step, the surface is used again."""
@@ -186,9 +186,10 @@ class Film:
         if self._last is not None and _have_same_polygons(mesh, self._last[0]):
             surface = self._last[1]
         else:
-            surface = surface_of(replace(mesh, point_arrays={}, cell_arrays={}))
+            surface = build_surface(mesh)
         self._last = replace(mesh, point_arrays={}, cell_arrays={}), surface
-        return surface, make_field(mesh, surface.mesh, *self._field_options)
+        arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
+        return surface, array_field(arrays, *self._field_options)
 
 
 def _have_same_polygons(first: SimulationMesh, second: SimulationMesh) -> bool:

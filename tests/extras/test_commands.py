@@ -18,10 +18,10 @@ from rosy_addon.external.simulation_files import (
     SimulationMesh,
     build_surface,
     list_steps,
-    make_field,
     read_simulation,
 )
 from rosy_addon.extras.film import Film
+from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.cpu import CpuRenderer
 from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
@@ -61,7 +61,7 @@ def test_render(rosy, files):
 
 
 def test_other_commands(rosy, files):
-    status, output, _ = rosy("info", files / "b.vtp", "--array", "rotation", "--degree", 1)
+    status, output, _ = rosy("info", files / "b.vtp", "--array", "rotation")
     assert status == 0 and "degree 1\n1,280 faces, 642 vertices, Euler" in output
     field = ("field", files / "b.vtp", "--array", "rotation", "-o", files / "out.rosy")
     assert rosy(*field) == (0, "", "")
@@ -84,7 +84,7 @@ def test_tone_from_an_array(rosy, files):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("b.vtp",), "b.vtp: 2 arrays can be a field: choose one with --array: 'rotation' "),
+        (("b.vtp",), "b.vtp: 2 arrays can be a field: choose one by its name, with --array"),
         (("b.vtp", "--array", "U"), "b.vtp: there is no array 'U', only '"),
         (("b.vtp", "--array", "height"), "b.vtp: array 'height' has scalars, a field needs vectors"),
         (("b.vtp", "rotation.npy", "--array", "rotation"), "give either --array, or a field file"),
@@ -100,12 +100,13 @@ def test_errors(rosy, files, words, message, monkeypatch):
     assert message in errors and errors.count("\n") == 1
 
 
-def test_the_extension_has_none_of_it(files, capfd):
+def test_the_extension_has_none_of_it(files, capfd, monkeypatch):
     """Without the extras, --array and film are unknown, and the files are no mesh files."""
+    monkeypatch.setitem(sys.modules, "rosy_addon.external.simulation_files", None)
     for words, message in (
         (("render", "a.ply", "--array", "x", "-o", "a.png"), "unrecognized arguments: --array"),
         (("film", "a.vtu", "-o", "a.gif"), "invalid choice: 'film'"),
-        (("render", "a.vtu", "-o", "a.png"), "a.vtu: is not a mesh file"),
+        (("render", "a.vtu", "-o", "a.png"), "must end in .obj, .off, .ply or .stl\n"),
     ):
         assert cli_main([str(word) for word in words]) == 2
         assert message in capfd.readouterr().err
@@ -148,7 +149,7 @@ def growing(tmp_path, sphere):
 def test_film(suffix, rosy, growing, tmp_path):
     """20 frames in the order of the numbers: the sphere grows in the fixed frame."""
     output = tmp_path / f"film{suffix}"
-    words = ("--size", "64x64", "--rate", 10, "--degree", 1, "--workers", 1)
+    words = ("--size", "64x64", "--rate", 10, "--workers", 1)
     status, lines, errors = rosy("film", *growing, "-o", output, *words)
     assert (status, errors) == (0, "")
     assert lines.splitlines() == [f"step {number} of 20" for number in range(1, 21)]
@@ -173,13 +174,14 @@ def test_film_has_one_camera_and_one_range(growing):
     """The largest step fills the frame. The range is the largest magnitude of all steps."""
     look = Look(length=8, magnitude="colour")
     steps = list_steps(growing)[::-1]
-    views = list(Film(steps, look, (30.0, 20.0), (60, 50), degree=1).views())
+    views = list(Film(steps, look, (30.0, 20.0), (60, 50)).views())
     assert len({id(view.camera) for view in views}) == 1
     fields = [view.instances[0].field for view in views]
     assert {view.look.magnitude_range for view in views} == {fields[0].magnitude.max()}
     mesh = read_simulation(steps[0].paths[0])
     surface = build_surface(mesh)
-    instance = mesh_instance(surface, make_field(mesh, surface, degree=1), "z")
+    arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
+    instance = mesh_instance(surface, array_field(arrays), "z")
     look = views[0].look
     expected = mesh_view(instance, look, (30.0, 20.0), (60, 50))
     assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pkgutil
+import sys
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from shapes import icosphere, torus
 
 import rosy_addon as rf
 from rosy_addon import api
+from rosy_addon.api.mesh_objects import MeshArrays
 from rosy_addon.cli.parser import main
 from rosy_addon.field.formats.polygons import offsets_from_sizes
 
@@ -75,11 +77,25 @@ def test_a_flat_mesh_needs_no_z():
         ((SQUARE, [[0, 1, 2]]), {"uv": [[0, np.nan]] * 4}, "not finite"),
         ((SQUARE,), {}, "expected vertices and faces"),
         ((object(),), {}, "not object"),
+        (
+            ("a.xyz",),
+            {},
+            "a.xyz: is not a mesh file: its name must end in .obj, .off, .ply, .stl, .vtk",
+        ),
+        (("a.obj",), {"step": 1}, "a.obj: step applies only to files of simulations"),
+        ((SQUARE, [[0, 1, 2]]), {"step": 1}, "step applies only to files of simulations"),
         (("none.obj",), {}, "none.obj: cannot be read"),
     ],
 )
 def test_meshes_that_are_refused(arguments, options, expected, error_of):
     assert expected in error_of(rf.Surface, *arguments, **options)
+
+
+def test_the_extension_reads_no_simulations(error_of, monkeypatch):
+    """The module that reads them is not in it."""
+    monkeypatch.setitem(sys.modules, "rosy_addon.external.simulation_files", None)
+    message = error_of(rf.Surface, "a.vtu")
+    assert message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply or .stl"
 
 
 def test_angles_are_those_of_the_frames(sphere):
@@ -125,6 +141,23 @@ def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
         assert np.array_equal(again.directions, field.directions)
     vectors = rf.from_vectors(sphere, field.vectors, 4)
     assert np.array_equal(vectors.vectors, field.vectors)
+
+
+def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
+    """Vectors of faces give the same field; the array is found by its name, or as the only one."""
+    arrays = MeshArrays(
+        sphere.vertices,
+        sphere.mesh.corner_vertex,
+        sphere.mesh.face_start,
+        vertex_data={"p": sphere.vertices[:, 2]},
+        face_data={"U": field.vectors},
+    )
+    surface = rf.Surface(arrays, name="flow")
+    for again in (rf.from_array(surface, degree=4), rf.from_array(surface, "cell:U", 4)):
+        assert np.array_equal(again.vectors, field.vectors) and again.surface is surface
+    assert rf.from_array(surface).degree == 1
+    assert "flow: array 'p' has scalars" in error_of(rf.from_array, surface, "p")
+    assert "sphere: has no array of vectors" in error_of(rf.from_array, sphere)
 
 
 def test_guides_may_be_a_field(sphere, field):

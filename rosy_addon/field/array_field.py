@@ -1,0 +1,313 @@
+"""Fields from the named arrays at the vertices and faces of a surface, as simulations store them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion, subtask
+from .field_io import field_from_raw_task
+from .formats.raw_field import RawField
+from .frames import dot
+from .representation import face_frames, from_representation, to_representation
+from .rosy_field import MAX_DEGREE, RosyField, check_degree
+from .surface import Surface, mean_per_face
+from .validate import (
+    FACE_TOLERANCE_DEG,
+    MAX_OUTLIER_FRACTION,
+    VERTEX_TOLERANCE_DEG,
+    apply_nonfinite_policy,
+    as_float64,
+    tangent_normals_task,
+)
+
+#: Degree of an array of vectors, if the caller gives none.
+VECTOR_DEGREE = 1
+
+#: Names of arrays that hold the normals of the surface, in lower case.
+_NORMAL_NAMES = ("normal", "normals")
+
+#: Order of the six numbers of a symmetric tensor in VTK, XX YY ZZ XY YZ XZ, as entries of the matrix.
+_SYMMETRIC_ENTRIES = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+
+#: Largest difference between a tensor and its transpose, relative to the largest entry of the array.
+_ASYMMETRY_TOLERANCE = 1e-3
+
+#: Length of the tangential part of a vector, relative to its length, that is only rounding error.
+_NORMAL_VECTOR_SINE = 1e-6
+
+_LABEL = "reading the field"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceArrays:
+    """A surface of V vertices and F faces, with named arrays.
+
+    Attributes
+    ----------
+    name : str
+        For messages, such as the path of the file.
+    surface : Surface
+    vertex_data, face_data : mapping of str to array_like
+        Arrays of V and of F rows. Others, and those that do not hold real numbers, are ignored.
+    """
+
+    name: str
+    surface: Surface
+    vertex_data: Mapping[str, Any]
+    face_data: Mapping[str, Any]
+
+
+class FieldArray(NamedTuple):
+    """An array at the points or the cells of a mesh: the vertices or the faces of its surface.
+
+    Attributes
+    ----------
+    name : str
+    domain : {"vertex", "face"}
+    values : (n, ...) ndarray
+    """
+
+    name: str
+    domain: str
+    values: np.ndarray
+
+    @property
+    def columns(self) -> int:
+        """Count of numbers at each point or cell."""
+        return int(np.prod(self.values.shape[1:]))
+
+    def __str__(self) -> str:
+        where = "points" if self.domain == "vertex" else "cells"
+        return f"'{self.name}' ({len(self.values):,} {where} x {self.columns})"
+
+
+def find_array(arrays: SurfaceArrays, name: str | None = None) -> FieldArray:
+    """Return the array that a field is made from.
+
+    Parameters
+    ----------
+    arrays : SurfaceArrays
+    name : str, optional
+        Its name, or "point:NAME" or "cell:NAME" if both have one. If not given, there must be a
+        single array that can be a field: see `array_field_task`. Without a name, only arrays of
+        floating-point numbers count, as integers are usually labels or colors, and no normals.
+
+    Raises
+    ------
+    RosyError
+        If there is no such array, or several. The message lists the arrays that there are.
+    """
+    found = _all_arrays(arrays)
+    if name is not None:
+        return _array_of_name(arrays, found, name)
+    candidates = [
+        array
+        for array in found
+        if array.values.dtype.kind == "f"
+        and array.name.lower() not in _NORMAL_NAMES
+        and _can_be_field(arrays, array.columns)
+    ]
+    if len(candidates) == 1:
+        return candidates[0]
+    if candidates:
+        raise RosyError(
+            f"{arrays.name}: {len(candidates)} arrays can be a field: choose one by its name, with "
+            f"--array on the command line: {_listed(candidates)}"
+        )
+    raise RosyError(
+        f"{arrays.name}: has no array of vectors or tensors, only {_listed(found)}: read a field from "
+        "a file, or generate one"
+    )
+
+
+def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
+    """Return the arrays at the points, then those at the cells."""
+    found = []
+    for domain, data, count in (
+        ("vertex", arrays.vertex_data, len(arrays.surface.vertices)),
+        ("face", arrays.face_data, arrays.surface.face_count),
+    ):
+        for name, given in data.items():
+            values = np.asarray(given)
+            if values.dtype.kind in "fiu" and values.shape[:1] == (count,):
+                found.append(FieldArray(name, domain, values))
+    return found
+
+
+def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -> FieldArray:
+    """Return the array of a name."""
+    found = [array for array in listed if array.name == name]
+    prefix, _, rest = name.partition(":")
+    if not found and prefix in ("point", "cell"):
+        domain = "vertex" if prefix == "point" else "face"
+        found = [array for array in listed if (array.name, array.domain) == (rest, domain)]
+    if len(found) > 1:
+        raise RosyError(
+            f"{arrays.name}: both points and cells have an array '{name}': choose 'point:{name}' or "
+            f"'cell:{name}'"
+        )
+    if not found:
+        raise RosyError(f"{arrays.name}: there is no array '{name}', only {_listed(listed)}")
+    return found[0]
+
+
+def _listed(arrays: list[FieldArray]) -> str:
+    """Return the names and shapes of arrays as text."""
+    return ", ".join(map(str, arrays)) or "the mesh"
+
+
+def _can_be_field(arrays: SurfaceArrays, columns: int) -> bool:
+    """Return whether a field can be made from an array with this count of numbers per element."""
+    if columns == 2:
+        return not np.ptp(arrays.surface.vertices[:, 2])
+    return columns % 3 == 0 and 3 <= columns <= 3 * MAX_DEGREE
+
+
+def array_field(
+    arrays: SurfaceArrays,
+    name: str | None = None,
+    degree: int | None = None,
+    nonfinite: str = "error",
+) -> RosyField:
+    """Run `array_field_task` to its end.
+
+    Examples
+    --------
+    >>> arrays = SurfaceArrays("flow", surface, {"velocity": velocity}, {})
+    >>> field = array_field(arrays, "velocity")
+    """
+    return run_to_completion(array_field_task(arrays, name, degree, nonfinite))
+
+
+def array_field_task(
+    arrays: SurfaceArrays,
+    name: str | None = None,
+    degree: int | None = None,
+    nonfinite: str = "error",
+) -> Task[RosyField]:
+    """Make a field from one of the arrays of a surface.
+
+    The count of numbers at each point or cell says what they are:
+
+    =======  ====================================================================================
+    2        on a mesh with constant z: a member vector, z is 0
+    3        a member vector
+    6        a symmetric tensor, in VTK's order XX, YY, ZZ, XY, YZ, XZ
+    9        a symmetric tensor, 3 x 3
+    12 ...   3 N numbers: all N directions
+    =======  ====================================================================================
+
+    Vectors that are tangent to the surface are treated as those of a field file, see
+    `field.validate.validated_field`. Other vectors, such as velocities at the boundary of a volume,
+    are replaced by their tangential components. Those at points are projected to each face at the
+    point, and then averaged over the corners of the face as RoSys. Tensors are restricted to the
+    tangent planes; those at points are averaged over the corners.
+
+    Parameters
+    ----------
+    arrays : SurfaceArrays
+    name : str, optional
+        See `find_array`.
+    degree : int, optional
+        The degree N; `VECTOR_DEGREE` for member vectors if not given. Tensors have degree 4.
+    nonfinite : {"error", "zero"}
+        Raise an error if a number is not finite, or treat the vector or tensor as undefined.
+
+    Returns
+    -------
+    RosyField
+
+    Raises
+    ------
+    RosyError
+        If there is no such array, it holds scalars or tensors that are not symmetric, has another
+        degree, or has numbers that are not finite. For the deformation gradient or the gradient of a
+        velocity, use the symmetric tensor that is of interest, such as the rate of strain.
+    """
+    surface = arrays.surface
+    found = find_array(arrays, name)
+    source = f"{arrays.name}: array '{found.name}'"
+    if not _can_be_field(arrays, found.columns):
+        kind = "scalars" if found.columns == 1 else f"{found.columns} numbers for each element"
+        raise RosyError(
+            f"{source} has {kind}, a field needs vectors or tensors; the arrays are "
+            f"{_listed(_all_arrays(arrays))}"
+        )
+    raw = _raw_field(found, source)
+    degree = check_degree(raw.degree or VECTOR_DEGREE if degree is None else degree)
+    if raw.degree not in (None, degree):
+        raise RosyError(
+            f"{source} gives a field of degree {raw.degree}, but degree {degree} was requested"
+        )
+    yield Progress(0.0, _LABEL)
+    if raw.tensors and raw.domain == "vertex":
+        apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
+        corner_values = raw.values.reshape(-1, 9)[surface.corner_vertex]
+        means = mean_per_face(corner_values, surface.face_start)
+        raw = replace(raw, values=means.reshape(-1, 3, 3), domain="face")
+    elif not raw.tensors and raw.values.shape[1] == 1:
+        vectors = raw.values[:, 0]
+        apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
+        task = _tangential_task(surface, vectors, raw.domain, degree)
+        tangential = yield from subtask(task, 0.0, 0.5, _LABEL)
+        if tangential is not None:
+            raw = replace(raw, values=tangential[:, None], domain="face")
+    task = field_from_raw_task(raw, surface, degree, source, nonfinite)
+    return (yield from subtask(task, 0.5, 1.0))
+
+
+def _raw_field(array: FieldArray, source: str) -> RawField:
+    """Return the rows of an array as vectors, directions or tensors."""
+    count, columns = len(array.values), array.columns
+    values = as_float64(array.values.reshape(count, columns))
+    if columns == 2:
+        values = np.pad(values, ((0, 0), (0, 1)))
+    if columns == 6:
+        values = values[:, _SYMMETRIC_ENTRIES]
+    matrices = np.ascontiguousarray(values.reshape(count, -1, 3))
+    if columns not in (6, 9):
+        degree = None if matrices.shape[1] == 1 else matrices.shape[1]
+        return RawField(matrices, degree, domain=array.domain)
+    finite = matrices[np.isfinite(matrices).all(axis=(1, 2))]
+    transposed = finite.swapaxes(1, 2)
+    asymmetry, size = np.abs(finite - transposed).max(initial=0.0), np.abs(finite).max(initial=0.0)
+    if asymmetry > _ASYMMETRY_TOLERANCE * size:
+        raise RosyError(
+            f"{source} has tensors that are not symmetric, by up to {asymmetry:.3g} of {size:.3g}: store "
+            "the symmetric tensors or the vectors to draw"
+        )
+    matrices = (matrices + matrices.swapaxes(1, 2)) / 2
+    return RawField(matrices, 4, domain=array.domain, tensors=True)
+
+
+def _tangential_task(
+    surface: Surface, vectors: np.ndarray, domain: str, degree: int
+) -> Task[np.ndarray | None]:
+    """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
+    normal = yield from tangent_normals_task(surface, domain)
+    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
+    length = np.sqrt(dot(vectors, vectors))
+    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(tolerance_deg)) * length
+    if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
+        return None
+    yield Progress(0.5, _LABEL)
+    if domain == "face":
+        return _tangential(vectors, surface.face_normal)
+    vectors = vectors[surface.corner_vertex]
+    tangential = _tangential(vectors, surface.face_normal[surface.corner_face])
+    x, y = face_frames(surface)
+    frames = x[surface.corner_face], y[surface.corner_face]
+    mean = mean_per_face(to_representation(tangential, *frames, degree), surface.face_start)
+    return from_representation(mean, x, y, degree)
+
+
+def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return the components of (n, 3) vectors in the planes of (n, 3) unit normals."""
+    tangential = vectors - dot(vectors, normal)[:, None] * normal
+    is_parallel = dot(tangential, tangential) <= _NORMAL_VECTOR_SINE**2 * dot(vectors, vectors)
+    return np.where(is_parallel[:, None] | ~normal.any(axis=1)[:, None], 0.0, tangential)

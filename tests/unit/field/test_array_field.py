@@ -1,0 +1,186 @@
+"""Fields from named arrays, against closed forms and against the same numbers in .npy files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cube, icosphere, plane
+
+from rosy_addon.field.array_field import SurfaceArrays, array_field, find_array
+from rosy_addon.field.field_io import read_field
+from rosy_addon.field.validate import vertex_normals
+
+
+def arrays_of(surface, points=(), cells=()):
+    return SurfaceArrays("flow.vtu", surface, dict(points), dict(cells))
+
+
+def rotation(points):
+    """(n, 3) velocities of the rotation about z, tangent to every surface of revolution about z."""
+    return np.stack([-points[:, 1], points[:, 0], np.zeros(len(points))], axis=1)
+
+
+def angle_between_lines(first, second):
+    """(n,) angles in degrees between (n, 3) vectors and their opposites."""
+    cosine = np.abs((first * second).sum(axis=1))
+    cosine /= np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    return np.degrees(np.arccos(np.minimum(cosine, 1)))
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return icosphere(3)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return cube()
+
+
+def constant(surface, domain, row):
+    """The arrays of a surface with the same numbers at all points, or at all cells."""
+    count = len(surface.vertices) if domain == "points" else surface.face_count
+    return arrays_of(surface, **{domain: {"a": np.tile(row, (count, 1))}})
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_rotation_at_points_and_cells(degree, sphere):
+    """Circles around the axis, with the distance from it as magnitude."""
+    arrays = arrays_of(
+        sphere, {"p": rotation(sphere.vertices)}, {"c": rotation(sphere.face_center)}
+    )
+    far_from_poles = np.abs(sphere.face_center[:, 2]) < 0.9
+    for name, tolerance in (("p", 3.0), ("c", 1.0)):
+        field = array_field(arrays, name, degree)
+        assert field.degree == degree
+        members = [field.vectors]
+        if degree == 4:
+            members.append(np.cross(sphere.face_normal, field.vectors))
+        circles = rotation(sphere.face_center)
+        off = np.minimum.reduce([angle_between_lines(m, circles) for m in members])
+        assert off[far_from_poles].max() < tolerance
+        if degree == 1:
+            radius = np.linalg.norm(circles, axis=1)[far_from_poles]
+            assert field.magnitude[far_from_poles] == pytest.approx(radius, rel=0.02)
+
+
+@pytest.mark.parametrize("columns", [3, 6, 9, 12])
+@pytest.mark.parametrize("domain", ["points", "cells"])
+def test_the_same_as_npy(columns, domain, sphere, tmp_path):
+    """Arrays give the fields of .npy files with the same rows, to the last bit."""
+    at_points = domain == "points"
+    rows = vectors = rotation(sphere.vertices if at_points else sphere.face_center)
+    if columns == 12:
+        other = np.cross(vertex_normals(sphere) if at_points else sphere.face_normal, vectors)
+        rows = np.concatenate([vectors, other, -vectors, -other], axis=1)
+    if columns in (6, 9):
+        tensors = vectors[:, :, None] * vectors[:, None] + 0.3 * np.eye(3)
+        rows = tensors.reshape(-1, 9)
+    array = rows[:, [0, 4, 8, 1, 5, 2]] if columns == 6 else rows
+    field = array_field(arrays_of(sphere, **{domain: {"a": array}}))
+    if columns in (6, 9) and at_points:
+        # .npy files have no tensors at points.
+        away = np.abs(sphere.face_center[:, 2]) < 0.9
+        circles = rotation(sphere.face_center)
+        assert angle_between_lines(field.vectors, circles)[away].max() < 3
+        return
+    np.save(tmp_path / "rows.npy", rows)
+    expected = read_field(tmp_path / "rows.npy", sphere, 1 if columns == 3 else None)
+    assert np.array_equal(field.vectors, expected.vectors)
+    for name in ("degree", "family_count"):
+        assert getattr(field, name) == getattr(expected, name)
+    if expected.direction_ratios is not None:
+        assert np.array_equal(field.direction_ratios, expected.direction_ratios)
+
+
+@pytest.mark.parametrize("domain", ["points", "cells"])
+def test_velocity_across_a_surface(domain, box):
+    """The tangential component on every face of a cube; degree 1, as these are vectors."""
+    velocity = np.array([1.0, 2.0, 3.0])
+    field = array_field(constant(box, domain, velocity))
+    normal = box.face_normal
+    assert field.degree == 1
+    assert field.vectors == pytest.approx(velocity - (normal @ velocity)[:, None] * normal)
+
+
+def test_velocity_normal_to_the_surface_is_undefined(box, sphere):
+    """Also where the tangential component is only a rounding error, as on a sphere."""
+    assert not array_field(arrays_of(sphere, cells={"U": sphere.face_normal})).vectors.any()
+    field = array_field(constant(box, "points", [0.0, 0.0, 1.0]))
+    is_cap = np.abs(box.face_normal[:, 2]) > 0.5
+    assert not field.vectors[is_cap].any()
+    assert field.magnitude[~is_cap] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("domain", ["points", "cells"])
+@pytest.mark.parametrize("columns", [6, 9])
+def test_stress(domain, columns, box):
+    """Principal directions in each face: the axis of the larger stress is the major one."""
+    row = np.diag([3.0, 2.0, 1.0]).ravel() if columns == 9 else [3.0, 2.0, 1.0, 0.0, 0.0, 0.0]
+    field = array_field(constant(box, domain, row))
+    major = np.where(np.abs(box.face_normal[:, :1]) > 0.5, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+    assert field.family_count == 2
+    assert angle_between_lines(field.vectors, major).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("number", "axis", "direction"), [(3, 2, [1, 1, 0]), (4, 0, [0, 1, 1]), (5, 1, [1, 0, 1])]
+)
+def test_order_of_the_numbers_of_a_symmetric_tensor(number, axis, direction, box):
+    """XX, YY, ZZ, XY, YZ, XZ: each shear has its principal directions in the faces of one kind."""
+    field = array_field(constant(box, "cells", np.eye(6)[number]))
+    is_sheared = np.abs(box.face_normal[:, axis]) > 0.5
+    lines = np.tile(np.array(direction, dtype=float), (is_sheared.sum(), 1))
+    assert angle_between_lines(field.vectors[is_sheared], lines).max() < 1e-4
+    assert not field.vectors[~is_sheared].any()
+
+
+def test_two_components_on_a_flat_mesh(box, error_of):
+    field = array_field(constant(plane(), "points", [3.0, 4.0]))
+    assert field.vectors == pytest.approx(np.tile([3.0, 4.0, 0.0], (16, 1)))
+    assert "'a' has 2 numbers" in error_of(array_field, constant(box, "points", [3.0, 4.0]), "a")
+
+
+def test_values_that_are_not_finite(box, error_of):
+    velocity = np.tile([1.0, 2.0, 3.0], (box.face_count, 1))
+    velocity[2] = np.nan
+    arrays = arrays_of(box, cells={"U": velocity})
+    message = error_of(array_field, arrays)
+    assert "flow.vtu: array 'U': 1 of 6 vectors are not finite" in message
+    field = array_field(arrays, nonfinite="zero")
+    assert np.flatnonzero(~field.vectors.any(axis=1)).tolist() == [2]
+    assert np.isnan(velocity[2]).all(), "the array stays as it is"
+
+
+def test_choice_of_an_array(box, error_of):
+    """Without a name there must be one array of vectors or tensors; names may be anything."""
+    others = {
+        "rgb": np.zeros((8, 3), dtype=np.uint8),
+        "p": np.zeros(8),
+        "Normals": box.vertices - 0.5,
+        "words": np.array(["a"] * 8),
+        "short": np.zeros((5, 3)),
+    }
+    arrays = arrays_of(box, {"U": np.ones((8, 3)), **others})
+    assert find_array(arrays).name == "U"
+    assert find_array(arrays, "rgb").columns == 3
+    message = error_of(find_array, arrays, "velocity")
+    listed = (
+        "'U' (8 points x 3), 'rgb' (8 points x 3), 'p' (8 points x 1), 'Normals' (8 points x 3)"
+    )
+    assert message == f"flow.vtu: there is no array 'velocity', only {listed}"
+    assert "'p' has scalars" in error_of(array_field, arrays, "p")
+    both = arrays_of(box, {"U": np.ones((8, 3))}, {"U": np.ones((6, 3)), "a\u202eb": np.ones((6, 6))})  # fmt: skip
+    message = error_of(find_array, both)
+    assert "3 arrays can be a field" in message and "'a\\u202eb' (6 cells x 6)" in message
+    assert "'point:U' or 'cell:U'" in error_of(find_array, both, "U")
+    assert find_array(both, "cell:U").domain == "face"
+    assert "degree 4, but degree 2" in error_of(array_field, both, "a\u202eb", degree=2)
+    message = error_of(array_field, arrays_of(box, others))
+    assert "no array of vectors or tensors, only 'rgb'" in message
+    assert "only the mesh" in error_of(array_field, arrays_of(box))
+
+
+def test_tensors_must_be_symmetric(box, error_of):
+    message = error_of(array_field, constant(box, "cells", np.arange(9.0)))
+    assert "'a' has tensors that are not symmetric" in message

@@ -124,6 +124,15 @@ class Field:
         return angles
 
     @cached_property
+    def representation(self) -> NDArray[np.complex128]:
+        """(F,): r exp(i N t) for the magnitude r and the angle t of a member; see `angles`.
+
+        It is the same for all members. `from_representation` makes a field of it.
+        """
+        z: NDArray[np.complex128] = self.magnitude * np.exp(1j * self.degree * self.angles)
+        return z
+
+    @cached_property
     def singularities(self) -> Singularities:
         """The singular vertices and their indices, in units of 1/N."""
         return Singularities(*find_singularities(self.surface.mesh, self.rosy))
@@ -175,6 +184,8 @@ class Field:
     def difference(self, other: Field) -> Difference:
         """Return the angle to another field of the same degree on the same surface.
 
+        Two smoothest fields of a closed surface may differ by a constant angle, which costs no energy.
+
         Raises
         ------
         RosyError
@@ -215,7 +226,7 @@ def check_same_surface(surface: Surface, field: Field) -> None:
 
 
 def from_vectors(
-    surface: Surface, vectors: ArrayLike, degree: int = 4, *, nonfinite: str = "error"
+    surface: Surface, vectors: ArrayLike, degree: int, *, nonfinite: str = "error"
 ) -> Field:
     """Make a field from one member vector for each face or vertex.
 
@@ -228,7 +239,7 @@ def from_vectors(
     vectors : (F, 3) or (V, 3) array_like
         Zero where the field is undefined. If there are as many faces as vertices, they are of faces.
     degree : int
-        N, from 1 to 12.
+        N, from 1 to 12: 1 for a vector field, 2 for a line field, 4 for a cross field.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
 
@@ -244,7 +255,7 @@ def from_vectors(
 
 
 def from_angles(
-    surface: Surface, angles: ArrayLike, degree: int = 4, *, magnitude: ArrayLike = 1.0
+    surface: Surface, angles: ArrayLike, degree: int, *, magnitude: ArrayLike = 1.0
 ) -> Field:
     """Make a field from the angle of a member on each face.
 
@@ -274,6 +285,34 @@ def from_angles(
     vectors = np.cos(values)[:, None] * x + np.sin(values)[:, None] * y
     field = Field(surface, RosyField(degree, vectors))
     return field if np.all(np.asarray(magnitude) == 1.0) else field.with_magnitude(magnitude)
+
+
+def from_representation(surface: Surface, representation: ArrayLike, degree: int) -> Field:
+    """Make a field from a complex number r exp(i N t) on each face.
+
+    Parameters
+    ----------
+    surface : Surface
+    representation : (F,) array_like of complex
+        The magnitude r, and N times the angle t of a member from x of `Surface.face_frames`.
+    degree : int
+        N, from 1 to 12.
+
+    Raises
+    ------
+    RosyError
+        If there is not one number for each face, or one is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rosyfields as rf
+    >>> square = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> rf.from_representation(square, [2j], degree=2).angles * 180 / np.pi
+    array([45.])
+    """
+    z = np.asarray(representation, dtype=np.complex128)
+    return from_angles(surface, np.angle(z) / check_degree(degree), degree, magnitude=np.abs(z))
 
 
 def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str = "error") -> Field:

@@ -98,7 +98,7 @@ def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
 
 def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
     """Return the (V, 3) or (V, 4) colors of vertices, 0 to 1; an empty array if there are none."""
-    visual = getattr(mesh, "visual", None)
+    visual: Any = getattr(mesh, "visual", None)
     if getattr(visual, "kind", None) == "vertex":
         return np.asarray(visual.vertex_colors) / 255.0
     return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)

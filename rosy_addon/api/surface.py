@@ -93,13 +93,12 @@ class Surface:
         sharp_edges: ArrayLike | None = None,
         step: int | None = None,
     ) -> None:
-        is_file = faces is None and isinstance(vertices, (str, os.PathLike))
-        self._path = Path(vertices) if is_file else None
+        self._path = _path_of(vertices) if faces is None else None
         simulation = _read_simulation(self._path, step)
         given = MeshArrays()
         default_up = "z"
         if self._path is not None and simulation is None:
-            self.mesh: PolygonMesh = read_mesh(self._path, sharp_angle=sharp_angle)
+            self.mesh: PolygonMesh = read_mesh(self._path, sharp_angle, sharp_edges)
             default_up = UP_AXIS_BY_SUFFIX[self._path.suffix.lower()]
         else:
             if simulation is not None:
@@ -205,6 +204,11 @@ class Surface:
         return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
 
 
+def _path_of(mesh: Any) -> Path | None:
+    """Return the path of a file; None if this is not one."""
+    return Path(mesh) if isinstance(mesh, (str, os.PathLike)) else None
+
+
 class _Simulation(NamedTuple):
     """The mesh in the file of a simulation, and its name."""
 
@@ -237,8 +241,8 @@ def _read_simulation(path: Path | None, step: int | None) -> _Simulation | None:
     mesh = read_simulation(path, step)
     if mesh.note:
         warnings.warn(mesh.note, RosyWarning, stacklevel=3)
-    data = {"vertex_data": mesh.point_arrays, "face_data": mesh.cell_arrays}
-    return _Simulation(MeshArrays(*mesh.polygons, **data), mesh.name)
+    arrays = MeshArrays(*mesh.polygons, None, mesh.point_arrays, mesh.cell_arrays)
+    return _Simulation(arrays, mesh.name)
 
 
 def _flat(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import RosyError
 from ..file_io import check_parsing_memory
@@ -35,17 +36,25 @@ BINARY_MEMORY = {".ply": 20, ".stl": 10}
 SHARP_ANGLE = np.radians(60)
 
 
-def read_mesh(path: str | os.PathLike[str], sharp_angle: float | None = None) -> Surface:
+def read_mesh(
+    path: str | os.PathLike[str],
+    sharp_angle: float | None = None,
+    sharp_edges: ArrayLike | None = None,
+) -> Surface:
     """Read a mesh from a file; see `read_mesh_task`.
 
     Examples
     --------
     >>> surface = read_mesh("bunny.obj")
     """
-    return run_to_completion(read_mesh_task(path, sharp_angle))
+    return run_to_completion(read_mesh_task(path, sharp_angle, sharp_edges))
 
 
-def read_mesh_task(path: str | os.PathLike[str], sharp_angle: float | None = None) -> Task[Surface]:
+def read_mesh_task(
+    path: str | os.PathLike[str],
+    sharp_angle: float | None = None,
+    sharp_edges: ArrayLike | None = None,
+) -> Task[Surface]:
     """Read a mesh from an .obj, .off, .ply or .stl file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
@@ -56,6 +65,8 @@ def read_mesh_task(path: str | os.PathLike[str], sharp_angle: float | None = Non
     path : path-like
     sharp_angle : float, optional
         Edges with a larger angle, in radians, are sharp. By default `SHARP_ANGLE`.
+    sharp_edges : (E, 2) array_like of int, optional
+        Pairs of vertices, further sharp edges.
 
     Returns
     -------
@@ -78,5 +89,5 @@ def read_mesh_task(path: str | os.PathLike[str], sharp_angle: float | None = Non
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     polygons = yield from subtask(reader(path), 0.0, 0.5)
     sharp_angle = SHARP_ANGLE if sharp_angle is None else sharp_angle
-    task = surface_task(*polygons, name=str(path), sharp_angle=sharp_angle)
+    task = surface_task(*polygons, name=str(path), sharp_angle=sharp_angle, sharp_edges=sharp_edges)
     return (yield from subtask(task, 0.5, 1.0))

@@ -41,7 +41,8 @@ def fields(cube: rf.Surface, folder: Path) -> rf.Field:
         rf.along_axis(cube, (1.0, 2.0, 3.0), degree=1),
         rf.along_uv(cube),
         rf.from_vectors(cube, vectors, 4, nonfinite="zero"),
-        rf.from_angles(cube, np.zeros(6), magnitude=0.5),
+        rf.from_angles(cube, np.zeros(6), 4, magnitude=0.5),
+        rf.from_representation(cube, np.ones(6), 4),
         rf.from_directions(cube, np.stack([vectors, -vectors], axis=1)),
         rf.from_tensors(cube, np.broadcast_to(np.diag([1.0, 2.0, 3.0]), (6, 3, 3))),
     ]
@@ -60,6 +61,12 @@ def fields(cube: rf.Surface, folder: Path) -> rf.Field:
     assert vertex.dtype == index.dtype == np.int32
     assert field.angles.shape == field.magnitude.shape == (6,)
     assert field.directions.shape == (6, 2, 3) and field.vectors.shape == (6, 3)
+    z: NDArray[np.complex128] = field.representation
+    assert z.shape == (6,)
+    try:
+        rf.from_array(cube, "velocity", degree=1)
+    except rf.RosyError as error:
+        assert "velocity" in str(error)
     return again
 
 
@@ -73,7 +80,8 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
     linear: NDArray[np.float32] = picture.rgba
     array: NDArray[np.uint8] = np.asarray(picture)
     assert array.shape == linear.shape == (32, 48, 4)
-    rf.render(cube, tone_values=np.linspace(0, 1, 8), size=(16, 16), tone_image=None, workers=1)
+    tone: NDArray[np.float32] = rf.ambient_occlusion(cube, directions=16)
+    rf.render(cube, tone_values=tone, size=(16, 16), tone_image=None, workers=1)
     drawing: rf.Drawing = rf.strokes(cube, field, size=(48, 48), spacing=8, colors=["navy"])
     drawing.save(folder / "cube.svg")
     svg: str = drawing.svg

@@ -106,7 +106,14 @@ def test_angles_are_those_of_the_frames(sphere):
     first_edge = sphere.vertices[sphere.faces[:, 1]] - sphere.vertices[sphere.faces[:, 0]]
     assert np.allclose(x, first_edge / np.linalg.norm(first_edge, axis=1, keepdims=True))
     assert field.degree == 3 and np.allclose(field.magnitude, 1)
-    assert np.allclose(rf.from_angles(sphere, angle, magnitude=angle**2).magnitude, angle**2)
+    assert np.allclose(rf.from_angles(sphere, angle, 4, magnitude=angle**2).magnitude, angle**2)
+
+
+def test_the_representation_is_that_of_any_member(sphere, field):
+    again = rf.from_representation(sphere, field.representation, 4)
+    assert np.allclose(again.representation, field.representation)
+    other_member = rf.from_vectors(sphere, field.directions[:, 1], 4)
+    assert np.allclose(other_member.representation, field.representation)
 
 
 def test_difference_of_a_rotated_field(sphere, field):
@@ -162,7 +169,7 @@ def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
 
 def test_guides_may_be_a_field(sphere, field):
     vectors = np.where(np.arange(sphere.face_count)[:, None] < 40, field.vectors, 0)
-    guided = rf.guided(sphere, vectors=rf.from_vectors(sphere, vectors))
+    guided = rf.guided(sphere, vectors=rf.from_vectors(sphere, vectors, 4))
     assert np.nanmax(guided.difference(field).angle[:40]) < 1e-3
     with pytest.raises(rf.RosyError, match="to_degree"):
         rf.guided(sphere, 2, vectors=field)

@@ -71,13 +71,16 @@ class Field:
     Parameters
     ----------
     surface : Surface
+        On whose faces the field is.
     rosy : rosyfields.field.rosy_field.RosyField
         The field as the other modules of the package use it.
 
     Attributes
     ----------
     surface : Surface
+        On whose faces the field is.
     rosy : rosyfields.field.rosy_field.RosyField
+        The field as the other modules of the package use it.
     """
 
     def __init__(self, surface: Surface, rosy: RosyField) -> None:

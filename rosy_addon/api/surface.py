@@ -57,7 +57,9 @@ class Surface:
     mesh : rosyfields.field.surface.Surface
         The mesh as the other modules of the package use it.
     name : str
+        For messages.
     up : {"y", "z"}
+        The axis that points up in pictures.
 
     Warns
     -----

@@ -20,6 +20,7 @@ OUTSIDE_DOCS = {
     "CONTRIBUTING.md": "contributing.html",
     "SECURITY.md": "security.html",
     "LICENSE": "files/LICENSE.txt",
+    "CITATION.cff": "files/CITATION.cff",
     "examples/bake_scene.py": "files/bake_scene.py",
     "farm/flamenco/rosy_bake.js": "files/rosy_bake.js",
 }

@@ -9,6 +9,7 @@
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-notebooks  the notebooks, with the package as a user installs it
+#   make test-bpy52    the tests with Blender 5.2's module: make test-bpy52 PYTHON313=python3.13
 #   make test-wheel    the Python package as it is installed: make test-wheel PYTHON=python3.13
 #   make test-python   the quick unit tests with another Python: make test-python PYTHON=python3.13
 #   make test-long further cases of some tests, which take minutes
@@ -23,6 +24,8 @@
 #   make clean     remove what was made here, but not the environments (make distclean: these too)
 
 PYTHON ?= python3.11
+# For Blender 5.1 and later.
+PYTHON313 ?= python3.13
 # Processes of a test run: `make test JOBS=1` for one, `auto` for one per core.
 JOBS   ?= auto
 # Random cases: how long, and the seed of the first one.
@@ -43,7 +46,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
-        smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-python test-wheel \
+        test-bpy52 smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-python test-wheel \
         test-extras test-notebooks fuzz fuzz-readers monkey zip dist check-tag gallery site \
         bench clean distclean
 .DELETE_ON_ERROR:
@@ -68,7 +71,7 @@ test-unit: .venv/ready .venv-bpy42/ready
 test-old-numpy: .venv-bpy42/ready
 	$(BPY42) $(PYTEST) -m "not slow and not long" tests/unit
 
-test-bpy42 test-bpy45 test-bpy50: test-bpy%: .venv-bpy%/ready
+test-bpy42 test-bpy45 test-bpy50 test-bpy52: test-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/$(BIN)/python $(PYTEST) tests/bpy
 
 test-extras: .venv-extras/ready
@@ -183,6 +186,7 @@ bench: .venv-bench/ready
 	$(make-environment)
 .venv-wheel-%/ready: tools/requirements/wheel.txt
 	$(make-environment)
+.venv-bpy52/ready: PYTHON = $(PYTHON313)
 .venv/ready:
 	$(make-environment)
 

@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
-#: Oldest version, and the only one for which PyPI has Blender's module.
-REQUIRED_VERSION = (3, 11)
+#: Oldest version.
+OLDEST_VERSION = (3, 11)
+
+#: The first version of Blender's module for each version of Python, newest first. PyPI has each version
+#: of the module for one version of Python.
+BPY_VERSIONS = {(5, 1): (3, 13), (4, 2): (3, 11)}
 
 
 def main() -> int:
     """Check this interpreter against a file of requirements."""
-    needs_bpy = any(line.startswith("bpy") for line in Path(sys.argv[1]).read_text().splitlines())
     version = sys.version_info[:2]
-    version_text = ".".join(map(str, version))
-    if needs_bpy and version != REQUIRED_VERSION:
+    required = _version_for_bpy(Path(sys.argv[1]).read_text())
+    if required is not None and version != required:
         print(
-            f"PyPI has no bpy for Python {version_text}, only for 3.11: make PYTHON=/path/to/python3.11"
+            f"PyPI has this bpy for Python {_text(required)} alone, not for {_text(version)}: "
+            f"name one with make {'PYTHON' if required == OLDEST_VERSION else 'PYTHON313'}="
+            f"/path/to/python{_text(required)}"
         )
         return 1
-    if version < REQUIRED_VERSION:
+    if version < OLDEST_VERSION:
         print(
-            f"Python {version_text} is too old, 3.11 is required: make PYTHON=/path/to/python3.11"
+            f"Python {_text(version)} is too old, {_text(OLDEST_VERSION)} is required: "
+            f"make PYTHON=/path/to/python{_text(OLDEST_VERSION)}"
         )
         return 1
     return 0
+
+
+def _version_for_bpy(requirements: str) -> tuple[int, int] | None:
+    """Return the version of Python that the required bpy is for; None if there is none."""
+    match = re.search(r"^bpy==(\d+)\.(\d+)", requirements, re.MULTILINE)
+    if match is None:
+        return None
+    bpy_version = int(match[1]), int(match[2])
+    return next(python for bpy, python in BPY_VERSIONS.items() if bpy_version >= bpy)
+
+
+def _text(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
 
 
 if __name__ == "__main__":

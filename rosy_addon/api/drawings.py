@@ -34,6 +34,14 @@ class Drawing:
     strokes : rosyfields.line_drawing.pipeline.StrokeDrawing
     camera : rosyfields.projection.camera.Camera
     pen : rosyfields.line_drawing.svg.Pen
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> drawing = rf.strokes(rf.Surface("torus.obj"), size=(100, 100), spacing=12)
+    >>> drawing.save("torus.svg")
+    >>> drawing.polylines[0].shape[1]
+    3
     """
 
     def __init__(self, strokes: StrokeDrawing, camera: Camera, pen: Pen) -> None:

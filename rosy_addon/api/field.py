@@ -81,6 +81,18 @@ class Field:
         On whose faces the field is.
     rosy : rosyfields.field.rosy_field.RosyField
         The field as the other modules of the package use it.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> field = rf.smoothest(torus)
+    >>> int(field.singularities.index.sum()) == field.degree * torus.euler_characteristic
+    True
+    >>> round(field.difference(field.rotated(0.2)).mean, 6)
+    0.2
+    >>> field.to_degree(2)
+    <Field: 2-RoSy field on <Surface 'torus.obj': 288 faces, 288 vertices>>
     """
 
     def __init__(self, surface: Surface, rosy: RosyField) -> None:
@@ -251,6 +263,14 @@ def from_vectors(
     RosyError
         If their number fits neither faces nor vertices, a vector is not finite, or vectors do not lie
         on the surface.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> wind = rf.from_vectors(torus, torus.face_frames[0], degree=1)
+    >>> wind.degree
+    1
     """
     array = np.asarray(vectors, dtype=np.float64)
     source = f"{surface.name}: vectors"
@@ -276,6 +296,15 @@ def from_angles(
     ------
     RosyError
         If there is not one angle for each face, or one is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> field = rf.from_angles(torus, np.full(torus.face_count, np.pi / 8), degree=4)
+    >>> bool(np.allclose(field.angles, np.pi / 8))
+    True
     """
     degree = check_degree(degree)
     values = np.asarray(angles, dtype=np.float64)
@@ -333,6 +362,16 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
     ------
     RosyError
         As `from_vectors`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> x, y = torus.face_frames
+    >>> field = rf.from_directions(torus, np.stack([x, x + y, -x, -x - y], axis=1))
+    >>> field.degree, field.is_rosy
+    (4, False)
     """
     array = np.asarray(directions, dtype=np.float64)
     if array.ndim != 3 or array.shape[2] != 3:
@@ -359,6 +398,15 @@ def from_tensors(surface: Surface, tensors: ArrayLike, *, nonfinite: str = "erro
     ------
     RosyError
         If there is not one tensor for each face, or one is not finite.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> x, y = torus.face_frames
+    >>> stress = 3 * x[:, :, None] * x[:, None] + y[:, :, None] * y[:, None]
+    >>> rf.from_tensors(torus, stress).degree
+    4
     """
     array = np.array(tensors, dtype=np.float64)
     if array.shape != (surface.face_count, 3, 3):
@@ -453,6 +501,14 @@ def read_field(
     ------
     RosyError
         If the file cannot be read, or does not fit the surface.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> rf.smoothest(torus, degree=6).save("torus.rosy")
+    >>> rf.read_field("torus.rosy", torus).degree
+    6
     """
     loaded = load_field(path, surface.mesh, degree, nonfinite, mesh=mesh)
     warn(loaded.note)

@@ -30,6 +30,13 @@ def form(surface: Surface, degree: int = 4) -> Field:
     ------
     RosyError
         If the degree is not supported, or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> rf.form(torus)
+    <Field: 4-RoSy field on <Surface 'torus.obj': 288 faces, 288 vertices>>
     """
     return _generated(surface, GeneratorSettings("form"), degree)
 
@@ -83,6 +90,14 @@ def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field
     ------
     RosyError
         If the degree is odd or not supported, or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> field = rf.curvature(torus, degree=2, reach=0.02)
+    >>> field.degree
+    2
     """
     return _generated(surface, GeneratorSettings("curvature", smoothing_length=reach), degree)
 
@@ -110,6 +125,13 @@ def features(
     ------
     RosyError
         If there is no such edge.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> rf.features(torus, edges=torus.faces[:24, :2]).degree
+    4
     """
     settings = GeneratorSettings(
         "features", sharp_angle=sharp_angle, edges=None if edges is None else np.asarray(edges)
@@ -198,6 +220,14 @@ def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree
     ------
     RosyError
         If the axis is not a direction.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> field = rf.along_axis(torus, (0, 1, 0), degree=1)
+    >>> float(field.magnitude.max()) <= 1
+    True
     """
     x, y, z = (float(component) for component in axis)
     return _generated(surface, GeneratorSettings("axis", axis=(x, y, z)), degree)
@@ -210,6 +240,13 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
     ------
     RosyError
         If the surface has no UV map.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> rf.along_uv(torus).degree
+    4
     """
     return _generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
 

@@ -61,6 +61,15 @@ class Picture:
     ----------
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied, the bottom row first.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rosyfields as rf
+    >>> picture = rf.render(rf.Surface("torus.obj"), size=(64, 48))
+    >>> np.asarray(picture).shape
+    (48, 64, 4)
+    >>> picture.save("torus.png")
     """
 
     def __init__(self, rgba: NDArray[np.float32]) -> None:
@@ -267,6 +276,13 @@ def turntable(
     ------
     RosyError
         As `render`, or if the video cannot be written.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> rf.turntable(torus, path="torus.gif", pictures=2, size=(32, 32)).name
+    'torus.gif'
     """
     path = Path(path)
     check_video_path(path)

@@ -28,6 +28,21 @@ def run(*command, folder, env=ENVIRONMENT) -> subprocess.CompletedProcess[str]:
     )
 
 
+def write_torus(path: Path) -> None:
+    """Write the torus of the examples: 24 x 12 quads around the z axis, with texture coordinates."""
+    u, v = np.meshgrid(np.arange(24) / 24, np.arange(12) / 12, indexing="ij")
+    ring, tube = 2 * np.pi * u, 2 * np.pi * v
+    radius = 1 + 0.4 * np.cos(tube)
+    points = np.stack([radius * np.cos(ring), radius * np.sin(ring), 0.4 * np.sin(tube)], axis=-1)
+    corner = np.arange(1, 24 * 12 + 1).reshape(24, 12)
+    right, up = np.roll(corner, -1, axis=0), np.roll(corner, -1, axis=1)
+    quads = np.stack([corner, right, np.roll(right, -1, axis=1), up], axis=-1).reshape(-1, 4)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points.reshape(-1, 3)]
+    lines += [f"vt {x:.6f} {y:.6f}" for x, y in zip(u.ravel(), v.ravel(), strict=True)]
+    lines += ["f " + " ".join(f"{vertex}/{vertex}" for vertex in quad) for quad in quads]
+    path.write_text("\n".join(lines) + "\n")
+
+
 def write_sphere(path: Path) -> None:
     """Write an ellipsoid of quads and triangles with a UV map, as ``.obj`` or ``.off``."""
     rings, segments = 12, 24

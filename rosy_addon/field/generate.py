@@ -146,7 +146,7 @@ def generate_task(
     if settings.kind == "curvature":
         split = 0.4 if settings.smoothing_length else 1.0
         field = yield from subtask(curvature_task(surface, degree), 0.0, split)
-        if not settings.smoothing_length:
+        if not settings.smoothing_length or not field.vectors.any():
             return field
         # The extent is zero if all faces are points; then so is the magnitude.
         length = max(settings.smoothing_length * surface.extent, TINY)

@@ -63,6 +63,15 @@ def add_turntable_command(subparsers: Any, extras: Extras) -> None:
         metavar="N",
         help="pictures in a full turn (%(default)d)",
     )
+    add_rate_option(parser)
+    add_view_options(parser, DEFAULT_VIDEO_SIZE)
+    add_workers_option(parser)
+    add_look_options(parser)
+    add_tone_options(parser)
+
+
+def add_rate_option(parser: argparse.ArgumentParser) -> None:
+    """Add --rate, of a video."""
     parser.add_argument(
         "--rate",
         type=float_between(0.1, 1000.0),
@@ -70,10 +79,6 @@ def add_turntable_command(subparsers: Any, extras: Extras) -> None:
         metavar="N",
         help="pictures per second (%(default)g)",
     )
-    add_view_options(parser, DEFAULT_VIDEO_SIZE)
-    add_workers_option(parser)
-    add_look_options(parser)
-    add_tone_options(parser)
 
 
 def run_turntable(options: argparse.Namespace) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
 from ..cli.look import add_look_options, requested_preset, requested_settings
-from ..cli.options import add_subcommand, add_workers_option, check_output, float_between
-from ..cli.render import video_encoder
+from ..cli.options import add_subcommand, add_workers_option, check_output
+from ..cli.render import add_rate_option, video_encoder
 from ..cli.streams import print_line
 from ..cli.view import add_view_options, requested_size
 from ..compositor.look import Look
@@ -60,13 +60,7 @@ def add_film_command(subparsers: Any) -> None:
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
     )
-    parser.add_argument(
-        "--rate",
-        type=float_between(0.1, 1000.0),
-        default=24.0,
-        metavar="N",
-        help="steps per second (%(default)g)",
-    )
+    add_rate_option(parser)
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_workers_option(parser)
     add_look_options(parser)

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +16,12 @@ from ..errors import RosyError, RosyWarning, counted
 from ..field.formats.obj import read_uv
 from ..field.formats.ply import read_vertex_values
 from ..field.formats.polygons import offsets_from_sizes
-from ..field.mesh_io import READERS, SHARP_ANGLE, read_mesh
+from ..field.mesh_io import READERS, SHARP_ANGLE, read_polygons_task
 from ..field.representation import face_frames
 from ..field.singularities import euler_characteristic
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import build_surface
+from ..progress import run_to_completion
 from ..rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .mesh_objects import MeshArrays, arrays_of
 
@@ -96,35 +97,30 @@ class Surface:
         step: int | None = None,
     ) -> None:
         self._path = _path_of(vertices) if faces is None else None
-        simulation = _read_simulation(self._path, step)
-        given = MeshArrays()
-        default_up = "z"
-        if self._path is not None and simulation is None:
-            self.mesh: PolygonMesh = read_mesh(self._path, sharp_angle, sharp_edges)
-            default_up = UP_AXIS_BY_SUFFIX[self._path.suffix.lower()]
-        else:
-            if simulation is not None:
-                vertices = simulation.arrays
-                name = simulation.name if name is None else name
-            name = "surface" if name is None else name
-            given = (
-                arrays_of(vertices, name) if faces is None else MeshArrays(vertices, *_flat(faces))
-            )
-            self.mesh = build_surface(
-                _positions(given.vertices, name),
-                given.corner_vertex,
-                given.face_start,
-                name=name,
-                sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
-                sharp_edges=sharp_edges,
-            )
-        self.name = self.mesh.name if name is None else name
-        self.up = default_up if up is None else up
+        suffix = "" if self._path is None else self._path.suffix.lower()
+        self.name = name or ("surface" if self._path is None else str(self._path))
+        self.up = up or UP_AXIS_BY_SUFFIX.get(suffix, "z")
         if self.up not in UP_AXIS_MATRIX:
             raise RosyError(f"{self.name}: up is {self.up!r}: choose 'y' or 'z'")
-        uv = given.uv if uv is None else uv
+        if step is not None and suffix in ("", *READERS):
+            raise RosyError(f"{self.name}: step applies only to files of simulations, such as .vtu")
+        if self._path is not None:
+            arrays = _read_arrays(self._path, step)
+        elif faces is None:
+            arrays = arrays_of(vertices, self.name)
+        else:
+            arrays = MeshArrays(vertices, *_flat(faces))
+        self.mesh: PolygonMesh = build_surface(
+            _positions(arrays.vertices, self.name),
+            arrays.corner_vertex,
+            arrays.face_start,
+            name=self.name,
+            sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
+            sharp_edges=sharp_edges,
+        )
+        uv = arrays.uv if uv is None else uv
         self._uv = None if uv is None else self._corner_values(uv, "uv", 2)
-        self._vertex_data, self._face_data = given.vertex_data, given.face_data
+        self._vertex_data, self._face_data = arrays.vertex_data, arrays.face_data
 
     def __repr__(self) -> str:
         counts = (
@@ -211,40 +207,34 @@ def _path_of(mesh: Any) -> Path | None:
     return Path(mesh) if isinstance(mesh, (str, os.PathLike)) else None
 
 
-class _Simulation(NamedTuple):
-    """The mesh in the file of a simulation, and its name."""
+def _read_arrays(path: Path, step: int | None) -> MeshArrays:
+    """Read a mesh file or, in the Python package, the file of a simulation.
 
-    arrays: MeshArrays
-    name: str
-
-
-def _read_simulation(path: Path | None, step: int | None) -> _Simulation | None:
-    """Read the file of a simulation, and issue a `RosyWarning` if it is one step of several.
-
-    Returns
-    -------
-    _Simulation or None
-        None if there is no path, if it is that of a plain mesh file, and in the extension for Blender.
+    If it is one step of several, issue a `RosyWarning` that says so.
     """
-    if path is None or path.suffix.lower() in READERS:
-        if step is not None:
-            where = "" if path is None else f"{path}: "
-            raise RosyError(f"{where}step applies only to files of simulations, such as .vtu")
-        return None
-    try:
-        from ..external.simulation_files import SUFFIXES, read_simulation
-    except ImportError:  # the extension for Blender
-        return None
-    if path.suffix.lower() not in SUFFIXES:
-        *suffixes, last = (*READERS, *SUFFIXES)
+    if path.suffix.lower() in READERS:
+        return MeshArrays(*run_to_completion(read_polygons_task(path)))
+    simulation_suffixes = _simulation_suffixes()
+    if path.suffix.lower() not in simulation_suffixes:
+        *suffixes, last = (*READERS, *simulation_suffixes)
         raise RosyError(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
+    from ..external.simulation_files import read_simulation
+
     mesh = read_simulation(path, step)
     if mesh.note:
         warnings.warn(mesh.note, RosyWarning, stacklevel=3)
-    arrays = MeshArrays(*mesh.polygons, None, mesh.point_arrays, mesh.cell_arrays)
-    return _Simulation(arrays, mesh.name)
+    return MeshArrays(*mesh.polygons, None, mesh.point_arrays, mesh.cell_arrays)
+
+
+def _simulation_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of the files of simulations: none in the extension for Blender."""
+    try:
+        from ..external.simulation_files import SUFFIXES
+    except ImportError:
+        return ()
+    return SUFFIXES
 
 
 def _flat(

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import RosyError
 from ..file_io import check_parsing_memory
@@ -36,37 +35,24 @@ BINARY_MEMORY = {".ply": 20, ".stl": 10}
 SHARP_ANGLE = np.radians(60)
 
 
-def read_mesh(
-    path: str | os.PathLike[str],
-    sharp_angle: float | None = None,
-    sharp_edges: ArrayLike | None = None,
-) -> Surface:
+def read_mesh(path: str | os.PathLike[str]) -> Surface:
     """Read a mesh from a file; see `read_mesh_task`.
 
     Examples
     --------
     >>> surface = read_mesh("bunny.obj")
     """
-    return run_to_completion(read_mesh_task(path, sharp_angle, sharp_edges))
+    return run_to_completion(read_mesh_task(path))
 
 
-def read_mesh_task(
-    path: str | os.PathLike[str],
-    sharp_angle: float | None = None,
-    sharp_edges: ArrayLike | None = None,
-) -> Task[Surface]:
+def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
     """Read a mesh from an .obj, .off, .ply or .stl file.
 
-    Vertices and faces keep the order of the file, because field files refer to them by number.
-    Equal corners of an .stl file are merged into one vertex.
+    Edges with an angle above `SHARP_ANGLE` are sharp.
 
     Parameters
     ----------
     path : path-like
-    sharp_angle : float, optional
-        Edges with a larger angle, in radians, are sharp. By default `SHARP_ANGLE`.
-    sharp_edges : (E, 2) array_like of int, optional
-        Pairs of vertices, further sharp edges.
 
     Returns
     -------
@@ -76,8 +62,32 @@ def read_mesh_task(
     Raises
     ------
     RosyError
-        If the file is missing, has another extension, is malformed or truncated, needs more memory
-        than there is, or is not a mesh with faces. The message names the file and, in text files, the line.
+        As of `read_polygons_task`, or if the file is not a mesh with faces.
+    """
+    polygons = yield from subtask(read_polygons_task(path), 0.0, 0.5)
+    task = surface_task(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
+    return (yield from subtask(task, 0.5, 1.0))
+
+
+def read_polygons_task(path: str | os.PathLike[str]) -> Task[Polygons]:
+    """Read the polygons of an .obj, .off, .ply or .stl file.
+
+    Vertices and faces keep the order of the file, because field files refer to them by number.
+    Equal corners of an .stl file are merged into one vertex.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    Polygons
+
+    Raises
+    ------
+    RosyError
+        If the file is missing, has another extension, is malformed or truncated, or needs more memory
+        than there is. The message names the file and, in text files, the line.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -87,7 +97,4 @@ def read_mesh_task(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
-    polygons = yield from subtask(reader(path), 0.0, 0.5)
-    sharp_angle = SHARP_ANGLE if sharp_angle is None else sharp_angle
-    task = surface_task(*polygons, name=str(path), sharp_angle=sharp_angle, sharp_edges=sharp_edges)
-    return (yield from subtask(task, 0.5, 1.0))
+    return (yield from reader(path))

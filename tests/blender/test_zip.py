@@ -141,9 +141,12 @@ def test_calls_paths_and_texts(sources):
 
 
 def test_packages_have_only_docstrings(sources):
-    """What a package imports at once would be loaded even if it is not used."""
+    """What a package imports at once would be loaded even if it is not used.
+
+    The package `api` is loaded when one of its names is used, and is there for them.
+    """
     for name, tree in sources.items():
-        if name.endswith("/__init__.py"):
+        if name.endswith("/__init__.py") and name != "api/__init__.py":
             assert len(tree.body) == 1 and ast.get_docstring(tree), name
 
 

@@ -373,8 +373,9 @@ CATEGORIES = {
     "kills": Category(_kill_case, share=1),
 }
 if importlib.util.find_spec("bpy") is not None:
+    # A case with Blender takes as long as twenty others.
     CATEGORIES |= {
-        "scenes": Category(_from_scenes("scene_case")),
-        "animations": Category(_from_scenes("animation_case"), share=2),
+        "scenes": Category(_from_scenes("scene_case"), share=3),
+        "animations": Category(_from_scenes("animation_case"), share=1),
         "scene-kills": Category(_from_scenes("scene_kill_case"), share=1),
     }

@@ -38,10 +38,7 @@ class Tips:
     @staticmethod
     def empty() -> Tips:
         """Return no tips."""
-        particles = SurfaceParticles(
-            np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, complex), np.empty(0)
-        )
-        return Tips(particles, np.empty(0, np.int32), np.empty(0), np.empty(0))
+        return Tips(SurfaceParticles.empty(), np.empty(0, np.int32), np.empty(0), np.empty(0))
 
     def __len__(self) -> int:
         return len(self.stroke)
@@ -94,17 +91,15 @@ class StrokeSegments(NamedTuple):
     direction: np.ndarray
 
     @staticmethod
-    def of_tips(tips: Tips, path: TracedPath, accepted: np.ndarray) -> StrokeSegments:
-        """Return the segments of a path that were traced by accepted tips, given as (n,) bool."""
-        keep = accepted[path.particle]
-        tip = path.particle[keep]
+    def of_tips(tips: Tips, path: TracedPath) -> StrokeSegments:
+        """Return the segments that tips have traced."""
         return StrokeSegments(
-            tips.stroke[tip],
-            tips.particles.sign[tip].astype(np.int8),
-            path.triangle[keep],
-            path.begin_weights[keep],
-            path.end_weights[keep],
-            path.direction[keep],
+            tips.stroke[path.particle],
+            tips.particles.sign[path.particle].astype(np.int8),
+            path.triangle,
+            path.begin_weights,
+            path.end_weights,
+            path.direction,
         )
 
 
@@ -187,7 +182,10 @@ class GrowingStrokes(ColumnTable):
     def extend(
         self, stroke: np.ndarray, end: np.ndarray, arc: np.ndarray, sample: np.ndarray
     ) -> None:
-        """Extend n ends to new samples at the given signed arc lengths."""
+        """Extend n ends to new samples at the given signed arc lengths.
+
+        The samples of one end are in order, so that the last one is the new end.
+        """
         self.end_sample[stroke, end] = sample
         np.maximum.at(self.max_arc, stroke, arc)
         np.minimum.at(self.min_arc, stroke, arc)

@@ -5,6 +5,7 @@ Only samples of the same family are compared. Distances are measured on the surf
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -69,7 +70,11 @@ class _Pairs(NamedTuple):
 
 
 def find_lateral_neighbors(
-    samples: StrokeSamples, sample: np.ndarray, min_separation: float, max_gap: float
+    samples: StrokeSamples,
+    sample: np.ndarray,
+    min_separation: float,
+    max_gap: float,
+    previous: np.ndarray | None = None,
 ) -> LateralNeighbors:
     """Compare samples with all nearby samples of the same family.
 
@@ -80,6 +85,10 @@ def find_lateral_neighbors(
         Numbers of the samples that are compared.
     min_separation, max_gap : float
         In spacings, as in `SeparationRules`.
+    previous : (n,) ndarray of int, optional
+        For the samples that were added last, sorted by step: index into `sample` of the sample before
+        this one at the same end of a stroke, or -1. Then a sample is compared only with samples of
+        its step and before, and it is rejected if the previous one is.
     """
     pairs = _comparable_pairs(samples, sample)
     spacing = (samples.spacing[pairs.sample] + samples.spacing[pairs.neighbor]) / 2
@@ -90,25 +99,122 @@ def find_lateral_neighbors(
         max(min_separation, 1e-3) / HEAD_ON_DISTANCE
     )
     distance = np.sqrt(lateral * lateral + forward_excess * forward_excess)
-    too_near = _is_older(samples, pairs) & (distance < min_separation * spacing)
-    rejected = np.zeros(len(sample), dtype=bool)
-    rejected[pairs.query[too_near]] = True
+    too_near = np.flatnonzero(_is_older(samples, pairs) & (distance < min_separation * spacing))
+    near_query, near_neighbor = pairs.query[too_near], pairs.neighbor[too_near]
 
     beside = np.abs(dot(pairs.offset, pairs.sample_frame[:, 2])) <= LATERAL_WINDOW * spacing
     beside = np.flatnonzero(beside & (lateral < SEARCH_RADIUS * spacing))
     lateral_gap = (lateral / spacing).take(beside)
     pairs = _Pairs(*(column.take(beside, axis=0) for column in pairs))
-    sample_side = (_left_component(pairs.offset, pairs.sample_frame) > 0).astype(np.intp)
+    side = (_left_component(pairs.offset, pairs.sample_frame) > 0).astype(np.intp)
     neighbor_side = (_left_component(pairs.offset, pairs.neighbor_frame) < 0).astype(np.intp)
-    gap = np.full((len(sample), 2), np.inf)
-    np.minimum.at(gap, (pairs.query, sample_side), lateral_gap)
-    yielded = ~rejected & ((gap > max_gap) & (gap < MAX_COVERED_GAP)).any(axis=1)
-    rejected |= yielded
-    covers = (lateral_gap < MAX_COVERED_GAP) & ~rejected[pairs.query]
+    covers = lateral_gap < MAX_COVERED_GAP
+    if previous is None:
+        gap, yielded, rejected = _judge(
+            len(sample), near_query, pairs.query, side, lateral_gap, max_gap
+        )
+    else:
+
+        def among(neighbor: np.ndarray) -> np.ndarray:
+            return np.maximum(neighbor - sample[0], -1) if len(sample) else neighbor
+
+        gap, yielded, rejected = _judge_in_order(
+            samples.step[sample],
+            previous,
+            (near_query, among(near_neighbor)),
+            (pairs.query, among(pairs.neighbor), side, lateral_gap),
+            max_gap,
+        )
+        covers &= ~np.append(rejected, False)[among(pairs.neighbor)]
+    covers &= ~rejected[pairs.query]
     covering = CoveringPairs(
-        *(column[covers] for column in (pairs.sample, pairs.neighbor, sample_side, neighbor_side))
+        *(column[covers] for column in (pairs.sample, pairs.neighbor, side, neighbor_side))
     )
     return LateralNeighbors(gap, rejected, yielded, covering)
+
+
+def _judge(
+    count: int,
+    near_query: np.ndarray,
+    query: np.ndarray,
+    side: np.ndarray,
+    lateral_gap: np.ndarray,
+    max_gap: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `gap`, `yielded` and `rejected` of `LateralNeighbors` for `count` samples.
+
+    Parameters
+    ----------
+    count : int
+    near_query : (k,) ndarray of int
+        Samples that are too near to an older one.
+    query, side, lateral_gap : (m,) ndarray
+        Samples beside another, the side of the other, and its distance in spacings.
+    max_gap : float
+    """
+    gap = np.full((count, 2), np.inf)
+    np.minimum.at(gap, (query, side), lateral_gap)
+    rejected = np.zeros(count, dtype=bool)
+    rejected[near_query] = True
+    yielded = ~rejected & ((gap > max_gap) & (gap < MAX_COVERED_GAP)).any(axis=1)
+    return gap, yielded, rejected | yielded
+
+
+def _judge_in_order(
+    step: np.ndarray,
+    previous: np.ndarray,
+    near: tuple[np.ndarray, np.ndarray],
+    beside: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    max_gap: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Do the same as `_judge` for samples that were added together, one step after another.
+
+    Samples that follow a rejected one are rejected too, and others are not compared with them.
+
+    Parameters
+    ----------
+    step, previous : (n,) ndarray of int
+        See `find_lateral_neighbors`.
+    near : tuple of (k,) ndarray
+        Samples and their older neighbors that are too near; -1 for a neighbor that is not among the
+        samples.
+    beside : tuple of (m,) ndarray
+        Samples, neighbors beside them, sides and distances in spacings.
+    max_gap : float
+    """
+    near, beside = (
+        tuple(column[order] for column in columns)
+        for columns in (near, beside)
+        for order in (np.argsort(columns[0], kind="stable"),)
+    )
+    # The last entry is for number -1.
+    exists = np.ones(len(step) + 1, dtype=bool)
+    gap, yielded = np.full((len(step), 2), np.inf), np.zeros(len(step), dtype=bool)
+    starts = np.searchsorted(step, np.arange(step[0], step[-1] + 2)) if len(step) else [0]
+    for first, end in pairwise(starts):
+        rows = slice(first, end)
+        exists[rows] = exists[previous[rows]]
+        near_query, near_neighbor = _rows_of(near, first, end)
+        query, neighbor, side, lateral_gap = _rows_of(beside, first, end)
+        is_near = exists[near_neighbor]
+        is_beside = (neighbor < end) & exists[neighbor]
+        gap[rows], yielded[rows], rejected = _judge(
+            end - first,
+            near_query[is_near] - first,
+            query[is_beside] - first,
+            side[is_beside],
+            lateral_gap[is_beside],
+            max_gap,
+        )
+        yielded[rows] &= exists[rows]
+        exists[rows] &= ~rejected
+    return gap, yielded, ~exists[:-1]
+
+
+def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.ndarray, ...]:
+    """Return the rows of columns whose first column, which is sorted, is from `first` to `end` - 1."""
+    rows = slice(*np.searchsorted(columns[0], (first, end)))
+    return tuple(column[rows] for column in columns)
 
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:

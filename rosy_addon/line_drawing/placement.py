@@ -24,14 +24,25 @@ from ..progress import Progress, Task
 from .directional_spacing import CornerSpacing
 from .growing_strokes import GrowingStrokes, StrokeSegments, Tips
 from .lateral_neighbors import find_lateral_neighbors
+from .path_samples import PathSamples, SampledPath
 from .samples import SAMPLE_STEP, StrokeSamples
 from .seeding import lateral_seeds, longest_open_runs
 from .separation_rules import SeparationRules
-from .surface_particles import SurfaceParticles, TracedPath, advance
+from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
 
 #: If a step is rejected, a tip tries half of it, as long as this fraction of a full step is left.
 MIN_STEP_SCALE = 0.2
+
+#: Largest number of samples by which a tip grows at once after its step was shortened. It is about to
+#: end, and what is traced beyond the end is lost.
+MAX_RETRIED_SAMPLES = 2
+
+#: Largest number of samples along a segment, so that widths and tones at its ends describe it.
+SAMPLES_PER_SEGMENT = 2
+
+#: Segments that a tip may trace at once: for each sample, and at least.
+SEGMENTS_PER_SAMPLE, MIN_SEGMENTS = 2, 16
 
 #: A tip has moved if its path and the chord of its path are longer than this fraction of the step.
 MIN_MOVED_RATIO = 0.02
@@ -82,65 +93,97 @@ class StreamlinePlacer:
 
     # --- growing ----------------------------------------------------------------------------------
 
-    def step(self) -> None:
-        """Advance all tips by one sample. Tips that cannot advance end."""
+    def grow(self, sample_count: int = 1) -> None:
+        """Advance all tips by up to `sample_count` samples. Tips that cannot advance end.
+
+        Samples are accepted as if all tips advanced by one at a time. Tips whose step is shortened
+        advance by at most `MAX_RETRIED_SAMPLES`.
+        """
         samples, strokes, tips = self.samples, self.strokes, self.tips
-        samples.begin_step()
-        particles, arc, has_moved, ended, path = self._advance_tips()
-        moving = np.flatnonzero(has_moved)
-        sample = samples.add(particles.take(moving), tips.stroke[moving], arc[moving])
+        path, traced, ended = self._trace_samples(sample_count)
+        tip, tip_count = traced.particle, len(tips)
+        stroke, arc = tips.stroke[tip], tips.arc[tip] + traced.position.sign * traced.arc
+        sample = samples.add(traced.position, stroke, arc, samples.next_steps(traced.rank))
         neighbors = find_lateral_neighbors(
-            samples, sample, self.rules.min_separation, self.rules.max_gap
+            samples, sample, self.rules.min_separation, self.rules.max_gap, traced.previous
         )
         samples.remove(sample[neighbors.rejected])
         samples.mark_covered(neighbors.covering)
-        accepted_sample = sample[~neighbors.rejected]
-        samples.add_open_sides(accepted_sample)
+        accepted = np.flatnonzero(~neighbors.rejected)
+        samples.add_open_sides(sample[accepted])
+        strokes.extend(stroke[accepted], tips.end[tip[accepted]], arc[accepted], sample[accepted])
+        traced_count = np.bincount(tip, minlength=tip_count)
+        strokes.end_yielded[tips.stroke, tips.end] &= traced_count == 0
+        yielding = tip[neighbors.yielded]
+        strokes.end_yielded[tips.stroke[yielding], tips.end[yielding]] = True
 
-        accepted, rejected = np.zeros((2, len(tips)), dtype=bool)
-        accepted[moving[~neighbors.rejected]] = True
-        rejected[moving[neighbors.rejected]] = True
-        self.segments.append(StrokeSegments.of_tips(tips, path, accepted))
-        strokes.extend(tips.stroke[accepted], tips.end[accepted], arc[accepted], accepted_sample)
-        strokes.end_yielded[tips.stroke[moving], tips.end[moving]] = neighbors.yielded
-
+        # Tips go on from their last accepted sample. If the next one was rejected, they try half of
+        # the step.
+        last = np.full(tip_count, -1)
+        last[tip[accepted]] = accepted
+        rejected = traced_count > np.bincount(tip[accepted], minlength=tip_count)
+        moved = np.flatnonzero(last >= 0)
+        walked = np.zeros(tip_count)
+        walked[moved] = traced.arc[last[moved]]
+        self.segments.append(StrokeSegments.of_tips(tips, path.cut(walked)))
+        tips.particles.assign(moved, traced.position.take(last[moved]))
+        tips.arc += tips.particles.sign * walked
         tips.step_scale[rejected] /= 2
         ended = np.where(rejected, tips.step_scale < MIN_STEP_SCALE, ended)
         max_length = self.rules.max_length * strokes.spacing[tips.stroke]
         ended |= strokes.length(tips.stroke) > max_length
         self._finish_tips(tips.take(np.flatnonzero(ended)))
-        # Rejected tips try again from where they were.
-        rejected_tips = np.flatnonzero(rejected)
-        particles.assign(rejected_tips, tips.particles.take(rejected_tips))
-        arc = np.where(rejected, tips.arc, arc)
-        self.tips = Tips(particles, tips.stroke, arc, tips.step_scale).take(np.flatnonzero(~ended))
+        self.tips = tips.take(np.flatnonzero(~ended))
 
-    def _advance_tips(
-        self,
-    ) -> tuple[SurfaceParticles, np.ndarray, np.ndarray, np.ndarray, TracedPath]:
-        """Trace the next step of all tips, without comparing them with strokes.
+    def _trace_samples(self, sample_count: int) -> tuple[SampledPath, PathSamples, np.ndarray]:
+        """Trace the next samples of all tips, without comparing them with strokes.
 
         Returns
         -------
-        particles : SurfaceParticles
-            Positions after the step.
-        arc : (n,) float64 ndarray
-            Signed arc lengths after the step.
-        has_moved, ended : (n,) bool ndarray
-            Whether the tip has moved, and whether it cannot continue.
-        path : TracedPath
+        path : SampledPath
+        traced : PathSamples
+            The particles are the tips.
+        ended : (n,) bool ndarray
+            Whether a tip cannot continue after its last sample.
         """
-        mesh, tips = self.mesh, self.tips
-        length = SAMPLE_STEP * self.samples.spacing_at(tips.particles) * tips.step_scale
-        particles, walked, ended, path = advance(mesh, tips.particles, length)
-        has_moved = walked > MIN_MOVED_RATIO * length
-        chord = mesh.points_at(particles.triangle, particles.weights) - mesh.points_at(
-            tips.particles.triangle, tips.particles.weights
+        mesh, tips, strokes = self.mesh, self.tips, self.strokes
+        step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips.particles)
+        # Both tips of a stroke may grow by all of the length that is left.
+        left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
+        count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
+        count = np.minimum(count, 1 + np.maximum(left / (2 * step), 0)).astype(np.intp)
+        max_segments = max(MIN_SEGMENTS, SEGMENTS_PER_SAMPLE * int(count.max()))
+        _, _, ended, path = advance(
+            mesh,
+            tips.particles,
+            count * step,
+            max_segment_length=SAMPLES_PER_SEGMENT * step,
+            max_segments=max_segments,
         )
+        path = SampledPath(path, tips.particles.sign)
+
+        def next_step(position: SurfaceParticles, tip: np.ndarray) -> np.ndarray:
+            return SAMPLE_STEP * tips.step_scale[tip] * self.samples.spacing_at(position)
+
+        traced = path.samples(step, next_step, ended)
         # In sliver triangles, a particle may walk without a change of position.
-        has_moved &= dot(chord, chord) > (MIN_MOVED_RATIO * length) ** 2
-        arc = tips.arc + tips.particles.sign * walked
-        return particles, arc, has_moved, ended | ~has_moved, path
+        start = mesh.points_at(tips.particles.triangle, tips.particles.weights)
+        points = mesh.points_at(traced.position.triangle, traced.position.weights)
+        is_first = traced.previous < 0
+        chord = points - np.where(
+            is_first[:, None], start[traced.particle], points[traced.previous]
+        )
+        walked = traced.arc - np.where(is_first, 0, traced.arc[traced.previous])
+        least = MIN_MOVED_RATIO * step[traced.particle]
+        has_moved = (walked > least) & (dot(chord, chord) > least * least)
+        ended |= np.bincount(traced.particle, minlength=len(tips)) == 0
+        if not has_moved.all():
+            ended[traced.particle[~has_moved]] = True
+            table = np.ones((len(tips), int(traced.rank.max()) + 1), dtype=bool)
+            table[traced.particle, traced.rank] = has_moved
+            kept = np.logical_and.accumulate(table, axis=1)[traced.particle, traced.rank]
+            traced = traced.take(np.flatnonzero(kept))
+        return path, traced, ended
 
     def _finish_tips(self, tips: Tips) -> None:
         """End tips. Strokes without tips that are too short are dropped."""
@@ -222,9 +265,9 @@ class StreamlinePlacer:
             return np.zeros(0, dtype=bool)
         parent_side = np.full(count, -1) if parent_side is None else parent_side
         samples, strokes = self.samples, self.strokes
-        samples.begin_step()
         stroke = strokes.add(parent_side, samples.spacing_at(particles))
-        sample = samples.add(particles, stroke, np.zeros(count))
+        step = samples.next_steps(np.zeros(count, dtype=np.int32))
+        sample = samples.add(particles, stroke, np.zeros(count), step)
         strokes.set_seeds(stroke, sample)
         neighbors = find_lateral_neighbors(
             samples, sample, self.rules.min_separation, self.rules.max_gap

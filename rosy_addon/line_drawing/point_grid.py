@@ -6,6 +6,7 @@ and no query visits many cells.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -259,6 +260,7 @@ class PointGrid:
         return key & self.mask
 
 
+@cache
 def _ring_offsets(rings: int) -> np.ndarray:
     """Return (cells, 3) int64: the offsets of the cells within `rings` rings around a cell."""
     side = np.arange(-rings, rings + 1)

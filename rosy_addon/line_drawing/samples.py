@@ -161,11 +161,15 @@ class StrokeSamples(ColumnTable):
 
     # --- adding and removing ----------------------------------------------------------------------
 
-    def begin_step(self) -> None:
-        """Begin the next step of growth."""
-        self.current_step += 1
+    def next_steps(self, step: np.ndarray) -> np.ndarray:
+        """Begin the next steps of growth, numbered from 0 in `step`; return their numbers of all."""
+        first = self.current_step + 1
+        self.current_step = first + int(step.max(initial=0))
+        return first + step
 
-    def add(self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    def add(
+        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray, step: np.ndarray
+    ) -> np.ndarray:
         """Add samples at n particles.
 
         Parameters
@@ -174,13 +178,15 @@ class StrokeSamples(ColumnTable):
         stroke : (n,) ndarray of int
         arc : (n,) ndarray
             Signed arc lengths from the seeds.
+        step : (n,) ndarray of int
+            The steps of growth at which they are added; see `next_steps`.
 
         Returns
         -------
         (n,) ndarray of int
             Their numbers.
         """
-        sample = self._append_at(particles, stroke, arc)
+        sample = self._append_at(particles, stroke, arc, step)
         self.grid.add(self.position[sample], SEARCH_RADIUS * self.spacing[sample])
         return sample
 
@@ -193,14 +199,14 @@ class StrokeSamples(ColumnTable):
         """
         count = self.count
         try:
-            yield self._append_at(
-                particles, np.full(len(particles), -1, np.int32), np.zeros(len(particles))
-            )
+            minus_one = np.full(len(particles), -1, dtype=np.int32)
+            step = np.full(len(particles), self.current_step)
+            yield self._append_at(particles, minus_one, np.zeros(len(particles)), step)
         finally:
             self.count = count
 
     def _append_at(
-        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray
+        self, particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray, step: np.ndarray
     ) -> np.ndarray:
         """Append rows for particles, without adding them to the grid."""
         mesh, triangle, weights = self.mesh, particles.triangle, particles.weights
@@ -222,7 +228,7 @@ class StrokeSamples(ColumnTable):
             spacing=self.spacing_at(particles),
             stroke=stroke,
             arc=arc,
-            step=np.full(len(triangle), self.current_step),
+            step=step,
             alive=np.ones(len(triangle), dtype=bool),
             side_neighbor=np.full((len(triangle), 2), -1),
             triangle=triangle,

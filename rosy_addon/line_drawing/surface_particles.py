@@ -7,7 +7,8 @@ at its midpoint (the midpoint rule) and is short enough that the field turns lit
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,8 @@ MAX_DIRECTION_ERROR, MAX_HALVINGS = np.radians(0.9), 5
 MAX_SEGMENTS = 32
 
 #: A particle is stuck if the turn of the field limits a segment to less than this fraction of the
-#: requested length.
-MIN_SEGMENT_RATIO = 0.004
+#: largest length of a segment.
+MIN_SEGMENT_RATIO = 0.002
 
 #: A direction is parallel to an edge if the slope of its barycentric coordinate is below this
 #: fraction of the largest slope.
@@ -52,31 +53,38 @@ class SurfaceParticles:
     member: np.ndarray
     sign: np.ndarray
 
+    @staticmethod
+    def empty() -> SurfaceParticles:
+        """Return no particles."""
+        return SurfaceParticles(
+            np.empty(0, np.int32), np.empty((0, 3)), np.empty(0, complex), np.empty(0)
+        )
+
     def __len__(self) -> int:
         return len(self.triangle)
 
     def take(self, indices: np.ndarray) -> SurfaceParticles:
         """Return a copy of some particles."""
-        return SurfaceParticles(*(getattr(self, entry.name)[indices] for entry in fields(self)))
+        return SurfaceParticles(*(column[indices] for column in self.columns))
+
+    @property
+    def columns(self) -> tuple[np.ndarray, ...]:
+        """The arrays, in the order of the attributes."""
+        return self.triangle, self.weights, self.member, self.sign
 
     def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
         """Overwrite the particles at `indices` with those of `source`."""
-        for entry in fields(self):
-            getattr(self, entry.name)[indices] = getattr(source, entry.name)
+        for column, values in zip(self.columns, source.columns, strict=True):
+            column[indices] = values
 
     @staticmethod
     def concatenate(first: SurfaceParticles, second: SurfaceParticles) -> SurfaceParticles:
         """Return both sets, one after the other."""
-        return SurfaceParticles(
-            *(
-                np.concatenate([getattr(first, entry.name), getattr(second, entry.name)])
-                for entry in fields(SurfaceParticles)
-            )
-        )
+        pairs = zip(first.columns, second.columns, strict=True)
+        return SurfaceParticles(*(np.concatenate(pair) for pair in pairs))
 
 
-@dataclass(frozen=True, eq=False)
-class TracedPath:
+class TracedPath(NamedTuple):
     """The m segments that particles have traced, in the order in which they were traced.
 
     Attributes
@@ -87,8 +95,10 @@ class TracedPath:
         Triangle of the segment.
     begin_weights, end_weights : (m, 3) float64 ndarray
         Barycentric coordinates of its ends in this triangle.
-    direction : (m,) complex128 ndarray
-        Unit direction in the frame of this triangle.
+    direction, member : (m,) complex128 ndarray
+        Unit direction, and the unit member that it follows, in the frame of this triangle.
+    length : (m,) float64 ndarray
+        In world space.
     """
 
     particle: np.ndarray
@@ -96,6 +106,12 @@ class TracedPath:
     begin_weights: np.ndarray
     end_weights: np.ndarray
     direction: np.ndarray
+    member: np.ndarray
+    length: np.ndarray
+
+    def take(self, indices: np.ndarray) -> TracedPath:
+        """Return some of the segments."""
+        return TracedPath(*(column[indices] for column in self))
 
 
 def advance(
@@ -103,6 +119,8 @@ def advance(
     particles: SurfaceParticles,
     length: np.ndarray,
     steering: np.ndarray | None = None,
+    max_segment_length: np.ndarray | None = None,
+    max_segments: int = MAX_SEGMENTS,
 ) -> tuple[SurfaceParticles, np.ndarray, np.ndarray, TracedPath]:
     """Move particles along the field.
 
@@ -114,14 +132,17 @@ def advance(
         Length to move, in world space.
     steering : (n,) float64 ndarray, optional
         Small angles in radians that are added to the direction of the field, counter-clockwise.
+    max_segment_length : (n,) float64 ndarray, optional
+        Largest length of a segment, in world space.
+    max_segments : int
+        Largest number of segments of a particle.
 
     Returns
     -------
     particles : SurfaceParticles
         The particles after the move.
     walked : (n,) float64 ndarray
-        Length that was moved. It is less than requested if a particle ended, or after
-        `MAX_SEGMENTS` segments.
+        Length that was moved. It is less than requested if a particle ended, or after `max_segments`.
     ended : (n,) bool ndarray
         Whether the particle cannot continue: at a border, at a crease or at a zero of the field.
     path : TracedPath
@@ -130,21 +151,22 @@ def advance(
     remaining = length.astype(np.float64).copy()
     ended = np.zeros(len(particles), dtype=bool)
     active = np.arange(len(particles))
-    steering_rotation = np.exp(1j * (np.zeros(len(particles)) if steering is None else steering))
+    rotation = particles.sign.astype(np.complex128)
+    if steering is not None:
+        rotation *= np.exp(1j * steering)
+    if max_segment_length is None:
+        max_segment_length = length
     segments: list[tuple[np.ndarray, ...]] = []
-    for _ in range(MAX_SEGMENTS):
+    for _ in range(max_segments):
         if not len(active):
             break
         current = result.take(active)
+        max_length = np.minimum(remaining[active], max_segment_length[active])
         new_weights, direction, member, edge, step, stuck = _next_segment(
-            mesh, current, remaining[active], length[active], steering_rotation[active]
+            mesh, current, max_length, max_segment_length[active], rotation[active]
         )
-        segments.append(
-            tuple(
-                column[~stuck]
-                for column in (active, current.triangle, current.weights, new_weights, direction)
-            )
-        )
+        columns = (active, current.triangle, current.weights, new_weights, direction, member, step)
+        segments.append(tuple(column[~stuck] for column in columns))
         current.weights, current.member = new_weights, member
         remaining[active] -= step
         stopped = stuck | _cross_edges(mesh, current, edge)
@@ -203,11 +225,14 @@ def trace_geodesics(
 def _next_segment(
     mesh: TangentMesh,
     particles: SurfaceParticles,
-    remaining: np.ndarray,
     length: np.ndarray,
-    steering_rotation: np.ndarray,
+    usual_length: np.ndarray,
+    rotation: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     """Compute one segment for each particle.
+
+    A segment is at most `length` long. Particles are stuck if the field turns so fast that a segment
+    would be much shorter than `usual_length`. `rotation`, (n,) complex128, turns the member into the direction of motion.
 
     Returns
     -------
@@ -227,7 +252,6 @@ def _next_segment(
     scale = np.abs(corner_z).max(axis=1)
     stuck = np.abs(z) <= ZERO_FIELD_RATIO * scale
     member = nearest_member(particles.member, np.where(stuck, 1, z), mesh.degree)
-    rotation = particles.sign * steering_rotation
     direction = rotation * mesh.directions_at(particles.triangle, particles.weights, member)
     slope = _barycentric_slopes(mesh, particles.triangle, direction)
     edge_distance, _ = _distance_to_edge(mesh, particles, slope)
@@ -238,17 +262,17 @@ def _next_segment(
         MAX_TURN_PER_SEGMENT * mesh.degree * norm_squared / np.where(turn_rate > 0, turn_rate, 1),
         np.inf,
     )
-    stuck |= max_step < MIN_SEGMENT_RATIO * length
+    stuck |= max_step < MIN_SEGMENT_RATIO * usual_length
     step, new_weights, edge = (
-        np.zeros(len(remaining)),
+        np.zeros(len(length)),
         particles.weights.copy(),
-        np.full(len(remaining), -1),
+        np.full(len(length), -1),
     )
     pending = np.flatnonzero(~stuck)
     for _ in range(MAX_HALVINGS):
         trial = particles.take(pending)
         z = corner_z[pending]
-        allowed = np.minimum(remaining, max_step)[pending]
+        allowed = np.minimum(length, max_step)[pending]
         midpoint = _moved_weights(
             trial.weights, slope[pending], 0.5 * np.minimum(edge_distance[pending], allowed)
         )
@@ -296,8 +320,7 @@ def _distance_to_edge(
     """Return the (n,) distances to the boundary of the triangle, and the (n,) edges there."""
     decreasing = slope < -PARALLEL_EPS * np.abs(slope).max(axis=1, keepdims=True)
     distances = np.where(decreasing, particles.weights / np.where(decreasing, -slope, 1), np.inf)
-    edge = np.argmin(distances, axis=1)
-    return np.take_along_axis(distances, edge[:, None], 1)[:, 0], edge
+    return np.minimum.reduce(distances, axis=1), np.argmin(distances, axis=1)
 
 
 def _moved_weights(weights: np.ndarray, slope: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -22,13 +22,11 @@ from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, corner_values, tangent_mesh_task
 
-#: Steps between two attempts to seed beside strokes, and the number of tips below which seeds are added at every
-#: step.
-STEPS_PER_SEEDING, MIN_TIPS = 3, 64
+#: Samples by which tips grow between two attempts to seed beside strokes.
+SAMPLES_PER_SEEDING = 8
 
-#: Distance in spacings between seeds that are added at once: in the first round, and the value at
-#: which rounds stop. Each round divides it by 4.
-MAX_SEED_SPACING, MIN_SEED_SPACING = 96.0, 6.0
+#: Distances in spacings between seeds that are added at once, from round to round.
+SEED_SPACINGS = (96.0, 24.0, 6.0)
 
 #: A phase ends when fewer tips are left than this fraction of their largest number.
 STRAGGLER_RATIO = 0.1
@@ -37,10 +35,10 @@ STRAGGLER_RATIO = 0.1
 #: the minimum separation for the strokes that fill the last gaps.
 FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.85
 
-#: Steps by which strokes around singularities grow before all others, so that the ends of the others do
-#: not form a ring around them. During the first of these steps they have another minimum separation, in
-#: spacings.
-WARMUP_STEPS, NEAR_STEPS, WARMUP_SEPARATION = 16, 6, 0.6
+#: Strokes around singularities grow before all others, so that the ends of the others do not form a
+#: ring around them: by these numbers of samples at once. At first they have another minimum separation,
+#: in spacings.
+FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
 
 
 def trace_strokes(instance: MeshInstance, spacing: np.ndarray | float, **options) -> Strokes:
@@ -135,36 +133,21 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
-    for step in range(WARMUP_STEPS):
+    for index, sample_count in enumerate(FIRST_WARMUP + SECOND_WARMUP):
         yield Progress(0.0, label)
-        if step == NEAR_STEPS:
+        if index == len(FIRST_WARMUP):
             placer.rules = replace(rules, max_gap=np.inf)
         if len(placer.tips):
-            placer.step()
+            placer.grow(sample_count)
     placer.suspend()
-    yield Progress(0.0, label)
-    seeds = candidate_seeds(placer.mesh, placer.spacing.values)
-    seeds = yield from uncovered_seeds_task(placer.samples, seeds)
-    seed_spacing, median_spacing = MAX_SEED_SPACING, float(np.median(placer.spacing.values))
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
-    while len(seeds):
-        yield Progress(placer.samples.coverage, label)
-        thinned = thinned_seeds(
-            placer.mesh,
-            seeds,
-            seed_spacing * median_spacing,
-            placer.samples.spacing_at(seeds) / median_spacing,
-        )
-        yield Progress(placer.samples.coverage, label)
-        placer.add_seeds(thinned)
+    for seed_spacing in SEED_SPACINGS:
+        yield from _add_uncovered_seeds_task(placer, seed_spacing)
         yield from _grow_until(placer, label, STRAGGLER_RATIO)
-        if seed_spacing <= MIN_SEED_SPACING:
-            break
-        seed_spacing /= 4
-        seeds = yield from uncovered_seeds_task(placer.samples, seeds)
     yield from placer.rescan_task(
         replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length)
     )
+    yield from _add_uncovered_seeds_task(placer, SEED_SPACINGS[-1])
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
@@ -173,10 +156,26 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     yield from placer.rescan_task(fill_rules)
     yield from _grow_until(placer, label)
-    if not placer.strokes.alive[: placer.strokes.count].any():
-        # Where only short strokes fit, none has survived the minimum lengths of the first rounds.
-        placer.add_seeds(candidate_seeds(placer.mesh, placer.spacing.values))
-        yield from _grow_until(placer, label)
+    # There may be gaps that are not beside a stroke, where all were too short for the phases before.
+    yield from _add_uncovered_seeds_task(placer)
+    yield from _grow_until(placer, label)
+
+
+def _add_uncovered_seeds_task(placer: StreamlinePlacer, seed_spacing: float = 0.0) -> Task[None]:
+    """Start strokes at seeds that are not near a stroke of their family.
+
+    The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
+    """
+    label = "looking for gaps"
+    yield Progress(placer.samples.coverage, label)
+    seeds = candidate_seeds(placer.mesh, placer.spacing.values)
+    seeds = yield from uncovered_seeds_task(placer.samples, seeds)
+    yield Progress(placer.samples.coverage, label)
+    if seed_spacing and len(seeds):
+        median = float(np.median(placer.spacing.values))
+        ratio = placer.samples.spacing_at(seeds) / median
+        seeds = thinned_seeds(placer.mesh, seeds, seed_spacing * median, ratio)
+    placer.add_seeds(seeds)
 
 
 def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> Task[None]:
@@ -185,25 +184,23 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
     nothing grows any more.
     """
-    steps, max_tips = 0, 0
+    max_tips = 0
     while True:
         yield Progress(placer.samples.coverage, label)
-        if steps % STEPS_PER_SEEDING == 0 or len(placer.tips) < MIN_TIPS:
-            seeded = placer.seed_neighbors()
-            if not seeded and not len(placer.tips):
-                if not placer.samples.has_open_sides:
-                    return
-                # Each call closes the sides that it tried. Try others twice more.
-                if not placer.seed_neighbors() and not placer.seed_neighbors():
-                    return
-            yield Progress(placer.samples.coverage, label)
+        seeded = placer.seed_neighbors()
+        if not seeded and not len(placer.tips):
+            if not placer.samples.has_open_sides:
+                return
+            # Each call closes the sides that it tried. Try others twice more.
+            if not placer.seed_neighbors() and not placer.seed_neighbors():
+                return
+        yield Progress(placer.samples.coverage, label)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
             return
         if tip_count:
-            placer.step()
-        steps += 1
+            placer.grow(SAMPLES_PER_SEEDING)
 
 
 def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:

@@ -8,6 +8,7 @@ from shapes import cube, cylinder, torus
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field
+from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
@@ -49,7 +50,9 @@ def test_spacing_and_width_are_even_up_to_creases(tone):
 @pytest.mark.slow
 def test_strokes_reach_creases_at_full_width():
     """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
-    strokes = draw_instances([sharp_cube()], CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
+    surface = sharp_cube().surface
+    instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, 4))
+    strokes = draw_instances([instance], CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
     ends = np.concatenate([strokes.start[:-1], strokes.start[1:] - 1])
     at_crease = (np.abs(np.abs(strokes.points[ends] - 0.5) - 0.5) < 1e-6).sum(axis=1) >= 2
     assert at_crease.sum() > 60

@@ -186,7 +186,9 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
         program(tmp_path / f"{name}.svg", tmp_path / f"{name}.png")
         pictures.append(ink_of(tmp_path / f"{name}.png"))
     assert (tmp_path / "closed.svg").read_text().count("Z") == lines.closed.sum()
-    assert np.abs(pictures[0] - pictures[1]).max() < 0.02
+    # The edges of a round join and of two round caps are antialiased a little differently. A part that
+    # is missing differs by 1.
+    assert np.abs(pictures[0] - pictures[1]).max() < 0.05
 
 
 @needs_inkscape

@@ -1,0 +1,148 @@
+"""Place samples along traced paths, and cut paths at samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .surface_particles import SurfaceParticles, TracedPath
+
+#: Two positions along a path are the same if they differ by less than this fraction of a step.
+ARC_EPS = 1e-9
+
+
+class PathSamples(NamedTuple):
+    """k samples along the paths of n particles, sorted by rank, then by particle.
+
+    Attributes
+    ----------
+    particle : (k,) intp ndarray
+        Number of the particle.
+    rank : (k,) intp ndarray
+        Number of the sample along the path of its particle, from 0.
+    previous : (k,) intp ndarray
+        The sample before along the same path, or -1.
+    arc : (k,) float64 ndarray
+        Distance from the beginning of the path, in world space.
+    position : SurfaceParticles
+        The samples, as particles that continue along the path.
+    """
+
+    particle: np.ndarray
+    rank: np.ndarray
+    previous: np.ndarray
+    arc: np.ndarray
+    position: SurfaceParticles
+
+    def take(self, indices: np.ndarray) -> PathSamples:
+        """Return some samples, which include all samples before each of them."""
+        number = np.full(len(self.particle) + 1, -1)
+        number[indices] = np.arange(len(indices))
+        return PathSamples(
+            self.particle[indices],
+            self.rank[indices],
+            number[self.previous[indices]],
+            self.arc[indices],
+            self.position.take(indices),
+        )
+
+
+class SampledPath:
+    """The paths of n particles, by distance from their beginning.
+
+    Parameters
+    ----------
+    path : TracedPath
+    sign : (n,) ndarray
+        Of the particles; see `SurfaceParticles`.
+    """
+
+    def __init__(self, path: TracedPath, sign: np.ndarray) -> None:
+        self.path = path.take(np.argsort(path.particle, kind="stable"))
+        self.sign = sign
+        particle, length = self.path.particle, self.path.length
+        # Distances along all paths, one after another.
+        self._end = np.cumsum(length)
+        first = np.searchsorted(particle, np.arange(len(sign) + 1))
+        before = np.concatenate([[0.0], self._end])
+        self._start = before[first[:-1]]
+        #: (n,) float64: lengths of the paths, in world space.
+        self.length = before[first[1:]] - self._start
+
+    def samples(
+        self,
+        first_step: np.ndarray,
+        next_step: Callable[[SurfaceParticles, np.ndarray], np.ndarray],
+        ended: np.ndarray,
+    ) -> PathSamples:
+        """Return samples at steps along the paths.
+
+        A path that ended, or is shorter than its first step, has a sample at its end as well.
+
+        Parameters
+        ----------
+        first_step : (n,) ndarray
+            Lengths of the first steps, in world space.
+        next_step : callable
+            Called as ``next_step(position, particle)`` with samples and the numbers of their paths.
+            Returns the lengths of the steps from there, in world space.
+        ended : (n,) bool ndarray
+            Whether the particle could not continue at the end of its path.
+        """
+        path = self.path
+        particle = np.flatnonzero(self.length > 0)
+        arc, step = np.zeros(len(particle)), first_step[particle]
+        row = np.full(len(particle), -1)
+        columns: list[tuple[np.ndarray, ...]] = []
+        sample_count, rank = 0, 0
+        while len(particle):
+            length = self.length[particle]
+            arc = arc + step
+            is_beyond = arc > length + ARC_EPS * step
+            kept = np.flatnonzero(~is_beyond | ended[particle] | (rank == 0))
+            arc = np.minimum(arc, length)[kept]
+            particle, step, row, is_beyond = (
+                column[kept] for column in (particle, step, row, is_beyond)
+            )
+            along = self._start[particle] + arc
+            segment = np.searchsorted(self._end, along - ARC_EPS * step)
+            fraction = 1 - (self._end[segment] - along) / path.length[segment]
+            begin, end = path.begin_weights[segment], path.end_weights[segment]
+            position = SurfaceParticles(
+                path.triangle[segment],
+                begin + np.clip(fraction, 0, 1)[:, None] * (end - begin),
+                path.member[segment],
+                self.sign[particle],
+            )
+            columns.append((particle, np.full(len(particle), rank), row, arc, *position.columns))
+            row = np.arange(sample_count, sample_count + len(particle))
+            sample_count += len(particle)
+            rank += 1
+            kept = np.flatnonzero(~is_beyond)
+            particle, arc, row = particle[kept], arc[kept], row[kept]
+            step = next_step(position.take(kept), particle)
+        if not columns:
+            return PathSamples(*np.empty((3, 0), np.intp), np.empty(0), SurfaceParticles.empty())
+        particle, rank, row, arc, *position = (
+            np.concatenate(column) for column in zip(*columns, strict=True)
+        )
+        return PathSamples(particle, rank, row, arc, SurfaceParticles(*position))
+
+    def cut(self, arc: np.ndarray) -> TracedPath:
+        """Return the paths up to (n,) distances from their beginnings."""
+        path = self.path
+        begin = self._end - path.length - self._start[path.particle]
+        fraction = (arc[path.particle] - begin) / np.where(path.length > 0, path.length, 1)
+        kept = np.flatnonzero(fraction > ARC_EPS)
+        path, fraction = path.take(kept), fraction[kept]
+        is_cut = fraction < 1 - ARC_EPS
+        end_weights = np.where(
+            is_cut[:, None],
+            path.begin_weights + fraction[:, None] * (path.end_weights - path.begin_weights),
+            path.end_weights,
+        )
+        return path._replace(
+            end_weights=end_weights, length=np.where(is_cut, fraction, 1) * path.length
+        )

@@ -14,6 +14,7 @@ import zlib
 import numpy as np
 import pytest
 from conftest import ROOT, long
+from harness.forked import run_command
 from shapes import cube, icosphere, torus
 
 from rosy_addon.cli import bake_workers, parser
@@ -24,10 +25,9 @@ from rosy_addon.image_io.png import write_png
 from rosy_addon.presets.store import preset_files
 
 
-def rosy(*arguments, **options) -> subprocess.CompletedProcess:
-    """Run ``python -m rosy_addon``."""
-    command = [sys.executable, "-m", "rosy_addon", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, **options)
+def rosy(*arguments) -> subprocess.CompletedProcess:
+    """Run ``rosyfields``."""
+    return run_command(list(map(str, arguments)), ROOT)
 
 
 def write_off(path, surface: Surface):

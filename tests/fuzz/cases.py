@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import pickle
+import resource
 import stat
 import traceback
 import zlib
@@ -25,6 +26,13 @@ from .options import random_options
 from .picture_files import png_bytes
 from .preset_files import preset_bytes
 from .shapes import Polygons, random_mesh
+
+#: Seconds of processor time in which Blender has to make the scene of a case.
+MAKING_LIMIT = 60
+
+
+class SlowSceneError(Exception):
+    """Blender alone takes too long to make a scene."""
 
 
 @dataclass
@@ -105,6 +113,10 @@ def make_case(category: str, seed: int, folder: Path) -> Case:
         A key of `CATEGORIES`.
     seed : int
     folder : Path
+
+    Raises
+    ------
+    SlowSceneError
     """
     rng = np.random.default_rng([zlib.crc32(category.encode()), seed])
     return CATEGORIES[category].make(rng, folder)
@@ -330,13 +342,15 @@ def _from_scenes(name: str) -> Callable[[Generator, Path], Case]:
         pid = os.fork()
         if pid == 0:
             try:
+                resource.setrlimit(resource.RLIMIT_CPU, (MAKING_LIMIT, MAKING_LIMIT))
                 case = getattr(scenes, name)(rng, folder)
                 result.write_bytes(pickle.dumps(case))
             except BaseException:
                 traceback.print_exc()
             finally:
                 os._exit(0)
-        os.waitpid(pid, 0)
+        if os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) < 0:
+            raise SlowSceneError
         return pickle.loads(result.read_bytes())
 
     return make

@@ -16,7 +16,7 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, as_complete
 from pathlib import Path
 from typing import NamedTuple
 
-from .cases import CATEGORIES, Case, make_case
+from .cases import CATEGORIES, MAKING_LIMIT, Case, SlowSceneError, make_case
 from .execution import Run, execute, opens_in_blender
 from .verdicts import Verdict, judge
 
@@ -146,7 +146,10 @@ def _run_case(arguments: tuple[str, int, Path]) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="rosy-fuzz-") as parent:
         folder = Path(parent) / "case"
         folder.mkdir()
-        case = make_case(category, seed, folder)
+        try:
+            case = make_case(category, seed, folder)
+        except SlowSceneError:
+            return Outcome(category, seed, Verdict.UNREADABLE, "not made", MAKING_LIMIT, 0)
         run = execute(case, folder)
         verdict, reason = judge(case, run, folder)
         blend_file = folder / "scene.blend"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import long
 from shapes import icosphere, torus
 
 from rosy_addon.compositor import fast_lic
@@ -84,8 +85,14 @@ LOOKS = {
 }
 
 
-@pytest.mark.parametrize("name", LOOKS)
-@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize(
+    ("name", "samples"),
+    [
+        *((name, 2) for name in LOOKS),
+        ("default", 1),
+        *long(*((name, 1) for name in LOOKS if name != "default")),
+    ],
+)
 def test_bands_are_parts_of_the_picture(name, samples):
     view = ViewInput(instances(), CAMERA, replace(LOOKS[name], supersampling=samples))
     gbuffer = project(view.instances, CAMERA, view.look.display, samples=view.samples_per_side)

@@ -2,7 +2,7 @@
 """Install the built zip into an empty Blender and test it there, headless and in a window.
 
     tests/blender/run.py stable|latest ROSY.zip [REAL_BLENDER] [--shots DIR] [--windows NAMES]
-                         [--vulkan] [PYTEST...]
+                         [--many] [--vulkan] [PYTEST...]
 
 REAL_BLENDER is the `real-blender` script, by default the one in ../shared/tools. Screenshots of the
 panel are saved in DIR. The exit status is 0 only if all tests passed. The last line is a
@@ -80,6 +80,7 @@ def parse_arguments() -> argparse.Namespace:
     )
     parser.add_argument("--only-window", action="store_true")
     parser.add_argument("--steps", default="", help="names of the only steps to run in a window")
+    parser.add_argument("--many", action="store_true", help="more cases in a window")
     parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
     if not options.zip.is_file():
@@ -102,6 +103,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     )
 
     environment["ROSY_STEPS"] = options.steps
+    environment["ROSY_MANY"] = "1" if options.many else ""
     environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
     backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
 
@@ -146,7 +148,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             results_file = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(results_file)
             is_large = width > SCREEN[0] or height > SCREEN[1]
-            time_limit = 900 if is_large or "ROSY_LIVE_MANY" in environment else 420
+            time_limit = 900 if is_large or options.many else 420
             arguments = [
                 *backend, "--window-geometry", "0", "0", str(width), str(height), *further_options,
                 "--python-exit-code", "1", "-P", str(HERE / script),

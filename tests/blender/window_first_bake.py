@@ -16,6 +16,7 @@ from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from window_steps import (
+    MANY,
     capture,
     in_view,
     preferences,
@@ -207,4 +208,4 @@ def live_suzanne():
     yield from save_picture("live")
 
 
-run_steps(default_cube, suzanne, live_suzanne)
+run_steps(default_cube, *([suzanne, live_suzanne] if MANY else []))

@@ -18,7 +18,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
-from window_steps import SHOTS, in_view, preferences, rosy, run_steps, view, wait_until
+from window_steps import MANY, SHOTS, in_view, preferences, rosy, run_steps, view, wait_until
 
 # Helpers of the steps
 
@@ -694,13 +694,11 @@ run_steps(
     workers_stopped_with_escape,
     strokes_stopped_with_escape,
     field_stopped_with_escape,
-    import_stopped_with_escape,
-    export_stopped_with_escape,
+    *([import_stopped_with_escape, export_stopped_with_escape] if MANY else []),
     export_and_import_from_the_file_browser,
     turntable_with_progress,
-    turntable_stopped_with_escape,
+    *([turntable_stopped_with_escape, turntable_from_its_file_browser] if MANY else []),
     turntable_encoded_by_another_blender,
-    turntable_from_its_file_browser,
     strokes_from_their_file_browser,
     animation_asks_for_a_folder,
     edited_strokes_are_replaced_on_request,

@@ -27,6 +27,9 @@ PICTURE_COLORS = 128
 #: Names of the only steps to run; all if there is none.
 ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 
+#: Whether to run more cases, and steps that others cover for the most part: `run.py --many`.
+MANY = bool(os.environ.get("ROSY_MANY"))
+
 
 def run_steps(*steps):
     """Run steps as soon as there is a window, write their results, and end Blender.

@@ -431,9 +431,12 @@ def move_a_point(data):
     if data.id_type == "CURVES":
         data.attributes["position"].data[0].vector.x += 0.1
     elif has_grease_pencil_drawings():
-        data.layers[0].frames[0].drawing.attributes["position"].data[0].vector.x += 0.1
+        drawings = [layer.frames[0].drawing for layer in data.layers]
+        drawing = next(drawing for drawing in drawings if len(drawing.strokes))
+        drawing.attributes["position"].data[0].vector.x += 0.1
     else:
-        data.layers[0].frames[0].strokes[0].points[0].co.x += 0.1
+        frame = next(layer.frames[0] for layer in data.layers if len(layer.frames[0].strokes))
+        frame.strokes[0].points[0].co.x += 0.1
 
 
 def recolor(data):

@@ -114,18 +114,17 @@ def find_lateral_neighbors(
             len(sample), near_query, pairs.query, side, lateral_gap, max_gap
         )
     else:
-
-        def among(neighbor: np.ndarray) -> np.ndarray:
-            return np.maximum(neighbor - sample[0], -1) if len(sample) else neighbor
-
+        # Indices of neighbors into `sample`, or -1.
+        first = int(sample[0]) if len(sample) else 0
+        index = np.maximum(pairs.neighbor - first, -1)
         gap, yielded, rejected = _judge_in_order(
             samples.step[sample],
             previous,
-            (near_query, among(near_neighbor)),
-            (pairs.query, among(pairs.neighbor), side, lateral_gap),
+            (near_query, np.maximum(near_neighbor - first, -1)),
+            (pairs.query, index, side, lateral_gap),
             max_gap,
         )
-        covers &= ~np.append(rejected, False)[among(pairs.neighbor)]
+        covers &= ~np.append(rejected, False)[index]
     covers &= ~rejected[pairs.query]
     covering = CoveringPairs(
         *(column[covers] for column in (pairs.sample, pairs.neighbor, side, neighbor_side))
@@ -182,11 +181,7 @@ def _judge_in_order(
         Samples, neighbors beside them, sides and distances in spacings.
     max_gap : float
     """
-    near, beside = (
-        tuple(column[order] for column in columns)
-        for columns in (near, beside)
-        for order in (np.argsort(columns[0], kind="stable"),)
-    )
+    near, beside = _sorted_by_first(near), _sorted_by_first(beside)
     # The last entry is for number -1.
     exists = np.ones(len(step) + 1, dtype=bool)
     gap, yielded = np.full((len(step), 2), np.inf), np.zeros(len(step), dtype=bool)
@@ -209,6 +204,12 @@ def _judge_in_order(
         yielded[rows] &= exists[rows]
         exists[rows] &= ~rejected
     return gap, yielded, ~exists[:-1]
+
+
+def _sorted_by_first(columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """Return columns with their rows sorted by the first one."""
+    order = np.argsort(columns[0], kind="stable")
+    return tuple(column[order] for column in columns)
 
 
 def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.ndarray, ...]:

@@ -18,6 +18,13 @@ PAIR_BATCH_SIZE = 1 << 20
 #: Sine of the angle between segments below which they count as parallel.
 MIN_SINE = 1e-9
 
+#: Strokes also cross where a segment ends within this fraction of its length before the other stroke.
+#: Where two strokes cross at an edge of a triangle, all four segments end there, but for rounding.
+END_TOLERANCE = 1e-6
+
+#: Crossings of two strokes are the same one if they are nearer than this along both, in spacings.
+SAME_CROSSING = 1e-4
+
 #: Difference of the keys of strips, and the tolerance of positions along them; see `_strip_keys`.
 STRIP_STRIDE, ROUNDING = 4.0, 1e-6
 
@@ -68,7 +75,35 @@ def crossings_task(strokes: Strokes) -> Task[Crossings]:
     order = np.lexsort((second, first, strokes.triangle[first]))
     pairs = np.stack([first, second], axis=1)[order]
     fraction = np.stack([fraction_first, fraction_second], axis=1)[order]
-    return Crossings(stroke[pairs], arc[pairs - 1] + fraction * (arc[pairs] - arc[pairs - 1]))
+    arc = arc[pairs - 1] + fraction * (arc[pairs] - arc[pairs - 1])
+    kept = _first_of_each(stroke[pairs], arc, SAME_CROSSING * strokes.spacing[pairs[:, 0]])
+    return Crossings(stroke[pairs[kept]], arc[kept])
+
+
+def _first_of_each(stroke: np.ndarray, arc: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
+    """Return the numbers of crossings, without those that are the same as an earlier one.
+
+    Parameters
+    ----------
+    stroke : (m, 2) ndarray of int
+    arc : (m, 2) ndarray
+        As in `Crossings`.
+    tolerance : (m,) ndarray
+        In world space.
+    """
+    swapped = stroke[:, :1] > stroke[:, 1:]
+    stroke = np.where(swapped, stroke[:, ::-1], stroke)
+    arc = np.where(swapped, arc[:, ::-1], arc)
+    order = np.lexsort((arc[:, 0], stroke[:, 1], stroke[:, 0]))
+    stroke, arc = stroke[order], arc[order]
+    is_new = np.ones(len(order), dtype=bool)
+    is_new[1:] = (np.diff(stroke, axis=0) != 0).any(axis=1) | (
+        np.abs(np.diff(arc, axis=0)) > tolerance[order[1:], None]
+    ).any(axis=1)
+    group = np.cumsum(is_new) - 1
+    first = np.full(int(is_new.sum()), len(order))
+    np.minimum.at(first, group, order)
+    return np.sort(first)
 
 
 def _close_pairs(
@@ -178,7 +213,8 @@ def _intersect_segments(
     denominator = np.where(is_oblique, norm_squared, 1)
     t = np.einsum("ni,ni->n", np.cross(q - p, s), normal) / denominator
     u = np.einsum("ni,ni->n", np.cross(q - p, r), normal) / denominator
-    crosses = is_oblique & (t >= 0) & (t < 1) & (u >= 0) & (u < 1)
+    low, high = -END_TOLERANCE, 1 + END_TOLERANCE
+    crosses = is_oblique & (t > low) & (t < high) & (u > low) & (u < high)
     return first[crosses], second[crosses], t[crosses], u[crosses]
 
 

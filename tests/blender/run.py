@@ -12,6 +12,8 @@ summary.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import fcntl
 import json
 import os
 import shlex
@@ -21,6 +23,7 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +45,9 @@ WINDOWS = {
 
 #: Size of the screen that `real-blender gui` makes. Larger windows get a screen of their own.
 SCREEN = 1400, 900
+
+#: Seconds after which the screen of a window exists.
+START_SECONDS = 4.0
 
 
 def main() -> int:
@@ -157,23 +163,33 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             if is_large:
                 screen = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
                 command = ["sh", shlex.join([*screen, "blender", *arguments])]
-            process = blender(
-                *command,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                timeout=time_limit + 60.0,
-            )
+            with only_start():
+                process = subprocess.Popen(
+                    [str(options.real_blender), command[0], options.which, *command[1:]],
+                    cwd=REPOSITORY,
+                    env=environment,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.STDOUT,
+                    text=True,
+                )
+            output, _ = process.communicate(timeout=time_limit + 60.0)
             add_window(counts, results_file)
             # Errors in the drawing of a panel appear on the terminal alone.
-            if "Traceback" in process.stdout:
-                print(
-                    "in the window:\n" + process.stdout[process.stdout.index("Traceback") :][:3000]
-                )
+            if "Traceback" in output:
+                print("in the window:\n" + output[output.index("Traceback") :][:3000])
                 counts["failed"] += 1
         if options.shots is not None:
             shutil.copytree(shots, options.shots, dirs_exist_ok=True)
     return counts
+
+
+@contextlib.contextmanager
+def only_start() -> Iterator[None]:
+    """Let no other run start a window at the same time: both might choose the same screen."""
+    with (Path(tempfile.gettempdir()) / "rosy-window.lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+        time.sleep(START_SECONDS)
 
 
 def add_junit(counts: dict[str, int], results: Path) -> None:

@@ -6,6 +6,7 @@ import importlib.util
 import os
 import pickle
 import resource
+import signal
 import stat
 import traceback
 import zlib
@@ -349,7 +350,8 @@ def _from_scenes(name: str) -> Callable[[Generator, Path], Case]:
                 traceback.print_exc()
             finally:
                 os._exit(0)
-        if os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) < 0:
+        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        if status in (-signal.SIGXCPU, -signal.SIGKILL):
             raise SlowSceneError
         return pickle.loads(result.read_bytes())
 

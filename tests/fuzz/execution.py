@@ -9,10 +9,10 @@ import stat
 import subprocess
 import sys
 import time
-import traceback
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..harness.forked import fork_command
 from .cases import Case, hash_file
 
 #: Seconds of the processor after which a run counts as hanging; seconds after which it does so even
@@ -100,29 +100,13 @@ def listing(folder: Path) -> dict[str, str]:
 
 def _fork(case: Case, folder: Path, streams: list[Path]) -> int:
     """Start a case in a copy of this process, which has imported all modules. Return its number."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    pid = os.fork()
-    if pid:
-        return pid
-    status = 1
-    try:
-        for number, path in zip((1, 2), streams, strict=True):
-            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-            os.dup2(descriptor, number)
-        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        os.chdir(folder)
+
+    def prepare() -> None:
         os.environ.update(case.environment)
         _set_limits()
-        from rosy_addon.extras.command_line import main
 
-        status = main(case.arguments)
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
+    with streams[0].open("wb") as stdout, streams[1].open("wb") as stderr:
+        return fork_command(case.arguments, folder, (stdout.fileno(), stderr.fileno()), prepare)
 
 
 def _start_process(case: Case, folder: Path, streams: list[Path]) -> int:

@@ -12,7 +12,6 @@ summary.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import fcntl
 import json
 import os
@@ -23,7 +22,6 @@ import sys
 import tempfile
 import time
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -163,33 +161,34 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             if is_large:
                 screen = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
                 command = ["sh", shlex.join([*screen, "blender", *arguments])]
-            with only_start():
-                process = subprocess.Popen(
-                    [str(options.real_blender), command[0], options.which, *command[1:]],
-                    cwd=REPOSITORY,
-                    env=environment,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.STDOUT,
-                    text=True,
-                )
-            output, _ = process.communicate(timeout=time_limit + 60.0)
+            wait_for_turn()
+            process = blender(
+                *command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=time_limit + 60.0,
+            )
             add_window(counts, results_file)
             # Errors in the drawing of a panel appear on the terminal alone.
-            if "Traceback" in output:
-                print("in the window:\n" + output[output.index("Traceback") :][:3000])
+            if "Traceback" in process.stdout:
+                print(
+                    "in the window:\n" + process.stdout[process.stdout.index("Traceback") :][:3000]
+                )
                 counts["failed"] += 1
         if options.shots is not None:
             shutil.copytree(shots, options.shots, dirs_exist_ok=True)
     return counts
 
 
-@contextlib.contextmanager
-def only_start() -> Iterator[None]:
-    """Let no other run start a window at the same time: both might choose the same screen."""
+def wait_for_turn() -> None:
+    """Wait until no other run starts a window: both might choose the same screen.
+
+    Other runs then wait for this one. A process that outlives this function holds the lock.
+    """
     with (Path(tempfile.gettempdir()) / "rosy-window.lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-        time.sleep(START_SECONDS)
+        subprocess.Popen(["sleep", str(START_SECONDS)], pass_fds=[file.fileno()])
 
 
 def add_junit(counts: dict[str, int], results: Path) -> None:

@@ -149,20 +149,10 @@ def bake_of_view(space=None, region=None, method="brute"):
 
 
 def check_is_bake(name, min_correlation=0.98, max_difference=0.01):
-    """Check that the screen shows the picture that a bake draws, at last.
-
-    On a busy machine, Blender draws a change of the view late.
-    """
-    for attempts_left in (2, 1, 0):
-        yield from wait_for_final_pictures()
-        seen, drawn = capture(name, view()[2]), bake_of_view()
-        try:
-            check_agreement(name, seen, drawn, min_correlation, max_difference)
-            return
-        except AssertionError:
-            if not attempts_left:
-                raise
-        yield 1.0
+    """Check that the screen shows the picture that a bake draws."""
+    yield from wait_for_final_pictures()
+    seen, drawn = capture(name, view()[2]), bake_of_view()
+    check_agreement(name, seen, drawn, min_correlation, max_difference)
 
 
 def check_agreement(name, seen, drawn, min_correlation=0.98, max_difference=0.01):

@@ -158,11 +158,8 @@ def singularities_as_dots():
     without = count_dots("panel-5-no-singularities")
     with in_view():
         assert bpy.ops.rosy.singularities(show="OVERLAY") == {"FINISHED"}
-    for _ in range(3):  # on a busy machine, Blender draws late
-        yield from save_screenshot("panel-6-singularities", 450)
-        orange, blue = count_dots("panel-6-singularities") - without
-        if orange:
-            break
+    yield from save_screenshot("panel-6-singularities", 450)
+    orange, blue = count_dots("panel-6-singularities") - without
     assert orange > 200 and blue > 200, (orange, blue)
     with in_view():
         bpy.ops.rosy.singularities(show="NONE")

@@ -93,7 +93,7 @@ class StreamlinePlacer:
 
     # --- growing ----------------------------------------------------------------------------------
 
-    def grow(self, sample_count: int = 1) -> None:
+    def grow(self, sample_count: int) -> None:
         """Advance all tips by up to `sample_count` samples. Tips that cannot advance end.
 
         Samples are accepted as if all tips advanced by one at a time. Tips whose step is shortened

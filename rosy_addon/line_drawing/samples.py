@@ -162,7 +162,7 @@ class StrokeSamples(ColumnTable):
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:
-        """Begin the next steps of growth, numbered from 0 in `step`; return their numbers of all."""
+        """Begin steps of growth, which `step` counts from 0, and return their numbers."""
         first = self.current_step + 1
         self.current_step = first + int(step.max(initial=0))
         return first + step

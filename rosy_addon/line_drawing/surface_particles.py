@@ -232,7 +232,8 @@ def _next_segment(
     """Compute one segment for each particle.
 
     A segment is at most `length` long. Particles are stuck if the field turns so fast that a segment
-    would be much shorter than `usual_length`. `rotation`, (n,) complex128, turns the member into the direction of motion.
+    would be much shorter than `usual_length`. `rotation`, (n,) complex128, turns the member into the
+    direction of motion.
 
     Returns
     -------

@@ -20,6 +20,7 @@ from .separation import separation_task
 from .separation_rules import SeparationRules
 from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
+from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh, corner_values, tangent_mesh_task
 
 #: Samples by which tips grow between two attempts to seed beside strokes.
@@ -141,13 +142,14 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
             placer.grow(sample_count)
     placer.suspend()
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
+    candidates = candidate_seeds(placer.mesh, placer.spacing.values)
     for seed_spacing in SEED_SPACINGS:
-        yield from _add_uncovered_seeds_task(placer, seed_spacing)
+        yield from _add_uncovered_seeds_task(placer, candidates, seed_spacing)
         yield from _grow_until(placer, label, STRAGGLER_RATIO)
     yield from placer.rescan_task(
         replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length)
     )
-    yield from _add_uncovered_seeds_task(placer, SEED_SPACINGS[-1])
+    yield from _add_uncovered_seeds_task(placer, candidates, SEED_SPACINGS[-1])
     yield from _grow_until(placer, label, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
@@ -157,19 +159,20 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     yield from placer.rescan_task(fill_rules)
     yield from _grow_until(placer, label)
     # There may be gaps that are not beside a stroke, where all were too short for the phases before.
-    yield from _add_uncovered_seeds_task(placer)
+    yield from _add_uncovered_seeds_task(placer, candidates)
     yield from _grow_until(placer, label)
 
 
-def _add_uncovered_seeds_task(placer: StreamlinePlacer, seed_spacing: float = 0.0) -> Task[None]:
-    """Start strokes at seeds that are not near a stroke of their family.
+def _add_uncovered_seeds_task(
+    placer: StreamlinePlacer, candidates: SurfaceParticles, seed_spacing: float = 0.0
+) -> Task[None]:
+    """Start strokes at those candidates that are not near a stroke of their family.
 
     The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
     """
     label = "looking for gaps"
     yield Progress(placer.samples.coverage, label)
-    seeds = candidate_seeds(placer.mesh, placer.spacing.values)
-    seeds = yield from uncovered_seeds_task(placer.samples, seeds)
+    seeds = yield from uncovered_seeds_task(placer.samples, candidates)
     yield Progress(placer.samples.coverage, label)
     if seed_spacing and len(seeds):
         median = float(np.median(placer.spacing.values))

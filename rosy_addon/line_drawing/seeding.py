@@ -212,7 +212,7 @@ def _lateral_points(
     )
     direction = samples.local_direction[sample] * np.where(side == 0, 1j, -1j)
     length = distance * samples.spacing[sample]
-    arrived, walked = trace_geodesics(samples.mesh, particles, direction, length)
+    arrived, _, walked = trace_geodesics(samples.mesh, particles, direction, length)
     return arrived, (walked >= MIN_WALKED_RATIO * length) & (arrived.member != 0)
 
 

@@ -78,7 +78,7 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
         weights[isolated].repeat(RAY_COUNT, axis=0),
     )
     particles = SurfaceParticles(triangle, weights, 1j * ray, np.ones(len(ray)))
-    arrived, walked = trace_geodesics(mesh, particles, ray, distance)
+    arrived, _, walked = trace_geodesics(mesh, particles, ray, distance)
     radial = mesh.points_at(arrived.triangle, arrived.weights) - mesh.points_at(triangle, weights)
     tangential = 1j * dot(radial, mesh.x[arrived.triangle]) - dot(radial, mesh.y[arrived.triangle])
     tangential /= np.maximum(np.abs(tangential), 1e-300)

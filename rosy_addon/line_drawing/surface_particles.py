@@ -179,7 +179,7 @@ def advance(
 
 def trace_geodesics(
     mesh: TangentMesh, particles: SurfaceParticles, direction: np.ndarray, length: np.ndarray
-) -> tuple[SurfaceParticles, np.ndarray]:
+) -> tuple[SurfaceParticles, np.ndarray, np.ndarray]:
     """Move particles along straight geodesics, and transport their members.
 
     Parameters
@@ -196,6 +196,8 @@ def trace_geodesics(
     particles : SurfaceParticles
         The particles after the move. Their members are those of the field that are nearest to the
         transported ones; 0 where the field is zero.
+    direction : (n,) complex128 ndarray
+        The directions after the move.
     walked : (n,) float64 ndarray
         Length that was moved. It is less than requested at borders and creases.
     """
@@ -219,7 +221,7 @@ def trace_geodesics(
         direction[active] = current_direction * rotation
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
     result.member = mesh.members_at(result.triangle, result.weights, result.member)
-    return result, length - remaining
+    return result, direction, length - remaining
 
 
 def _next_segment(

@@ -160,6 +160,6 @@ def _sides_with_room(
     has_room = np.empty((len(sample), 2), dtype=bool)
     for side, rotation in enumerate((1j, -1j)):
         length = 1.25 * samples.spacing[sample]
-        _, walked = trace_geodesics(mesh, particles, direction * rotation, length)
+        *_, walked = trace_geodesics(mesh, particles, direction * rotation, length)
         has_room[:, side] = walked >= 0.999 * length
     return has_room

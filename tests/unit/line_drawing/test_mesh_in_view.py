@@ -92,7 +92,7 @@ def test_parts_are_connected_as_the_mesh(name):
     on_whole = np.einsum("nk,nkj->nj", weights, part.weights[start])
     for of_mesh, at, on in ((part.mesh, start, weights), (mesh, part.triangle[start], on_whole)):
         particles = SurfaceParticles(at, on, np.ones(len(at), dtype=complex), np.ones(len(at)))
-        arrived, walked = trace_geodesics(of_mesh, particles, direction, length)
+        arrived, _, walked = trace_geodesics(of_mesh, particles, direction, length)
         ends.append((of_mesh.points_at(arrived.triangle, arrived.weights), walked))
     reached = ends[0][1] >= 0.999 * length
     assert reached.mean() > 0.7

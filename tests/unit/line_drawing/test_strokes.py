@@ -291,7 +291,7 @@ def test_straight_ahead_is_a_geodesic():
     around = np.cross((0, 0, 1.0), mesh.normal[triangle])
     direction = np.cos(angle)[:, None] * around + np.sin(angle)[:, None] * np.array([0, 0, 1.0])
     tangent = dot(direction, mesh.x[triangle]) + 1j * dot(direction, mesh.y[triangle])
-    arrived, walked = trace_geodesics(mesh, particles, tangent, np.full(count, 0.5))
+    arrived, _, walked = trace_geodesics(mesh, particles, tangent, np.full(count, 0.5))
     end = mesh.points_at(arrived.triangle, arrived.weights)
     inside = walked > 0.5 - 1e-9
     assert inside.any()

@@ -134,13 +134,13 @@ def compose_task(
             )
             tone = tone[drawn]
         field = field.part(drawn)
-        layer = yield from subtask(_layer_task(field, pixel_look, images), stop, stop)
+        layer = yield from subtask(layer_task(field, pixel_look, images), stop, stop)
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
             part, part_images = field.part(block), images.part(block)
             entries = part.gbuffer_index
             if modulation is None:
-                color[entries] = _colorize(part, part_images, layer.tone[block], part_look)
+                color[entries] = colorize(part, part_images, layer.tone[block], part_look)
             else:
                 color[entries], alpha[entries] = render_hatching(
                     part, part_images, part_look, tone[block], modulation.part(block)
@@ -206,8 +206,8 @@ def compose_planar(
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = replace(look, supersampling=1)
     images = run_to_completion(lic_task(field, look, noise))
-    layer = run_to_completion(_layer_task(field, look, images))
-    color = _colorize(field, layer.images, layer.tone, look)
+    layer = run_to_completion(layer_task(field, look, images))
+    color = colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
     rgba_task = _resolve_pixels_task(field.pixel, color, opaque, field.width, (0, field.height), 1)
     return Picture(run_to_completion(rgba_task), (layer,))
@@ -296,7 +296,7 @@ def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> T
     return heights
 
 
-def _layer_task(field: PixelField, look: Look, images: LicImages) -> Task[DegreeLayer]:
+def layer_task(field: PixelField, look: Look, images: LicImages) -> Task[DegreeLayer]:
     """Build the layer of one degree: its blend, with the contrast of one image times the gain."""
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     tone = np.empty_like(images.blend)
@@ -308,7 +308,7 @@ def _layer_task(field: PixelField, look: Look, images: LicImages) -> Task[Degree
     return DegreeLayer(field.degree, field.pixel, images, tone)
 
 
-def _colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
+def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
     """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude or by family.
 
     (P, K) `tone` is that of `DegreeLayer`.

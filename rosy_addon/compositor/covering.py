@@ -31,7 +31,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..progress import Progress, Task, run_to_completion
 from ..projection.pixel_blocks import pixel_blocks
 from .look import Look
-from .pixel_field import NEIGHBOR_OFFSETS, PixelField, normalized
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
 
 #: The largest integer in `Covering.state_table`.
 INT16_MAX = 32767
@@ -39,11 +39,39 @@ INT16_MAX = 32767
 #: Squares of lengths between these bounds are neither rounded to 0 or infinity nor denormal.
 MIN_SQUARE, MAX_SQUARE = np.float32(1e-30), np.float32(1e30)
 
+#: Length in pixels of a foreshortened step, below which derivatives of the noise count less.
+SHORT_STEP = 0.125
+
 #: `PixelField.neighbor_mask` of a pixel that is linked to all neighbors.
 ALL_NEIGHBORS = 0b111_111_111
 
 #: The cell that streamlines stay in after their end: a corner of the border.
 SINK_CELL = 0
+
+
+class SeamTable:
+    """Finds the steps across seams; see `pixel_field.SeamSteps`.
+
+    Parameters
+    ----------
+    steps : SeamSteps
+    cell_of_pixel : (P,) int32 ndarray
+    sheets_per_turn : int
+    """
+
+    def __init__(self, steps: SeamSteps, cell_of_pixel: np.ndarray, sheets_per_turn: int) -> None:
+        self.steps = steps
+        # The cells of pixels are in ascending order, too.
+        self._key = cell_of_pixel.take(steps.source).astype(np.int64) * 9 + steps.bit
+        self.target_cell = cell_of_pixel.take(steps.target)
+        self.sheet_shift = steps.rotation * np.float32(sheets_per_turn / (2 * np.pi))
+
+    def find(self, cell: np.ndarray, bit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return which steps from (n,) cells cross seams, and the numbers of these steps."""
+        key = cell.astype(np.int64) * 9 + bit
+        place = np.minimum(np.searchsorted(self._key, key), max(len(self._key) - 1, 0))
+        crossing = np.flatnonzero(self._key.take(place) == key)
+        return crossing, place[crossing]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +99,8 @@ class Covering:
         The step on screen, x and y; then for each channel the noise and its derivative to the left.
     state_scales : (3,) tuple of float
         Scales of the integers: of the step (pixels), of the noise, and of its derivative.
+    seams : SeamTable or None
+        Steps across seams, if there are any.
     """
 
     sheets: int
@@ -80,6 +110,7 @@ class Covering:
     packed_phase: np.ndarray
     state_table: np.ndarray
     state_scales: tuple[float, float, float]
+    seams: SeamTable | None = None
 
     @property
     def line_count(self) -> int:
@@ -198,12 +229,10 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)
     cell_noise[cell_of_pixel] = noise
-    # Foreshortened directions may be longer than 1 where the field of view is wide.
-    max_step = 2.0 if look.foreshorten else 1.0
     max_noise = max(float(np.abs(noise).max()), 1e-30)
-    max_slope = 2 * max_noise * max_step
+    max_slope = 2 * max_noise / (SHORT_STEP if look.foreshorten else 1.0)
     quantize = [
-        np.float32(INT16_MAX / max_step),
+        np.float32(INT16_MAX),
         np.float32(INT16_MAX / max_noise),
         np.float32(INT16_MAX / max_slope),
     ]
@@ -223,12 +252,11 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
             angle = look.guiding_angle + 2 * np.pi * sheet / per_turn
             direction = _apply_harmonics(field, block, *_rotate(x, y, angle))
             step_x, step_y = _to_screen(field, block, *direction, look.foreshorten)
+            slope_x, slope_y = step_x, step_y
             if look.foreshorten:
-                step_x, step_y = (
-                    np.clip(step_x, -max_step, max_step),
-                    np.clip(step_y, -max_step, max_step),
-                )
-            rows[:, 3::2] = np.rint(up * step_x[:, None] - right * step_y[:, None])
+                step_x, step_y = _shorten_to_neighbors(step_x, step_y)
+                slope_x, slope_y = _over_square(step_x, step_y)
+            rows[:, 3::2] = np.rint(up * slope_x[:, None] - right * slope_y[:, None])
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
             scatter_rows(state_table[sheet], block_cells, rows)
@@ -244,11 +272,37 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
         packed_phase=packed_phase,
         state_table=state_table.reshape(-1, state_table.shape[2]),
         state_scales=(
-            look.step * max_step / INT16_MAX,
+            look.step / INT16_MAX,
             max_noise / INT16_MAX,
             max_slope / INT16_MAX,
         ),
+        seams=_seam_table(field.seam_steps, cell_of_pixel, per_turn),
     )
+
+
+def _shorten_to_neighbors(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shorten steps that are longer than one row or one column of pixels."""
+    scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
+    return x * scale, y * scale
+
+
+def _over_square(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Divide steps by their squared lengths, for derivatives of the noise to their left.
+
+    Such a derivative is multiplied by a distance to the left (see `streamline_batch`). Both are
+    proportional to the length of the step.
+    """
+    square = np.maximum(x * x + y * y, np.float32(SHORT_STEP * SHORT_STEP))
+    return x / square, y / square
+
+
+def _seam_table(
+    steps: SeamSteps | None, cell_of_pixel: np.ndarray, sheets_per_turn: int
+) -> SeamTable | None:
+    """Return the table of steps across seams, or None if there are none."""
+    if steps is None or not len(steps.source):
+        return None
+    return SeamTable(steps, cell_of_pixel, sheets_per_turn)
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:

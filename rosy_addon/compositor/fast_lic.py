@@ -254,9 +254,14 @@ def streamline_margin(look: Look) -> int:
 
 
 def _strips(field: PixelField, look: Look, band: Band | None) -> list[_Strip]:
-    """Divide a picture, or a band of it, into strips of rows, from the bottom."""
+    """Divide a picture, or a band of it, into strips of rows, from the bottom.
+
+    Across seams, streamlines can reach all rows. The picture is then a single strip.
+    """
     height, margin = field.height, streamline_margin(look)
-    count = strip_count(field.width, height, field.line_count, margin)
+    count = 1
+    if field.seam_steps is None:
+        count = strip_count(field.width, height, field.line_count, margin)
     borders = [height * number // count for number in range(count + 1)]
     strips = []
     for start, stop in pairwise(borders):

@@ -86,16 +86,50 @@ def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]
     exact_scale = look.unit_size / (
         pixel_world_size(np.concatenate(bounds), camera) * look.supersampling
     )
-    scale = float(
-        np.clip(
-            2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE),
-            *_scale_limits(look),
-        )
+    return _scaled_look(
+        look, 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
     )
+
+
+def look_on_surface(look: Look, step: float, pixel: float) -> Look:
+    """Return the look for lines on a surface that no camera sees, with its lengths in steps.
+
+    Parameters
+    ----------
+    look : Look
+    step : float
+        Length of a step of streamlines, in Blender units.
+    pixel : float
+        Blender units that replace a pixel, if the unit of the look is "pixels".
+
+    Returns
+    -------
+    Look
+        Foreshortened, as steps have one length on the surface.
+    """
+    unit_size = pixel if look.unit == "pixels" else look.unit_size
+    look = replace(
+        look,
+        unit="world",
+        unit_size=float(np.clip(unit_size, *_range_of("unit_size"))),
+        method="sheets",
+        anchor="surface",
+        foreshorten=True,
+        supersampling=1,
+        step=1.0,
+        length=max(round(look.length * look.step), 1),
+    )
+    return _scaled_look(look, unit_size / step)
+
+
+def _scaled_look(look: Look, scale: float) -> Look:
+    """Multiply the lengths of a look, as far as their ranges allow."""
+    scale = float(np.clip(scale, *_scale_limits(look)))
     lengths = {
         setting.name: _scaled_length(look, setting, scale) for setting in pixel_lengths(Look)
     }
-    return replace(look, **lengths, unit_size=look.unit_size / scale)
+    unit_size = float(np.clip(look.unit_size / scale, *_range_of("unit_size")))
+    return replace(look, **lengths, unit_size=unit_size)
 
 
 def preview_look(look: Look, downscale: int) -> Look:
@@ -163,6 +197,12 @@ def cell_size_args(look: Look) -> dict[str, Any]:
     if look.unit == "pixels":
         return {"pixel": 0.0, "smallest": 0.0}
     return {"pixel": look.unit_size, "smallest": float(look.supersampling)}
+
+
+def _range_of(name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a setting."""
+    setting = settings_of(Look)[name]
+    return setting.low, setting.high
 
 
 def _scale_limits(look: Look) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,41 @@ from ..projection.pixel_neighbors import neighbor_masks_task, screen_jacobians
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
+
+
+class SeamSteps(NamedTuple):
+    """Steps to neighbors that the picture has elsewhere: those across the seams of a UV map.
+
+    The K steps are in ascending order of `source` and `bit`. A displacement d in the picture, as a
+    complex number, is `linear` d + `conjugate` conj(d) after the step.
+
+    Attributes
+    ----------
+    source : (K,) int32 ndarray
+        Pixel before the step, as an index into the list of pixels.
+    bit : (K,) uint8 ndarray
+        The step, as an index into `NEIGHBOR_OFFSETS`.
+    target : (K,) int32 ndarray
+        Pixel after the step.
+    offset : (K,) complex64 ndarray
+        The point that is reached, relative to the center of that pixel, in pixels.
+    linear, conjugate : (K,) complex64 ndarray
+    rotation : (K,) float32 ndarray
+        Angle that a direction gains, relative to the frames of the field, in radians.
+    """
+
+    source: np.ndarray
+    bit: np.ndarray
+    target: np.ndarray
+    offset: np.ndarray
+    linear: np.ndarray
+    conjugate: np.ndarray
+    rotation: np.ndarray
+
+    def displaced(self, step: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+        """Return (n,) complex64 displacements in the picture after steps, by their numbers."""
+        linear, conjugate = self.linear.take(step), self.conjugate.take(step)
+        return linear * displacement + conjugate * displacement.conj()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +83,8 @@ class PixelField:
     gbuffer_index : slice or (P,) intp ndarray
         Indices of the pixels in the arrays of the G-buffer that they were taken from. A slice if
         all were taken.
+    seam_steps : SeamSteps or None
+        Steps to pixels that are not neighbors in the picture.
     """
 
     degree: int
@@ -58,6 +96,7 @@ class PixelField:
     neighbor_mask: np.ndarray
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     gbuffer_index: slice | np.ndarray = dataclass_field(default_factory=lambda: slice(None))
+    seam_steps: SeamSteps | None = None
 
     @cached_property
     def harmonics(self) -> list[tuple[int, np.ndarray]]:
@@ -84,7 +123,10 @@ class PixelField:
         return next((number for kind, number in self.channels if kind == "family"), 1)
 
     def part(self, extent: slice) -> PixelField:
-        """Return the field at some of the pixels. Its `neighbor_mask` is that of all pixels."""
+        """Return the field at some of the pixels, without its `seam_steps`.
+
+        Its `neighbor_mask` is that of all pixels.
+        """
         index = self.gbuffer_index
         if isinstance(index, slice):
             first = index.start or 0
@@ -99,6 +141,7 @@ class PixelField:
             neighbor_mask=self.neighbor_mask[extent],
             channels={channel: values[extent] for channel, values in self.channels.items()},
             gbuffer_index=index,
+            seam_steps=None,
         )
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:

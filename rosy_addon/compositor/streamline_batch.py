@@ -25,6 +25,9 @@ INTERPOLATED_GAIN = 1.0
 #: pixels.
 MAX_LATERAL_OFFSET = 0.25
 
+#: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
+MAX_SEAM_OFFSET = np.float32(1.5)
+
 
 class StreamlineBatch:
     """A batch of streamlines, traced together, with preallocated buffers.
@@ -198,14 +201,19 @@ class StreamlineBatch:
             np.maximum(flat_displacement, np.float32(-1), out=flat_displacement)
             np.minimum(flat_displacement, np.float32(1), out=flat_displacement)
             position -= displacement
-            active_counts[
-                self._step_cells(
-                    cell,
-                    unpack_neighbor_mask(packed_phase),
-                    flat_displacement[::2],
-                    flat_displacement[1::2],
-                )
-            ] = step
+            ended, crossing, seam = self._step_cells(
+                cell,
+                unpack_neighbor_mask(packed_phase),
+                flat_displacement[::2],
+                flat_displacement[1::2],
+            )
+            active_counts[ended] = step
+            if len(crossing):
+                steps = covering.seams.steps
+                reached = steps.displaced(seam, position[crossing]) + steps.offset.take(seam)
+                position[crossing] = _within_reach(reached)
+                direction[crossing] = steps.displaced(seam, direction[crossing])
+                target_phase[crossing] += covering.seams.sheet_shift.take(seam)
             packed_phase = covering.packed_phase.take(cell, mode="clip")
             target_phase -= packed_phase
             np.rint(target_phase, out=target_phase)
@@ -237,18 +245,35 @@ class StreamlineBatch:
 
     def _step_cells(
         self, cell: np.ndarray, mask: np.ndarray, column: np.ndarray, row: np.ndarray
-    ) -> np.ndarray:
-        """Step cells by -1 to 1 columns and rows, in place; return the indices of those that end."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Step cells by -1 to 1 columns and rows, in place.
+
+        Returns
+        -------
+        ended, crossing : (n,) intp ndarray
+            Indices of the streamlines that end, and of those that cross a seam.
+        seam : (n,) intp ndarray
+            The numbers of these steps across seams.
+        """
+        crossing = seam = np.empty(0, dtype=np.intp)
         blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
         if len(blocked):
             bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
-            blocked = blocked[mask[blocked] >> bit & 1 == 0]
+            is_blocked = mask[blocked] >> bit & 1 == 0
+            blocked, bit = blocked[is_blocked], bit[is_blocked]
         ended = blocked[cell[blocked] != SINK_CELL]
+        seams = self._covering.seams
+        if seams is not None and len(blocked):
+            crossing, seam = seams.find(cell[blocked], bit)
+            crossing = blocked[crossing]
+            ended = np.setdiff1d(ended, crossing, assume_unique=True)
         cell_offset = row * np.float32(self._covering.width)
         cell_offset += column
         cell += cell_offset.astype(np.intp)
         cell[blocked] = SINK_CELL
-        return ended
+        if len(crossing):
+            cell[crossing] = seams.target_cell.take(seam)
+        return ended, crossing, seam
 
     def _record_step(
         self,
@@ -341,6 +366,13 @@ class StreamlineBatch:
         row = np.where(same_side, step - 1, -step) * stride
         gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
         return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+
+def _within_reach(position: np.ndarray) -> np.ndarray:
+    """(n,) complex64 offsets from the centers of cells, at most `MAX_SEAM_OFFSET` along each axis."""
+    offset = position.view(np.float32)
+    np.clip(offset, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=offset)
+    return position
 
 
 def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.rest_coordinates import matrix_scale, rest_coordinates_task
+from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates_task
 from .image_noise import (
     BLUR_FACTOR,
     NOISE_MEAN,
@@ -111,9 +111,6 @@ def surface_noise_task(
     rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.3)
     units = instance_units(gbuffer, pixel)
     instance_hash = instance_hashes(gbuffer.instance_names)
-    # The variance of a mean along a streamline is proportional to the size of cells. The factor
-    # keeps it at that of cells of the size `grain`.
-    normalization = np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in pixel_blocks(len(gbuffer.pixel)):
         yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
@@ -122,12 +119,12 @@ def surface_noise_task(
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
         if detail:
             scale = scale * feature_scale(curvature[block], block_rest.pixel_size, grain, detail)
-        size = np.maximum(block_rest.pixel_size * scale, 1e-30)
-        level = np.log2(size * np.float32(grain * LATTICE_SCALE))
-        lattice = [_to_lattice_space(block_rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+        size = np.maximum(block_rest.pixel_size * scale, 1e-30) * np.float32(grain)
         block_hash = instance_hash[instance_id]
-        _accumulate_octaves(total[:, block], lattice, level, block_hash, seed, density)
-        total[:, block] *= normalization / np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
+        solid_noise(block_rest, size, block_hash, seed, density, out=total[:, block])
+        # The variance of a mean along a streamline is proportional to the size of cells. The factor
+        # keeps it at that of cells of the size `grain`.
+        total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
         yield from subtask(_high_pass_task(gbuffer, total, BLUR_FACTOR * high_pass), 0.6, 1.0)
@@ -136,6 +133,36 @@ def surface_noise_task(
         yield Progress(1.0, STEP_LABEL)
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
+
+
+def solid_noise(
+    rest: RestCoordinates,
+    cell_size: np.ndarray,
+    instance_hash: np.ndarray,
+    seed: int,
+    density: float,
+    out: np.ndarray,
+) -> None:
+    """Make noise in the rest space of meshes, averaged over pixels.
+
+    Parameters
+    ----------
+    rest : RestCoordinates
+        Of n pixels.
+    cell_size : (n,) float32 ndarray
+        Side of a cell on the surface, in Blender units of rest space.
+    instance_hash : (n,) uint32 ndarray
+        From `instance_hashes`.
+    seed, density
+        As for `surface_noise`.
+    out : (K, n) float32 ndarray
+        Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
+    """
+    level = np.log2(cell_size * np.float32(LATTICE_SCALE))
+    lattice = [_to_lattice_space(rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+    out[...] = 0
+    _accumulate_octaves(out, lattice, level, instance_hash, seed, density)
+    out *= np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
 
 
 def instance_units(gbuffer: GBuffer, unit: float) -> np.ndarray | None:

@@ -6,6 +6,7 @@ A package imports only from those above it::
     projection            cameras, rasterizer, G-buffer and shadow maps
     compositor            pictures from G-buffers
     line_drawing          streamlines on surfaces, as strokes
+    surface_texture       textures of the surface, for UV maps
     rendering, image_io   the renderer interface and its numpy renderer; image files
     gpu, presets          the renderer on the graphics card; stored looks and stroke settings
     scene                 reading and writing Blender data
@@ -18,8 +19,8 @@ The modules outside the packages are of two kinds. The base modules, such as `er
 `cache` and `settings`, are imported by many packages. The main jobs are run by operators and by the
 command line: `bake`, `animation`, `draw_strokes` and `turntable_video`.
 
-``field``, ``projection``, ``compositor``, ``line_drawing``, ``rendering``, ``image_io`` and
-``presets`` do not import bpy and need only numpy. The public names are those of `api`. They are
+``field``, ``projection``, ``compositor``, ``line_drawing``, ``surface_texture``, ``rendering``,
+``image_io`` and ``presets`` do not import bpy and need only numpy. The public names are those of `api`. They are
 loaded when they are first used.
 """
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
         RosyWarning,
         Singularities,
         Surface,
+        Texture,
         along_axis,
         along_uv,
         ambient_occlusion,
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
         render,
         smoothest,
         strokes,
+        texture,
         turntable,
     )
 
@@ -67,6 +70,7 @@ __all__ = [
     "RosyWarning",
     "Singularities",
     "Surface",
+    "Texture",
     "along_axis",
     "along_uv",
     "ambient_occlusion",
@@ -85,6 +89,7 @@ __all__ = [
     "render",
     "smoothest",
     "strokes",
+    "texture",
     "turntable",
 ]
 

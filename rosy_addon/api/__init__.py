@@ -7,6 +7,7 @@ Angles are in radians, except those of a view, which are in degrees.
     generators   fields that are computed
     pictures     pictures and turntables
     drawings     strokes
+    textures     textures
 """
 
 from ..errors import RosyError, RosyWarning
@@ -26,6 +27,7 @@ from .field import (
 from .generators import along_axis, along_uv, curvature, features, form, guided, smoothest
 from .pictures import Picture, ambient_occlusion, list_presets, render, turntable
 from .surface import Surface
+from .textures import Texture, texture
 
 __all__ = [
     "Difference",
@@ -36,6 +38,7 @@ __all__ = [
     "RosyWarning",
     "Singularities",
     "Surface",
+    "Texture",
     "along_axis",
     "along_uv",
     "ambient_occlusion",
@@ -54,5 +57,6 @@ __all__ = [
     "render",
     "smoothest",
     "strokes",
+    "texture",
     "turntable",
 ]

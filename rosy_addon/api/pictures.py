@@ -217,7 +217,7 @@ def render(
     reference = None if tone_picture is None else _image_luminance(tone_picture)
     name = str(tone_picture) if isinstance(tone_picture, (str, os.PathLike)) else "tone_picture"
     picture_view = mesh_view(
-        _instance(surface, field, tone),
+        upright_instance(surface, field, tone),
         look,
         view,
         check_size(*size),
@@ -292,7 +292,7 @@ def turntable(
         encode = find_ffmpeg()
     sources = {"attribute": tone_values, "image": tone_image}
     look = picture_look(surface.name, preset, settings, sources)
-    instance = _instance(surface, field, _surface_tone(surface, tone_values, tone_image))
+    instance = upright_instance(surface, field, _surface_tone(surface, tone_values, tone_image))
     views = turntable_views(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic
     )
@@ -357,7 +357,9 @@ def find_ffmpeg() -> Encoder | None:
     return find_encoder()
 
 
-def _instance(surface: Surface, field: Field | None, tone: SurfaceTone | None) -> MeshInstance:
+def upright_instance(
+    surface: Surface, field: Field | None, tone: SurfaceTone | None
+) -> MeshInstance:
     """Return a surface with its field in world space, upright."""
     field = form(surface) if field is None else field
     check_same_surface(surface, field)

@@ -16,6 +16,7 @@ from .presets import add_presets_command
 from .render import add_render_command, add_turntable_command
 from .streams import discard_output, output_stream, print_error, print_line
 from .strokes import add_strokes_command
+from .texture import add_texture_command
 
 #: Options whose values may begin with a minus sign.
 NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--frames")
@@ -90,6 +91,7 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentPar
         add_render_command,
         add_strokes_command,
         add_turntable_command,
+        add_texture_command,
         add_field_command,
         add_info_command,
     ):

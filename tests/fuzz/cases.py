@@ -277,6 +277,33 @@ def _tone_case(rng: Generator, folder: Path) -> Case:
     return _command(rng, folder, [name], options, command=command, rate=0.06)
 
 
+def _texture_case(rng: Generator, folder: Path) -> Case:
+    """A texture for a UV map that may reach far, overlap, or have no area."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
+    suffix = ".obj" if rng.random() < 0.95 else list(WRITERS)[rng.integers(4)]
+    data = mesh_bytes(rng, suffix, mesh)
+    if rng.random() < 0.5:
+        scale, offset = 10.0 ** rng.uniform(-6, 6), rng.normal(0, 3, 2) * (rng.random() < 0.5)
+        u, v = scale * rng.random(2) * (rng.random(2) < 0.9)
+        words = (
+            b"vt %.9g %.9g" % (u * x + offset[0], v * y + offset[1]) for x, y in rng.random((9, 2))
+        )
+        lines = [next(words, line) if line[:2] == b"vt" else line for line in data.split(b"\n")]
+        data = b"\n".join(lines)
+    (folder / f"mesh{suffix}").write_bytes(data)
+    inputs = [f"mesh{suffix}"]
+    if rng.random() < 0.3:
+        inputs.append(_write_field(rng, folder, mesh))
+    size = str(
+        rng.choice([16, 32, 64, 200, 400, 8, 99999], p=[0.3, 0.3, 0.2, 0.1, 0.08, 0.01, 0.01])
+    )
+    leave_out = {"size", *({"generate", "degree"} if len(inputs) > 1 else ())}
+    words = random_options(rng, "texture", rate=0.12, leave_out=leave_out)
+    output = "out.<UDIM>.png" if rng.random() < 0.2 else "out.png"
+    outputs = {output, *(f"out.{number}.png" for number in range(1001, 1101))}
+    return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)
+
+
 def _path_case(rng: Generator, folder: Path) -> Case:
     """Paths that are not plain files, too long, linked, odd, or the input itself."""
     mesh = random_mesh(rng, faults=0)
@@ -384,6 +411,7 @@ CATEGORIES = {
     "options": Category(_option_case),
     "looks": Category(_look_case),
     "tones": Category(_tone_case),
+    "textures": Category(_texture_case),
     "paths": Category(_path_case, share=5),
     "streams": Category(_stream_case, share=1),
     "kills": Category(_kill_case, share=1),

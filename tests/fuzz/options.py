@@ -132,6 +132,7 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "sharp_angle": _number(0, 180, (30.0, 80.0)),
     "view": _numbers(2, 60.0),
     "size": _size,
+    "margin": lambda rng: str(rng.choice([0, 1, 4, 16, 512, -1])),
     "workers": lambda rng: str(rng.integers(-1, 5)),
     "preset": _preset,
     "set": _setting,

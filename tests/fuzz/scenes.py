@@ -282,6 +282,7 @@ def _link_library(folder: Path, *, missing: bool) -> None:
     library = folder / "library.blend"
     shutil.copy2(folder / "scene.blend", library)
     _new_file()
+    bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 64
     with bpy.data.libraries.load(str(library), link=True) as (source, target):
         target.objects = source.objects
     for obj in target.objects:

@@ -1,0 +1,177 @@
+"""`texture`: the field drawn in the UV map of a surface."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from ..compositor.look import Look
+from ..errors import RosyError
+from ..presets.store import default_user_folder, load_preset
+from ..progress import run_to_completion
+from ..surface_texture.draw import (
+    DEFAULT_MARGIN,
+    DEFAULT_SIZE,
+    check_texture_look,
+    check_texture_size,
+    draw_texture_task,
+)
+from .field import Field, warn
+from .generators import uv_map
+from .pictures import Picture, upright_instance
+from .surface import Surface
+
+#: What stands for the number of the tile in the name of a file, as in Blender.
+UDIM_TOKEN = "<UDIM>"
+
+#: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
+NOTABLE_OVERLAP = 0.05
+
+
+class Texture:
+    """A texture for the UV map of a surface. A notebook shows its first tile.
+
+    Attributes
+    ----------
+    tiles : dict of int to Picture
+        The pictures, by the numbers of their tiles. A texture that is not of the kind UDIM has one
+        picture, with the number 1001.
+    overlap : float
+        Fraction of the area of the UV map that lies under other charts, which show the same texels.
+    """
+
+    def __init__(self, tiles: dict[int, Picture], overlap: float) -> None:
+        self.tiles = tiles
+        self.overlap = overlap
+
+    def __repr__(self) -> str:
+        size = self._first().rgba.shape[0]
+        tiles = "" if len(self.tiles) == 1 else f", {len(self.tiles)} tiles"
+        return f"<Texture: {size} x {size} texels{tiles}>"
+
+    def _repr_png_(self) -> bytes:
+        return self._first()._repr_png_()
+
+    def _first(self) -> Picture:
+        return self.tiles[min(self.tiles)]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write 8-bit ``.png`` files.
+
+        Parameters
+        ----------
+        path : path-like
+            ``<UDIM>`` in the name of the file stands for the number of the tile, as in Blender.
+
+        Raises
+        ------
+        RosyError
+            If the name does not end in ``.png``, it has no place for the number of one of several
+            tiles, or a file cannot be written.
+        """
+        if len(self.tiles) > 1 and UDIM_TOKEN not in Path(path).name:
+            raise RosyError(
+                f"{path}: the name of the file has no {UDIM_TOKEN} for the number of the tile"
+            )
+        for number, picture in self.tiles.items():
+            picture.save(tile_path(path, number))
+
+
+def tile_path(path: str | os.PathLike[str], number: int) -> Path:
+    """Return the file of a tile."""
+    return Path(path).with_name(Path(path).name.replace(UDIM_TOKEN, str(number)))
+
+
+def texture(
+    surface: Surface,
+    field: Field | None = None,
+    *,
+    size: int = DEFAULT_SIZE,
+    margin: int = DEFAULT_MARGIN,
+    udim: bool = False,
+    preset: str | os.PathLike[str] | None = None,
+    **settings: Any,
+) -> Texture:
+    """Draw a field as a texture for the UV map of a surface.
+
+    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. Without light, as
+    the renderer that shows the texture lights it.
+
+    Parameters
+    ----------
+    surface : Surface
+        With a UV map.
+    field : Field, optional
+        By default a field of degree 4 along the form of the surface; see `form`.
+    size : int
+        Width and height in texels.
+    margin : int
+        Width of the margin around charts, in texels. Smaller versions of the texture then show no
+        seams either.
+    udim : bool
+        Whether each tile of the UV map has a picture of its own. Otherwise, the texture repeats beyond u
+        and v from 0 to 1.
+    preset : str or path-like, optional
+        Name of a preset, or a ``.json`` file; see `list_presets`.
+    **settings
+        Settings of the look, after the preset: ``grain=3, seed=3``. A pixel is that of a square with the
+        area of the surface and 1024 pixels on each side, whatever the size of the texture. With
+        ``unit="world", unit_size=0.002`` it is that many units of length.
+
+    Returns
+    -------
+    Texture
+
+    Warns
+    -----
+    RosyWarning
+        If charts overlap.
+
+    Raises
+    ------
+    RosyError
+        If there is no UV map, it cannot be drawn, a setting or the preset is not possible or draws ink,
+        or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> square = rf.Surface(
+    ...     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+    ...     [[0, 1, 2, 3]],
+    ...     uv=[[0, 0], [1, 0], [1, 1], [0, 1]],
+    ... )
+    >>> rf.texture(square, rf.along_axis(square, (1, 1, 0), degree=2), size=64)
+    <Texture: 64 x 64 texels>
+    """
+    look = texture_look(surface.name, preset, settings)
+    check_texture_size(size, margin)
+    uv = uv_map(surface)
+    drawn = run_to_completion(
+        draw_texture_task(
+            upright_instance(surface, field, None), uv, look, size, margin=margin, is_udim=udim
+        )
+    )
+    if drawn.overlap > NOTABLE_OVERLAP:
+        warn(
+            f"{surface.name}: {drawn.overlap:.0%} of its UV map lies under other charts, which show the "
+            "same texels: unwrap the mesh without overlaps if they are to differ"
+        )
+    return Texture({number: Picture(rgba) for number, rgba in drawn.tiles().items()}, drawn.overlap)
+
+
+def texture_look(
+    name: str, preset: str | os.PathLike[str] | None, settings: dict[str, Any]
+) -> Look:
+    """Return the look of a texture of the mesh `name`.
+
+    Raises
+    ------
+    RosyError
+        If a setting is not possible, or the look cannot be drawn as a texture.
+    """
+    look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
+    look = look.with_settings(dict(settings))
+    check_texture_look(look, name)
+    return look

@@ -1,0 +1,1 @@
+"""Textures of the surface: the field drawn in a UV map, without seams."""

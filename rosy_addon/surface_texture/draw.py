@@ -1,0 +1,244 @@
+"""Draw the field of a mesh as a texture for one of its UV maps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..cache import Cache
+from ..compositor.compose import colorize, layer_task
+from ..compositor.lic import lic_lengths_task
+from ..compositor.lic_images import with_magnitude_range
+from ..compositor.look import Look, colors_magnitude, is_hatched
+from ..compositor.look_units import look_on_surface
+from ..errors import RosyError
+from ..line_drawing.tangent_mesh import TangentMesh, tangent_mesh_task
+from ..memory import check_memory, raise_mmap_threshold
+from ..progress import Progress, Task, run_to_completion, subtask
+from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.rest_coordinates import matrix_scale
+from .charts import UvCharts, uv_charts_task
+from .margin import margin_task
+from .texel_field import texel_field_task
+from .texel_noise import texel_noise_task
+from .texels import Texels, TextureFrame, texels_task, texture_frame
+
+#: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
+#: mesh fills has lines of about the same width.
+SURFACE_PIXELS = 1024
+
+#: A step is one texel long where the UV map is finest, but for this fraction of the texels.
+FINE_FRACTION = 0.05
+
+#: Smallest length of a step, in texels of the mean size.
+MIN_STEP = 0.25
+
+#: Texels on each side of a texture: default and range.
+DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = 2048, 16, 16384
+
+#: Margin in texels: default and maximum.
+DEFAULT_MARGIN, MAX_MARGIN = 16, 512
+
+#: Bytes of a texel of the frame, of each line there, and of the same with colored noise; of a texel of a
+#: chart, and of each line there for each channel of the noise. Fitted to measurements.
+TEXEL_BYTES, LINE_BYTES, COLORED_LINE_BYTES = 14, 24, 48
+CHART_TEXEL_BYTES, CHART_LINE_BYTES = 64, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A texture of the surface.
+
+    Attributes
+    ----------
+    frame : TextureFrame
+    rgba : (H, W, 4) float32 ndarray
+        Linear, opaque, rows from the bottom. The tiles of a UDIM texture are stacked.
+    overlap : float
+        Fraction of the area of the UV map that lies under other parts of it. They show the same texels.
+    """
+
+    frame: TextureFrame
+    rgba: np.ndarray
+    overlap: float
+
+    def tiles(self) -> dict[int, np.ndarray]:
+        """Return the (size, size, 4) picture of each tile, by its UDIM number."""
+        if not self.frame.is_udim:
+            return {self.frame.tile_names()[0]: self.rgba}
+        size = self.frame.size
+        return {
+            name: self.rgba[row * size : (row + 1) * size]
+            for row, name in enumerate(self.frame.tile_names())
+        }
+
+
+def draw_texture(
+    instance: MeshInstance, uv: np.ndarray, look: Look, size: int, **options
+) -> Texture:
+    """Run `draw_texture_task` to its end."""
+    return run_to_completion(draw_texture_task(instance, uv, look, size, **options))
+
+
+def draw_texture_task(
+    instance: MeshInstance,
+    uv: np.ndarray,
+    look: Look,
+    size: int,
+    *,
+    margin: int = DEFAULT_MARGIN,
+    is_udim: bool = False,
+    cache: Cache | None = None,
+) -> Task[Texture]:
+    """Draw the field of a mesh as a texture.
+
+    Streamlines run on the surface. Texture and line width do not depend on the charts of the UV map.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+        With a field.
+    uv : (C, 2) ndarray
+        u and v at the corners of the surface.
+    look : Look
+        With soft ink. The light, the tone and the settings of a camera have no effect. With the unit
+        "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
+        each side.
+    size : int
+        Texels on each side of the texture, or of a tile of it.
+    margin : int
+        Width of the margin around charts, in texels.
+    is_udim : bool
+        Whether the tiles of the UV map are pictures of their own.
+    cache : Cache, optional
+        Stores what does not depend on the look.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    Texture
+
+    Raises
+    ------
+    RosyError
+        If there is no field, the look is one of ink, the size or the margin is out of range, the UV map
+        cannot be drawn, or there is not enough memory.
+    """
+    name = instance.surface.name
+    check_texture_look(look, name)
+    check_texture_size(size, margin)
+    raise_mmap_threshold()
+    mesh = yield from subtask(
+        tangent_mesh_task(
+            instance,
+            display=look.display,
+            cross_creases=look.cross_creases,
+            crease_angle=look.crease_angle,
+            cache=cache,
+        ),
+        0.0,
+        0.05,
+    )
+    charts = yield from subtask(uv_charts_task(instance.surface, mesh, uv), 0.05, 0.1)
+    frame = texture_frame(charts, size, name, is_udim)
+    _check_texture_memory(frame, charts, mesh, look)
+    texels = yield from subtask(texels_task(charts, frame, name), 0.1, 0.15)
+    step = step_length(mesh, charts, texels)
+    look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
+    color_task = _colors_task(instance, mesh, charts, texels, look, step)
+    field, color = yield from subtask(color_task, 0.15, 0.95)
+    image = yield from subtask(margin_task(frame, field, color, margin), 0.95, 1.0)
+    rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
+    rgba[..., :3] = image
+    return Texture(frame, rgba, texels.overlap)
+
+
+def check_texture_look(look: Look, name: str) -> None:
+    """Check that a look can be drawn as a texture.
+
+    Raises
+    ------
+    RosyError
+        If its ink is not soft.
+    """
+    if is_hatched(look):
+        raise RosyError(
+            f"{name}: a texture shows soft streaks, but the look has ink: choose the ink style Soft"
+        )
+
+
+def check_texture_size(size: int, margin: int) -> None:
+    """Check the size and the margin of a texture, in texels.
+
+    Raises
+    ------
+    RosyError
+        If one of them is out of range.
+    """
+    for value, low, high, what in (
+        (size, MIN_SIZE, MAX_SIZE, "a size"),
+        (margin, 0, MAX_MARGIN, "a margin"),
+    ):
+        if not low <= value <= high:
+            raise RosyError(
+                f"a texture cannot have {what} of {value} texels: choose {low} to {high}"
+            )
+
+
+def _check_texture_memory(
+    frame: TextureFrame, charts: UvCharts, mesh: TangentMesh, look: Look
+) -> None:
+    """Check that there is memory for a texture; see `memory.check_memory`."""
+    texels = frame.width * frame.height
+    used = min(float((mesh.area * np.abs(charts.density)).sum()) * frame.size**2, texels)
+    lines, is_colored = mesh.family_count, look.noise == "colour"
+    needed = texels * (TEXEL_BYTES + lines * (COLORED_LINE_BYTES if is_colored else LINE_BYTES))
+    needed += used * (CHART_TEXEL_BYTES + lines * CHART_LINE_BYTES * (3 if is_colored else 1))
+    tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
+    check_memory(
+        needed,
+        f"a texture of {tiles}{frame.size} x {frame.size} texels",
+        "choose a smaller size",
+    )
+
+
+def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
+    """Return the length of a step of streamlines, in Blender units.
+
+    It is a texel where the UV map is fine, so that streamlines step from texel to texel.
+    """
+    texels_per_unit = charts.stretch()[0][texels.triangle] * texels.frame.size
+    finest = float(np.quantile(texels_per_unit, 1 - FINE_FRACTION))
+    mean_size = float(np.sqrt(mesh.area.sum() / len(texels)))
+    return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
+
+
+def _colors_task(
+    instance: MeshInstance,
+    mesh: TangentMesh,
+    charts: UvCharts,
+    texels: Texels,
+    look: Look,
+    step: float,
+):
+    """Return the field at texels, and their (P, 3) linear colors."""
+    crease_angle = None if look.cross_creases else look.crease_angle
+    field_task = texel_field_task(mesh, charts, texels, step, crease_angle)
+    field = yield from subtask(field_task, 0.0, 0.2)
+    scale = matrix_scale(instance.matrix)
+    noise_task = texel_noise_task(instance.surface, charts, texels, look, step, scale)
+    noise = yield from subtask(noise_task, 0.2, 0.45)
+    (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.45, 0.95)
+    layer = yield from subtask(layer_task(field, look, images), 0.95, 0.95)
+    if colors_magnitude(look):
+        look = with_magnitude_range(look, field)
+    color = np.empty((len(field.pixel), 3), dtype=np.float32)
+    for block in pixel_blocks(len(color)):
+        yield Progress(0.95 + 0.05 * block.start / len(color), "drawing the colors")
+        color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
+    return field, color

@@ -1,0 +1,306 @@
+"""The field at the texels of a UV map, and the steps from texel to texel along the surface.
+
+Inside of a chart, a streamline steps to neighboring texels. Across a seam, and across the border of a
+tile, a step is a straight line on the surface: it is unfolded over the edges between the triangles, and
+leads to the texel where it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
+from ..field.frames import dot
+from ..field.representation import power, signed_power
+from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
+from ..line_drawing.tangent_mesh import TangentMesh
+from ..progress import Progress, Task, subtask
+from ..projection.field_channel import FieldChannel, rotation_order
+from ..projection.pixel_blocks import pixel_blocks
+from .charts import UvCharts
+from .texels import Texels
+
+#: Neighboring texels are also neighbors on the surface if their distance there is at most this many
+#: times what the UV map stretches their distance to.
+MAX_STRETCHED_STEP = 2.0
+
+#: A step across a seam arrives if it covers at least this fraction of its length.
+MIN_WALKED_RATIO = 0.999
+
+#: Largest factor by which a step across a seam stretches displacements. Streamlines end where triangles
+#: have nearly no area in the UV map.
+MAX_SEAM_STRETCH = 64.0
+
+#: Texels whose steps across seams are traced at once.
+SEAM_BLOCK = 1 << 14
+
+#: Label of all steps.
+STEP_LABEL = "following the surface across seams"
+
+
+def texel_field_task(
+    mesh: TangentMesh,
+    charts: UvCharts,
+    texels: Texels,
+    step: float,
+    crease_angle: float | None,
+) -> Task[PixelField]:
+    """Compute the field at texels.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    charts : UvCharts
+    texels : Texels
+    step : float
+        Length of a step of streamlines, in Blender units.
+    crease_angle : float or None
+        Streamlines end where the normals of neighboring texels differ by more than this angle, in
+        radians. None if they cross creases.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    PixelField
+        Its `screen_jacobian` maps unit tangents to steps in texels, which are foreshortened where the
+        UV map is coarse.
+    """
+    count, size, degree = len(texels), texels.frame.size, mesh.degree
+    z = np.empty(count, dtype=np.complex64)
+    jacobian = np.empty((2, count), dtype=np.complex64).T
+    channels: dict[FieldChannel, np.ndarray] = {
+        ("deviation", number): np.empty(count, dtype=np.complex64) for number, _ in mesh.harmonics
+    }
+    family = ("family", mesh.family_count)
+    if mesh.family_z is not None:
+        channels[family] = np.empty(count, dtype=np.complex64)
+    to_texels = size * step
+    for block in pixel_blocks(count):
+        yield Progress(0.3 * block.start / count, "finding directions")
+        triangle, weights = texels.triangle[block], texels.barycentric[block]
+        frame = frames_at(charts, triangle, weights)
+        z[block] = np.einsum("nk,nk->n", weights, mesh.z[triangle]) * power(frame.conj(), degree)
+        for axis, tangent in enumerate((frame, 1j * frame)):
+            jacobian[block, axis] = to_texels * charts.to_uv(triangle, tangent)
+        for number, values in mesh.harmonics:
+            channel = ("deviation", number)
+            turn = signed_power(frame.conj(), rotation_order(channel, degree))
+            channels[channel][block] = np.einsum("nk,nk->n", weights, values[triangle]) * turn
+        if mesh.family_z is not None:
+            turn = signed_power(frame.conj(), rotation_order(family, degree))
+            channels[family][block] = mesh.family_z[triangle] * turn
+    masks_task = _neighbor_masks_task(mesh, charts, texels, z != 0, crease_angle)
+    mask = yield from subtask(masks_task, 0.3, 0.7)
+    seam_steps = yield from subtask(_seam_steps_task(mesh, charts, texels, mask, z != 0), 0.7, 1.0)
+    return PixelField(
+        degree=degree,
+        width=texels.frame.width,
+        height=texels.frame.height,
+        pixel=texels.index,
+        representation=z,
+        screen_jacobian=jacobian,
+        neighbor_mask=mask,
+        channels=channels,
+        seam_steps=seam_steps,
+    )
+
+
+def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return (n,) complex128: the unit tangents `UvCharts.frame` at (n, 3) barycentric coordinates."""
+    corner = charts.frame[triangle]
+    frame = np.einsum("nk,nk->n", weights, corner)
+    norm = np.abs(frame)
+    return np.divide(frame, norm, out=corner[:, 0].copy(), where=norm > 1e-6)
+
+
+def _neighbor_masks_task(
+    mesh: TangentMesh,
+    charts: UvCharts,
+    texels: Texels,
+    defined: np.ndarray,
+    crease_angle: float | None,
+) -> Task[np.ndarray]:
+    """(P,) uint16 `PixelField.neighbor_mask`: the neighbors in the same chart, near on the surface."""
+    masks = np.zeros(len(texels), dtype=np.uint16)
+    masks[defined] = 1 << 4
+    # Squared length on the surface that a texel is stretched to at most, and points and normals.
+    stretch = charts.stretch()[1] * texels.frame.size
+    reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
+    reach_squared = (reach * reach).astype(np.float32)
+    min_cosine = None if crease_angle is None else np.cos(crease_angle)
+    width, height = texels.frame.width, texels.frame.height
+    band_rows = max((1 << 16) // width, 1)
+    for first_row in range(0, height, band_rows):
+        yield Progress(first_row / height, STEP_LABEL)
+        rows = min(band_rows + 1, height - first_row)
+        first, stop = np.searchsorted(
+            texels.index, [first_row * width, (first_row + rows) * width]
+        ).tolist()
+        triangle, weights = texels.triangle[first:stop], texels.barycentric[first:stop]
+        point = np.einsum("nk,nki->ni", weights, mesh.points[triangle].astype(np.float32))
+        normal = None
+        if min_cosine is not None:
+            normal = np.einsum("nk,nki->ni", weights, mesh.corner_normal[triangle].astype("f4"))
+            normal /= np.sqrt(np.maximum(dot(normal, normal), 1e-20))[:, None]
+        grid = np.full((rows, width), -1, dtype=np.int32)
+        grid.reshape(-1)[texels.index[first:stop] - first_row * width] = np.arange(stop - first)
+        for source, target, bit in _neighbor_pairs(grid):
+            a, b = triangle[source], triangle[target]
+            linked = a == b
+            other = np.flatnonzero(~linked)
+            a, b, own, neighbor = a[other], b[other], source[other], target[other]
+            offset = point[own] - point[neighbor]
+            dx, dy = NEIGHBOR_OFFSETS[bit]
+            near = dot(offset, offset) <= (dx * dx + dy * dy) * np.maximum(
+                reach_squared[a], reach_squared[b]
+            )
+            near &= charts.chart[a] == charts.chart[b]
+            if normal is not None:
+                near &= dot(normal[own], normal[neighbor]) >= min_cosine
+            linked[other] = near
+            linked &= defined[first + source] & defined[first + target]
+            source, target = first + source[linked], first + target[linked]
+            masks[source] |= np.uint16(1 << bit)
+            masks[target] |= np.uint16(1 << (8 - bit))
+    return masks
+
+
+def _neighbor_pairs(grid: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, int]]:
+    """Yield the pairs of neighbors in an image of indices, and the bit of the step between them.
+
+    -1 stands for no texel. Each pair is yielded in one direction.
+    """
+    height, width = grid.shape
+    for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
+        left, right = max(-dx, 0), width - max(dx, 0)
+        source = grid[: height - dy, left:right].ravel()
+        target = grid[dy:, left + dx : right + dx].ravel()
+        both = (source >= 0) & (target >= 0)
+        yield source[both], target[both], NEIGHBOR_OFFSETS.index((dx, dy))
+
+
+def _seam_steps_task(
+    mesh: TangentMesh, charts: UvCharts, texels: Texels, mask: np.ndarray, defined: np.ndarray
+) -> Task[SeamSteps]:
+    """Trace the steps that `mask` does not have along the surface."""
+    entry = np.full(texels.frame.width * texels.frame.height, -1, dtype=np.int32)
+    entry[texels.index] = np.arange(len(texels), dtype=np.int32)
+    border = np.flatnonzero(defined & (mask != 0b111_111_111))
+    source, bit = np.nonzero(mask[border, None] >> np.arange(9, dtype=np.uint16) & 1 == 0)
+    source, bit = border[source].astype(np.int32), bit.astype(np.uint8)
+    offsets = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])
+    parts = []
+    for start in range(0, len(source), SEAM_BLOCK):
+        yield Progress(start / len(source), STEP_LABEL)
+        part = slice(start, start + SEAM_BLOCK)
+        parts.append(
+            _seam_steps(
+                mesh, charts, texels, defined, entry, source[part], bit[part], offsets[bit[part]]
+            )
+        )
+    if not parts:
+        return _no_seam_steps()
+    return SeamSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _no_seam_steps() -> SeamSteps:
+    """Return no steps: the UV map has no seam that streamlines could cross."""
+    integer, number = np.empty(0, np.int32), np.empty(0, np.complex64)
+    return SeamSteps(
+        integer, np.empty(0, np.uint8), integer, number, number, number, np.empty(0, np.float32)
+    )
+
+
+def _seam_steps(
+    mesh: TangentMesh,
+    charts: UvCharts,
+    texels: Texels,
+    defined: np.ndarray,
+    entry: np.ndarray,
+    source: np.ndarray,
+    bit: np.ndarray,
+    offset: np.ndarray,
+) -> SeamSteps:
+    """Return those of n steps that lead to a texel.
+
+    Parameters
+    ----------
+    source, bit, offset : (n,) ndarrays
+        Texels, and the steps from them, also as complex numbers in texels.
+    entry : (H W,) int32 ndarray
+        The texel at each place of the frame, or -1.
+    """
+    size = texels.frame.size
+    triangle = texels.triangle[source]
+    weights = texels.barycentric[source].astype(np.float64)
+    tangent = charts.to_surface(triangle, offset / size)
+    length = np.abs(tangent)
+    frame = frames_at(charts, triangle, weights)
+    unit = np.divide(tangent, length, out=np.ones_like(tangent), where=length > 0)
+    start = SurfaceParticles(triangle, weights, frame.copy(), np.ones(len(source)))
+    end, direction, walked = trace_geodesics(mesh, start, unit, length)
+    arrived = (walked >= MIN_WALKED_RATIO * length) & (length > 0)
+    uv = np.einsum("nk,nk->n", end.weights, charts.uv[end.triangle]) * size
+    target, reached = _nearest_texels(charts, texels, entry, end.triangle, uv)
+    arrived &= target >= 0
+    arrived[arrived] &= defined[target[arrived]]
+    # Tangents are rotated by this from the frame of the one triangle to that of the other.
+    turn = direction * unit.conj()
+    back, back_conjugate = (part[triangle] for part in charts.inverse())
+    ahead, ahead_conjugate = charts.linear[end.triangle], charts.conjugate[end.triangle]
+    linear = ahead * turn * back + ahead_conjugate * (turn * back_conjugate).conj()
+    conjugate = ahead * turn * back_conjugate + ahead_conjugate * (turn * back).conj()
+    arrived &= np.abs(linear) + np.abs(conjugate) <= MAX_SEAM_STRETCH
+    kept = np.flatnonzero(arrived)
+    end_frame = frames_at(charts, end.triangle[kept], end.weights[kept])
+    return SeamSteps(
+        source=source[kept],
+        bit=bit[kept],
+        target=target[kept],
+        offset=reached[kept].astype(np.complex64),
+        linear=linear[kept].astype(np.complex64),
+        conjugate=conjugate[kept].astype(np.complex64),
+        rotation=np.angle(frame[kept] * turn[kept] * end_frame.conj()).astype(np.float32),
+    )
+
+
+def _nearest_texels(
+    charts: UvCharts, texels: Texels, entry: np.ndarray, triangle: np.ndarray, uv: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find the texel of the same chart that is nearest to each point of the UV plane.
+
+    Parameters
+    ----------
+    triangle : (n,) int32 ndarray
+        Triangles of the points.
+    uv : (n,) complex128 ndarray
+        The points, in texels.
+
+    Returns
+    -------
+    texel : (n,) int32 ndarray
+        -1 if none of the nine around the point is one.
+    offset : (n,) complex128 ndarray
+        The point, relative to the center of that texel.
+    """
+    column, row = np.floor(uv.real).astype(np.intp), np.floor(uv.imag).astype(np.intp)
+    best = np.full(len(uv), np.inf)
+    texel, offset = np.full(len(uv), -1, dtype=np.int32), np.zeros(len(uv), dtype=np.complex128)
+    for dx, dy in NEIGHBOR_OFFSETS:
+        index = texels.frame.flat_indices(column + dx, row + dy)
+        candidate = np.where(index >= 0, entry.take(np.maximum(index, 0)), -1)
+        same = charts.chart.take(texels.triangle.take(candidate)) == charts.chart.take(triangle)
+        delta = uv - (column + dx + 0.5 + 1j * (row + dy + 0.5))
+        distance = np.where((candidate >= 0) & same, np.abs(delta), np.inf)
+        nearer = distance < best
+        best[nearer], texel[nearer], offset[nearer] = (
+            distance[nearer],
+            candidate[nearer],
+            delta[nearer],
+        )
+    return texel, offset

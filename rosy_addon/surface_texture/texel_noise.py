@@ -1,0 +1,167 @@
+"""Noise at texels: the noise of the surface, with cells of one size in Blender units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
+from ..compositor.look import Look
+from ..compositor.surface_noise import instance_hashes, solid_noise
+from ..field.surface import Surface
+from ..progress import Progress, Task
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.rest_coordinates import RestCoordinates, rest_positions
+from .charts import UvCharts
+from .texels import Texels
+
+#: Smallest side of a cell of the noise, in texels of the coarser direction.
+MIN_CELL_TEXELS = 1.0
+
+#: Most points on each side of the grid whose values are the means that a high pass subtracts.
+MAX_GRID_SIDE = 256
+
+#: Side of a cell of that grid, in standard deviations of the blur. Values are spread to the corners of
+#: their cell and interpolated from them, both linearly.
+GRID_CELL_SIGMAS = 3**0.5
+
+#: Texels that are spread over the grid at once.
+GRID_BLOCK = 1 << 18
+
+#: Label of all steps.
+STEP_LABEL = "making noise"
+
+
+def texel_noise_task(
+    surface: Surface,
+    charts: UvCharts,
+    texels: Texels,
+    look: Look,
+    step: float,
+    scale: float,
+) -> Task[np.ndarray]:
+    """Make noise that is anchored to the surface, at its texels.
+
+    Parameters
+    ----------
+    surface : Surface
+    charts : UvCharts
+    texels : Texels
+    look : Look
+        In steps of streamlines. Its `grain`, `density`, `high_pass`, `noise` and `seed` are used.
+    step : float
+        Length of a step, in Blender units.
+    scale : float
+        Blender units of the world in one of object space.
+
+    Returns
+    -------
+    (P, K) float32 ndarray
+        With the mean `NOISE_MEAN`.
+    """
+    channels = 3 if look.noise == "colour" else 1
+    rest = rest_positions(surface).astype(np.float32)
+    triangle_vertex = surface.triangle_vertex
+    gradient = (charts.gradient / texels.frame.size).astype(np.complex64)
+    stretch = charts.stretch()[1] * (texels.frame.size * scale)
+    coarse = np.divide(MIN_CELL_TEXELS, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
+    cell_size = np.maximum(look.grain * step / scale, coarse).astype(np.float32)
+    instance_hash = instance_hashes([surface.name])
+    total = np.empty((channels, len(texels)), dtype=np.float32)
+    for block in pixel_blocks(len(texels)):
+        yield Progress(0.7 * block.start / len(texels), STEP_LABEL)
+        triangle = texels.triangle[block]
+        corners = triangle_vertex.take(triangle, axis=0).T
+        change = gradient.take(triangle, axis=0).T
+        size = cell_size.take(triangle)
+        coordinates = RestCoordinates(
+            texels.barycentric[block].T,
+            change.real,
+            change.imag,
+            tuple(rest.take(corner, axis=0).T for corner in corners),
+            size,
+        )
+        block_hash = np.broadcast_to(instance_hash, len(triangle))
+        solid_noise(coordinates, size, block_hash, look.seed, look.density, out=total[:, block])
+    if look.high_pass:
+        sigma = BLUR_FACTOR * look.high_pass * step / scale
+        yield from _subtract_local_means_task(surface, charts, texels, rest, total, sigma)
+    noise = np.empty(total.shape[::-1], dtype=np.float32)
+    for block in pixel_blocks(len(noise)):
+        yield Progress(1.0, STEP_LABEL)
+        noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
+    return noise
+
+
+def _subtract_local_means_task(
+    surface: Surface,
+    charts: UvCharts,
+    texels: Texels,
+    rest: np.ndarray,
+    channels: np.ndarray,
+    sigma: float,
+) -> Task[None]:
+    """Subtract a blur over the surface from (K, P) values at texels, in place.
+
+    The blur is one in space: values are spread over a grid, and interpolated from it. So it knows no
+    charts.
+
+    Parameters
+    ----------
+    rest : (V, 3) float32 ndarray
+        `rest_positions` of the surface.
+    sigma : float
+        Of the blur, in Blender units of rest space.
+    """
+    used = rest[surface.used_vertices]
+    low, extent = used.min(axis=0), float(np.ptp(used, axis=0).max())
+    side = max(GRID_CELL_SIGMAS * sigma, extent / (MAX_GRID_SIDE - 2))
+    shape = (np.ptp(used, axis=0) / side).astype(np.intp) + 2
+    stride = np.array([shape[1] * shape[2], shape[2], 1])
+    area = np.abs(charts.density)
+    area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
+    count = len(texels)
+    blocks = [slice(start, start + GRID_BLOCK) for start in range(0, count, GRID_BLOCK)]
+
+    def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (n,) lowest points of the cells of texels, and (n, 3) places in the cells."""
+        triangle = texels.triangle[block]
+        position = np.zeros((len(triangle), 3), dtype=np.float32)
+        for corner, weight in zip(
+            surface.triangle_vertex.take(triangle, axis=0).T,
+            texels.barycentric[block].T,
+            strict=True,
+        ):
+            position += weight[:, None] * rest.take(corner, axis=0)
+        position = (position - low) / np.float32(side)
+        cell = np.clip(position.astype(np.intp), 0, shape - 2)
+        return cell @ stride, np.clip(position - cell, 0, 1).astype(np.float32)
+
+    sums = np.zeros((1 + len(channels), int(shape.prod())))
+    for number, block in enumerate(blocks):
+        yield Progress(0.7 + 0.15 * number / len(blocks), STEP_LABEL)
+        first, place = cells(block)
+        weight = area[texels.triangle[block]]
+        for offset, share in _corner_shares(place, stride):
+            point, share = first + offset, share * weight
+            sums[0] += np.bincount(point, share, sums.shape[1])
+            for values, out in zip(channels, sums[1:], strict=True):
+                out += np.bincount(point, share * values[block], sums.shape[1])
+    means = (sums[1:] / np.maximum(sums[0], np.finfo(float).tiny)).astype(np.float32)
+    for number, block in enumerate(blocks):
+        yield Progress(0.85 + 0.15 * number / len(blocks), STEP_LABEL)
+        first, place = cells(block)
+        for offset, share in _corner_shares(place, stride):
+            for values, mean in zip(channels, means, strict=True):
+                values[block] -= share * mean.take(first + offset)
+
+
+def _corner_shares(place: np.ndarray, stride: np.ndarray):
+    """Yield the offset of each corner of a cell in the grid, and the (n,) weights of linear interpolation.
+
+    `place` is (n, 3), from 0 to 1.
+    """
+    for corner in np.ndindex(2, 2, 2):
+        share = np.ones(len(place), dtype=np.float32)
+        for axis, upper in enumerate(corner):
+            share *= place[:, axis] if upper else 1 - place[:, axis]
+        yield int(np.dot(corner, stride)), share

@@ -1,0 +1,200 @@
+"""`Texels`: the points of the surface that the texels of a UV map show.
+
+A map may have several tiles, which are unit squares of the UV plane. The texels of all tiles are one
+frame: the tiles of a UDIM texture are stacked. Other textures repeat, so all their tiles are at the same
+place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, subtask
+from ..projection.rasterizer import rasterize_task
+from .charts import UvCharts
+
+#: Most tiles of a UV map.
+MAX_TILES = 100
+
+#: Number of the tile at the origin, and tiles in a row, in the numbering of UDIM.
+FIRST_TILE, TILES_PER_ROW = 1001, 10
+
+#: Label of all steps.
+STEP_LABEL = "finding texels"
+
+
+@dataclass(frozen=True)
+class TextureFrame:
+    """The frame of all texels of a texture.
+
+    Attributes
+    ----------
+    size : int
+        Texels on each side of a tile.
+    tiles : tuple of (int, int)
+        u and v of the lower left corners of the tiles that have a chart.
+    is_udim : bool
+        Whether each tile is a picture of its own. Otherwise, all show the same picture.
+    """
+
+    size: int
+    tiles: tuple[tuple[int, int], ...]
+    is_udim: bool = False
+
+    @property
+    def width(self) -> int:
+        """Texels in a row."""
+        return self.size
+
+    @property
+    def height(self) -> int:
+        """Rows of texels."""
+        return self.size * len(self.tiles) if self.is_udim else self.size
+
+    def tile_names(self) -> list[int]:
+        """Return the UDIM numbers of the tiles, from the bottom of the frame."""
+        return [FIRST_TILE + u + TILES_PER_ROW * v for u, v in self.tiles]
+
+    def first_row(self, tile: int) -> int:
+        """Return the first row of a tile, by its place in `tiles`."""
+        return self.size * tile if self.is_udim else 0
+
+    def flat_indices(self, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+        """Return the (n,) intp indices in the frame of texels of the UV plane; -1 outside of all tiles.
+
+        Parameters
+        ----------
+        column, row : (n,) ndarray of int
+            From the origin of the UV plane.
+        """
+        tile_u, in_column = np.divmod(column, self.size)
+        tile_v, in_row = np.divmod(row, self.size)
+        index = np.full(len(column), -1, dtype=np.intp)
+        for number, (u, v) in enumerate(self.tiles):
+            inside = (tile_u == u) & (tile_v == v)
+            first_row = self.first_row(number)
+            index[inside] = (in_row[inside] + first_row) * self.width + in_column[inside]
+        return index
+
+
+@dataclass(frozen=True, eq=False)
+class Texels:
+    """The P texels whose centers are on the surface, in ascending order.
+
+    Attributes
+    ----------
+    frame : TextureFrame
+    index : (P,) int32 ndarray
+        Flat index into the frame, row by row from the lower left.
+    triangle : (P,) int32 ndarray
+    barycentric : (P, 3) float32 ndarray
+    overlap : float
+        Fraction of the area of all charts that lies under other charts.
+    """
+
+    frame: TextureFrame
+    index: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    overlap: float
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False) -> TextureFrame:
+    """Find the tiles of a UV map.
+
+    Parameters
+    ----------
+    charts : UvCharts
+    size : int
+        Texels on each side of a tile.
+    name : str
+        Of the mesh, for messages.
+    is_udim : bool
+
+    Raises
+    ------
+    RosyError
+        If there are more than `MAX_TILES`, or tiles that UDIM cannot number.
+    """
+    used = charts.gradient.any(axis=1)
+    uv = charts.uv[used]
+    # A border between two tiles belongs to the one that has the triangle.
+    low_u, low_v = (np.floor(part.min(axis=1) + 1e-9).astype(int) for part in (uv.real, uv.imag))
+    high_u, high_v = (
+        np.maximum(np.ceil(part.max(axis=1) - 1e-9).astype(int) - 1, low)
+        for part, low in ((uv.real, low_u), (uv.imag, low_v))
+    )
+    ranges = np.unique(np.stack([low_u, high_u, low_v, high_v], axis=1), axis=0)
+    tiles = set()
+    for first_u, last_u, first_v, last_v in ranges.tolist():
+        if (last_u - first_u + 1) * (last_v - first_v + 1) > MAX_TILES:
+            break
+        tiles |= {(u, v) for u in range(first_u, last_u + 1) for v in range(first_v, last_v + 1)}
+        if len(tiles) > MAX_TILES:
+            break
+    else:
+        if is_udim and any(not 0 <= u < TILES_PER_ROW or v < 0 for u, v in tiles):
+            raise RosyError(
+                f"{name}: its UV map reaches beyond the tiles that UDIM numbers: move its charts to "
+                f"u from 0 to {TILES_PER_ROW} and v above 0"
+            )
+        return TextureFrame(size, tuple(sorted(tiles, key=lambda tile: tile[::-1])), is_udim)
+    raise RosyError(
+        f"{name}: its UV map reaches over more than {MAX_TILES} tiles: scale it to u and v from 0 to 1"
+    )
+
+
+def texels_task(charts: UvCharts, frame: TextureFrame, name: str) -> Task[Texels]:
+    """Find the texels whose centers are on the surface.
+
+    Where charts overlap, a texel shows the triangle with the smallest index of the first tile.
+
+    Raises
+    ------
+    RosyError
+        If there is none.
+    """
+    corners = charts.uv.ravel()
+    triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    taken = np.zeros(frame.width * frame.height if len(frame.tiles) > 1 else 0, dtype=bool)
+    parts = []
+    for number, (u, v) in enumerate(frame.tiles):
+        start, stop = number / len(frame.tiles), (number + 1) / len(frame.tiles)
+        clip = np.zeros((len(corners), 4))
+        clip[:, 0], clip[:, 1] = 2 * (corners.real - u) - 1, 2 * (corners.imag - v) - 1
+        clip[:, 3] = 1
+        reaches = _reaches_tile(clip[:, :2].reshape(-1, 3, 2))
+        task = rasterize_task(clip, triangles[reaches], frame.size, frame.size)
+        fragments = yield from subtask(task, start, stop, STEP_LABEL)
+        index = fragments.pixel + np.int32(frame.first_row(number) * frame.width)
+        columns = index, reaches[fragments.triangle].astype(np.int32), fragments.barycentric
+        if len(taken):
+            is_free = ~taken[index]
+            columns = tuple(column[is_free] for column in columns)
+            taken[columns[0]] = True
+        parts.append(columns)
+    yield Progress(1.0, STEP_LABEL)
+    index, triangle, barycentric = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if not len(index):
+        raise RosyError(
+            f"{name}: its UV map has no texel: make the texture larger, or unwrap the mesh"
+        )
+    if len(parts) > 1:
+        order = np.argsort(index, kind="stable")
+        index, triangle, barycentric = index[order], triangle[order], barycentric[order]
+    edge_a, edge_b = charts.uv[:, 1] - charts.uv[:, 0], charts.uv[:, 2] - charts.uv[:, 0]
+    area = 0.5 * np.abs((edge_a.conj() * edge_b).imag).sum() * frame.size**2
+    overlap = max(0.0, 1 - len(index) / area)
+    return Texels(frame, index, triangle, barycentric, overlap)
+
+
+def _reaches_tile(corners: np.ndarray) -> np.ndarray:
+    """Indices of the triangles, given their (T, 3, 2) corners, that may reach -1 to 1 in x and y."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    return np.flatnonzero(((low < 1) & (high > -1)).all(axis=1))

@@ -1,0 +1,70 @@
+"""Textures from scripts and from the command line."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import rosy_addon.api as rf
+from rosy_addon.cli.parser import main
+from rosy_addon.image_io.png import read_png
+
+SQUARE = ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+UV = np.array(SQUARE[0])[:, :2] * 0.9 + 0.05
+
+
+def test_the_command_draws_the_same_texture(tmp_path):
+    """Also that of the preset and the settings."""
+    lines = [f"v {x} {y} {z}" for x, y, z in SQUARE[0]] + [f"vt {u} {v}" for u, v in UV]
+    path = tmp_path / "square.obj"
+    path.write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4"]))
+    out = tmp_path / "square.png"
+    words = ["--generate", "uv", "--degree", "2", "--size", "64", "--margin", "3"]
+    look = ["--preset", "plaid", "--set", "seed=3"]
+    assert main(["texture", str(path), "-o", str(out), *words, *look]) == 0
+    surface = rf.Surface(path)
+    texture = rf.texture(
+        surface, rf.along_uv(surface, 2), size=64, margin=3, preset="plaid", seed=3
+    )
+    assert list(texture.tiles) == [1001] and texture.overlap == 0
+    (picture,) = texture.tiles.values()
+    picture.save(tmp_path / "same.png")
+    assert out.read_bytes() == (tmp_path / "same.png").read_bytes()
+    assert (read_png(out)[..., 3] == 1).all()
+
+
+def test_tiles_have_files_of_their_own(tmp_path, error_of):
+    square = rf.Surface(*SQUARE, name="square", uv=UV * [2, 1])
+    texture = rf.texture(square, rf.along_uv(square, 2), size=32, udim=True)
+    assert repr(texture) == "<Texture: 32 x 32 texels, 2 tiles>"
+    texture.save(tmp_path / "square.<UDIM>.png")
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "square.1001.png",
+        "square.1002.png",
+    ]
+    assert "no <UDIM>" in error_of(texture.save, tmp_path / "square.png")
+
+
+def test_overlaps_are_a_warning():
+    square = rf.Surface(*SQUARE, name="square", uv=UV * [2, 1])
+    with pytest.warns(rf.RosyWarning, match="square: 4.% of its UV map lies under other charts"):
+        rf.texture(square, rf.along_uv(square, 2), size=32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rf.texture(square, rf.along_uv(square, 2), size=32, udim=True)
+
+
+def test_textures_that_are_refused(error_of):
+    square = rf.Surface(*SQUARE, name="square", uv=UV)
+    field = rf.along_uv(square)
+    for keywords, expected in (
+        ({"size": 8}, "a size of 8 texels: choose 16 to 16384"),
+        ({"margin": -1}, "a margin of -1 texels"),
+        ({"preset": "engraving"}, "square: a texture shows soft streaks"),
+        ({"preset": "none"}, "there is no preset 'none'"),
+        ({"lenght": 3}, "lenght"),
+    ):
+        assert expected in error_of(rf.texture, square, field, **keywords)
+    assert "has no UV map" in error_of(rf.texture, rf.Surface(*SQUARE, name="square"))

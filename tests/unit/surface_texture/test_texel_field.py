@@ -1,0 +1,93 @@
+"""Streamlines over the texels of many charts are those of the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import torus
+from uv_maps import patches_uv
+
+from rosy_addon.compositor.covering import build_covering
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import look_on_surface
+from rosy_addon.compositor.streamline_batch import StreamlineBatch
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.line_drawing.surface_particles import SurfaceParticles, advance
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh, nearest_member
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.surface_texture.charts import uv_charts_task
+from rosy_addon.surface_texture.draw import step_length
+from rosy_addon.surface_texture.texel_field import frames_at, texel_field_task
+from rosy_addon.surface_texture.texels import texels_task, texture_frame
+
+#: Steps of the streamlines that are compared.
+STEPS = 40
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+def test_streamlines_cross_seams_as_on_the_mesh(degree):
+    """After 40 steps, streamlines are where particles on the mesh are, to less than a texel.
+
+    Particles know neither texels nor charts. Streamlines begin within half a texel of its center.
+    """
+    surface = torus()
+    instance = MeshInstance(
+        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), degree)
+    )
+    mesh = build_tangent_mesh(instance)
+    charts = run_to_completion(uv_charts_task(surface, mesh, patches_uv(3)))
+    assert charts.chart.max() + 1 == 32
+    texels = run_to_completion(texels_task(charts, texture_frame(charts, 1024, "torus"), "torus"))
+    step = step_length(mesh, charts, texels)
+    field = run_to_completion(texel_field_task(mesh, charts, texels, step, np.pi))
+    look = look_on_surface(Look(), step, step)
+    covering = build_covering(field, look, np.full((len(texels), 1), 0.1, dtype=np.float32))
+    start = np.unique(field.seam_steps.source)
+    start = start[field.representation[start] != 0][:: max(len(start) // 4000, 1)]
+    # Sheet 0 is the member nearest to the frame.
+    batch = StreamlineBatch(covering, [look], [None], STEPS, len(start))
+    line = covering.cell_of_pixel[start].astype(np.intp)
+    states = [line.copy() for line, *_ in batch.trace(line)]
+    cell = states[STEPS][: len(start)] % covering.cell_count
+    pixel_of_cell = np.zeros(covering.cell_count, dtype=np.intp)
+    pixel_of_cell[covering.cell_of_pixel] = np.arange(len(texels))
+    reached = pixel_of_cell[cell]
+
+    triangle, weights = texels.triangle, texels.barycentric.astype(np.float64)
+    z = np.einsum("nk,nk->n", weights[start], mesh.z[triangle[start]])
+    frame = frames_at(charts, triangle[start], weights[start])
+    particles = SurfaceParticles(
+        triangle[start], weights[start], nearest_member(frame, z, degree), np.ones(len(start))
+    )
+    length = np.full(len(start), STEPS * step)
+    end, walked, *_ = advance(
+        mesh, particles, length, max_segment_length=np.full(len(start), step), max_segments=400
+    )
+    arrived = walked > 0.999 * length
+    assert (cell[arrived] != 0).mean() > 0.99
+    both = np.flatnonzero(arrived & (cell != 0))
+    streamline = mesh.points_at(triangle[reached[both]], weights[reached[both]])
+    error = np.linalg.norm(streamline - mesh.points_at(end.triangle, end.weights)[both], axis=1)
+    texel_size = np.sqrt(mesh.area.sum() / len(texels))
+    assert np.median(error) < 0.7 * texel_size
+    assert np.quantile(error, 0.98) < 1.7 * texel_size
+
+
+def test_steps_across_seams_are_isometries():
+    """They lead as far on the surface as in the chart, and back to where they began."""
+    surface = torus()
+    instance = MeshInstance(
+        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), 4)
+    )
+    mesh = build_tangent_mesh(instance)
+    charts = run_to_completion(uv_charts_task(surface, mesh, patches_uv(3)))
+    texels = run_to_completion(texels_task(charts, texture_frame(charts, 512, "torus"), "torus"))
+    steps = run_to_completion(texel_field_task(mesh, charts, texels, 0.01, np.pi)).seam_steps
+    source, target = texels.triangle[steps.source], texels.triangle[steps.target]
+    displacement = np.exp(1j * np.arange(len(source)))
+    before = charts.to_surface(source, displacement / 512)
+    after = charts.to_surface(target, steps.displaced(np.arange(len(source)), displacement) / 512)
+    # The triangles of the texels may differ from those where the step begins and ends.
+    ratio = np.abs(after) / np.abs(before)
+    assert np.median(np.abs(ratio - 1)) < 0.01 and np.quantile(np.abs(ratio - 1), 0.95) < 0.1

@@ -116,6 +116,7 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
         anchor="surface",
         foreshorten=True,
         supersampling=1,
+        guiding_angle=0.0,
         step=1.0,
         length=max(round(look.length * look.step), 1),
     )

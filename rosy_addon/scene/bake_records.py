@@ -37,6 +37,9 @@ from .staleness import SCENE_STATES, difference
 #: Prefix of the names of RoSy's images and materials. The name of the camera follows.
 NAME_PREFIX = "RoSy "
 
+#: `RosyBake.view` of a texture.
+TEXTURE_VIEW = "texture"
+
 
 @dataclass(frozen=True)
 class BakeInfo:
@@ -45,7 +48,7 @@ class BakeInfo:
     Attributes
     ----------
     camera : str
-        Name of the camera, or ``3D View``.
+        Name of the camera, or ``3D View``; of a texture, the name of the object.
     width, height : int
         Pixels.
     image : bpy.types.Image
@@ -57,6 +60,8 @@ class BakeInfo:
         First and last frame of a sequence. Empty for a single picture.
     unknown_reason : str
         Why it is not known whether the picture is up to date. Empty if it is known.
+    is_texture : bool
+        Whether it is a texture of an object.
     """
 
     camera: str
@@ -67,6 +72,25 @@ class BakeInfo:
     is_shown: bool
     frame_range: str = ""
     unknown_reason: str = ""
+    is_texture: bool = False
+
+
+@dataclass(frozen=True)
+class TextureSource:
+    """The surface that a texture shows.
+
+    Attributes
+    ----------
+    obj : bpy.types.Object
+    uv_map : str
+        Name of the UV map.
+    margin : int
+        Texels.
+    """
+
+    obj: bpy.types.Object
+    uv_map: str
+    margin: int
 
 
 @dataclass(frozen=True)
@@ -93,14 +117,14 @@ class DrawnFrom:
 
     Attributes
     ----------
-    source : bpy.types.Object, Camera or None
+    source : bpy.types.Object, Camera, TextureSource or None
         None for a sequence from the cameras that render the frames.
     states : dict of int or None to PictureState
         By frame; for a single picture the only key is None.
     device : {"cpu", "gpu"}
     """
 
-    source: CameraSource | None
+    source: CameraSource | TextureSource | None
     states: Mapping[int | None, PictureState]
     device: str
 
@@ -146,10 +170,14 @@ def store_record(
 
 
 def _find_or_add_record(
-    scene: bpy.types.Scene, name: str, source: CameraSource | None
+    scene: bpy.types.Scene, name: str, source: CameraSource | TextureSource | None
 ) -> bpy.types.PropertyGroup:
     """Return the record of a camera, or of the scene if there is no camera, with its present name."""
     records = scene.rosy.bakes
+    if isinstance(source, TextureSource):
+        record = _find_texture_record(scene, source.obj) or records.add()
+        record.name, record.camera, record.view = name, None, TEXTURE_VIEW
+        return record
     if source is None:
         camera, view = None, FRAME_CAMERAS
         record = next((entry for entry in records if entry.view == view), None)
@@ -161,6 +189,38 @@ def _find_or_add_record(
     record = record or records.get(name) or records.add()
     record.name, record.camera, record.view = name, camera, view
     return record
+
+
+def _find_texture_record(
+    scene: bpy.types.Scene, obj: bpy.types.Object
+) -> bpy.types.PropertyGroup | None:
+    """Return the record of the texture of an object alone; None if there is none.
+
+    Copies of an object share its texture, until one of them is baked again.
+    """
+    for record in scene.rosy.bakes:
+        if record.view == TEXTURE_VIEW:
+            objects = _texture_objects(record)
+            if objects == [obj] or (not objects and record.name == obj.name):
+                return record
+    return None
+
+
+def _texture_objects(record: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+    """Return the objects that can show a texture, sorted by name."""
+    return sorted(
+        (
+            obj
+            for obj in bpy.data.objects
+            if obj.users_collection
+            and any(
+                record.material in projections_of_group(modifier.node_group)
+                for modifier in obj.modifiers
+                if is_rosy_modifier(modifier)
+            )
+        ),
+        key=lambda obj: obj.name,
+    )
 
 
 def _replace_datablocks(
@@ -182,9 +242,15 @@ def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | 
 
 
 def camera_name(record: bpy.types.PropertyGroup) -> str:
-    """Return the present name of the camera of a record, or of the scene if it has several."""
+    """Return the present name of the camera of a record, or of the scene if it has several.
+
+    Of a texture, that of the object.
+    """
     if record.view == FRAME_CAMERAS:
         return record.id_data.name
+    if record.view == TEXTURE_VIEW:
+        objects = _texture_objects(record)
+        return objects[0].name if objects else record.name
     return record.name if record.camera is None else record.camera.name
 
 
@@ -207,9 +273,14 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
     )
 
 
-def recorded_materials() -> set[bpy.types.Material]:
-    """Return the materials of all records of all scenes."""
-    return {record.material for scene in bpy.data.scenes for record in scene.rosy.bakes}
+def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
+    """Return the materials of all records of all scenes, also those of textures."""
+    return {
+        record.material
+        for scene in bpy.data.scenes
+        for record in scene.rosy.bakes
+        if textures or record.view != TEXTURE_VIEW
+    }
 
 
 def list_bakes(
@@ -247,6 +318,7 @@ def list_bakes(
             "",
             record.material in shown_materials,
             record.frames,
+            is_texture=record.view == TEXTURE_VIEW,
         )
         infos.append(replace(info, **reasons.find(record)))
     for material in shown_materials - {record.material for record in scene.rosy.bakes}:
@@ -289,6 +361,8 @@ class _PresentReasons:
         if recorded is None:
             return {"unknown_reason": "baked with another version of RoSy"}
         name = camera_name(record)
+        if record.view == TEXTURE_VIEW:
+            return self._find_of_texture(record, recorded)
         try:
             source = self._source(record)
         except RosyError as error:  # there is no camera at all
@@ -300,7 +374,18 @@ class _PresentReasons:
             del present.output["placement"]  # frames always fill the frame of the camera
         recorded = replace(recorded, device=record.device)
         present = replace(present, device=self._device(present, record))
-        return {"stale_reason": difference(recorded, present, source.name)}
+        return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
+
+    def _find_of_texture(
+        self, record: bpy.types.PropertyGroup, recorded: PictureState
+    ) -> dict[str, str]:
+        """Do the same as `find` for a texture."""
+        objects = _texture_objects(record)
+        if not objects:
+            return {"unknown_reason": f"object '{record.name}' does not show it any more"}
+        obj = objects[0]
+        present = self.scene_state.texture_state(self.scene, self.depsgraph, obj)
+        return {"stale_reason": difference(recorded, present, f"the UV map of '{obj.name}'")}
 
     def _device(self, present: PictureState, record: bpy.types.PropertyGroup) -> str:
         """Return what would draw a picture now: "cpu" or "gpu"."""

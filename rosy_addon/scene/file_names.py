@@ -13,8 +13,10 @@ import bpy
 MAX_STEM_BYTES = 180
 
 
-def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
+def picture_stem(name: str, kind: Literal["camera", "scene", "texture"] = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
+
+    Those of the texture of an object are such as ``RoSy_Cube_texture``.
 
     Characters that file systems do not allow become underscores, and long names are cut. If cameras
     or scenes would then have the same file, also where file systems ignore case, one of them has
@@ -23,19 +25,26 @@ def picture_stem(name: str, kind: Literal["camera", "scene"] = "camera") -> str:
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
+    if kind == "texture":
+        siblings |= {("texture", obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
     siblings.add((kind, name))
-    stem = _clean_stem(name)
-    rivals = [key for key in siblings if _file_key(_clean_stem(key[1])) == _file_key(stem)]
-    first = min(rivals, key=lambda key: (_clean_stem(key[1]) != f"RoSy_{key[1]}", key))
+    stem = _clean_stem(*_label(kind, name))
+    rivals = [key for key in siblings if _file_key(_clean_stem(*_label(*key))) == _file_key(stem)]
+    first = min(rivals, key=lambda key: (_clean_stem(*_label(*key)) != f"RoSy_{key[1]}", key))
     if (kind, name) == first:
         return stem
     return f"{stem}-{zlib.crc32(f'{kind} {name}'.encode()):08x}"
 
 
-def _clean_stem(name: str) -> str:
+def _label(kind: str, name: str) -> tuple[str, str]:
+    """Return what the stem consists of: a name, and what follows it."""
+    return name, " texture" if kind == "texture" else ""
+
+
+def _clean_stem(name: str, ending: str) -> str:
     """Return the stem with underscores for characters that are not allowed, cut to its length."""
     stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
-    return stem.decode(errors="ignore")
+    return stem.decode(errors="ignore") + bpy.path.clean_name(ending)
 
 
 def _file_key(stem: str) -> str:

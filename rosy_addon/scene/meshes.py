@@ -161,6 +161,31 @@ def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
     return content_hash(*parts)
 
 
+def read_uvs(mesh: bpy.types.Mesh, name: str, label: str, purpose: str) -> np.ndarray:
+    """Return u and v of the corners, (C, 2) float32, from a UV map.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    name : str
+        Of the UV map. Empty: the active one.
+    label, purpose : str
+        The mesh, and what needs the UV map, for the message.
+
+    Raises
+    ------
+    RosyError
+        If there is no such UV map.
+    """
+    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
+    if layer is None:
+        missing = f"no UV map '{name}'" if name else "no UV map"
+        raise RosyError(f"{label}: its mesh has {missing}, which {purpose} needs")
+    values = np.empty(2 * len(mesh.loops), dtype=np.float32)
+    layer.uv.foreach_get("vector", values)
+    return values.reshape(-1, 2)
+
+
 def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Return `Surface.corner_vertex`, (C,) int32, and `Surface.face_start`, (F + 1,) int32."""
     corner_vertex = _attribute_or_collection(

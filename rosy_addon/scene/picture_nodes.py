@@ -95,6 +95,33 @@ def new_material(
     return material
 
 
+def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:
+    """Create a material that shows a texture on a UV map, lit like any other surface.
+
+    Parameters
+    ----------
+    name : str
+    image : bpy.types.Image
+    uv_map : str
+        Name of the UV map.
+    """
+    material = bpy.data.materials.new(name)
+    if not has_nodes_by_default(material):
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    build = _NodeBuilder(tree)
+    coordinates = build("ShaderNodeUVMap", uv_map=uv_map)
+    image_node = build("ShaderNodeTexImage", image=image)
+    shader = build("ShaderNodeBsdfPrincipled")
+    output = build("ShaderNodeOutputMaterial")
+    shader.inputs["Roughness"].default_value = 1.0
+    tree.links.new(coordinates.outputs["UV"], image_node.inputs["Vector"])
+    tree.links.new(image_node.outputs["Color"], shader.inputs["Base Color"])
+    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    return material
+
+
 def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
     """Set the frame range of a material's image sequence. Each file is shown at its own frame."""
     for node in material.node_tree.nodes:

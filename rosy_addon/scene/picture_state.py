@@ -20,11 +20,19 @@ from ..field.rosy_field import MAX_DEGREE
 from ..file_io import read_bytes
 from ..projection.camera import Camera
 from ..settings import settings_of
+from ..surface_texture.draw import TEXTURE_SETTINGS
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .lights import rendered_lights
 from .look_properties import read_look
-from .meshes import evaluated_mesh, read_attribute, shape_digest, vertex_positions
+from .meshes import (
+    evaluated_mesh,
+    polygon_arrays,
+    read_attribute,
+    read_uvs,
+    shape_digest,
+    vertex_positions,
+)
 from .owned_data import user_modifiers
 from .scene_reader import field_objects, rendered_instances
 from .tone_inputs import (
@@ -37,6 +45,9 @@ from .tone_inputs import (
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is
 #: drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
+
+#: Those that decide how a texture is stored.
+TEXTURE_OUTPUT = ("store", "directory", "image_format")
 
 
 @dataclass(frozen=True)
@@ -174,6 +185,7 @@ class SceneState:
         self._fields: dict[str, _Instances] = {}
         self._occluders: dict[str, _Instances] = {}
         self._lights: dict[str, list[str]] = {}
+        self._texture_states: dict[tuple, PictureState] = {}
         sources = _read_sources(scene)
         self._read_meshes(depsgraph, sources, {} if mesh_states is None else mesh_states)
         if sources.uses_lights:
@@ -232,6 +244,20 @@ class SceneState:
             ),
         )
 
+    def texture_state(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
+    ) -> PictureState:
+        """Return the state of the texture of an object, which is read once for the same settings."""
+        settings = scene.rosy
+        key = (
+            *(obj.session_uid, obj.rosy.texture_uv_map, obj.data.uv_layers.active_index),
+            *(settings.texture_size, settings.texture_margin, read_look(settings)),
+            *(getattr(settings, name) for name in TEXTURE_OUTPUT),
+        )
+        if key not in self._texture_states:
+            self._texture_states[key] = read_texture_state(scene, depsgraph, obj)
+        return self._texture_states[key]
+
     def _relevant_occluders(
         self, camera: Camera | None, casts_shadows: bool
     ) -> Iterator[tuple[str, _Instances]]:
@@ -262,6 +288,46 @@ def read_picture_states(
     """Return the state of the picture from each camera."""
     scene_state = SceneState(scene, depsgraph)
     return [scene_state.picture_state(scene, depsgraph, source) for source in sources]
+
+
+def read_texture_state(
+    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
+) -> PictureState:
+    """Return the state of the texture of an object, with the settings of the scene.
+
+    A texture stays up to date when its object moves or deforms.
+    """
+    settings, mesh = scene.rosy, obj.data
+    look = read_look(settings)
+    shape = [shape_digest(mesh), *_field_parts(mesh, mesh), settings.undefined]
+    uv_parts = [settings.texture_margin]
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
+        if evaluated is not None:
+            shape += polygon_arrays(evaluated)
+            try:
+                uv_parts.append(
+                    read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name, "the texture")
+                )
+            except RosyError as error:
+                uv_parts.append(str(error))
+    output = {name: getattr(settings, name) for name in TEXTURE_OUTPUT}
+    if output["store"] == "PACKED":
+        del output["directory"]
+    return PictureState(
+        look={
+            name: getattr(look, name)
+            for name in TEXTURE_SETTINGS
+            if settings_of(Look)[name].applies(look)
+        },
+        size=[settings.texture_size, settings.texture_size],
+        camera=_digest(*uv_parts),
+        output=output,
+        device="cpu",
+        objects={obj.name_full: ["", _digest(*shape)]},
+        occluders={},
+        lights={},
+        reference="",
+    )
 
 
 def _read_sources(scene: bpy.types.Scene) -> _Sources:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 
 import bpy
 import numpy as np
@@ -27,7 +28,7 @@ from .evaluated_field import (
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .libraries import check_object_type, remedy_for_absence
-from .meshes import evaluated_mesh, mesh_fans_task, mesh_surface, mesh_surface_task
+from .meshes import evaluated_mesh, mesh_fans_task, mesh_surface, mesh_surface_task, read_uvs
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
@@ -49,11 +50,14 @@ class SceneData:
         The original object of each instance with a field, in the same order.
     warnings : tuple of str
         For each object that was left out because its field cannot be drawn: which one, and why.
+    uvs : dict of bpy.types.Object to (C, 2) float32 ndarray
+        u and v at the corners of the objects whose UV maps were asked for.
     """
 
     instances: list[MeshInstance]
     objects: list[bpy.types.Object]
     warnings: tuple[str, ...] = ()
+    uvs: Mapping[bpy.types.Object, np.ndarray] = dataclass_field(default_factory=dict)
 
 
 def field_objects(
@@ -110,6 +114,7 @@ def read_scene_task(
     nonfinite: str = "error",
     cache: Cache | None = None,
     tone_request: ToneRequest | None = None,
+    uv_maps: Mapping[bpy.types.Object, str] | None = None,
 ) -> Task[SceneData]:
     """Read every mesh that is visible in renders, as arrays.
 
@@ -131,6 +136,8 @@ def read_scene_task(
         Keeps mesh instances that have not changed since an earlier call.
     tone_request : ToneRequest, optional
         The source of the surface tones.
+    uv_maps : mapping of bpy.types.Object to str, optional
+        Names of UV maps that are read, too. Empty: the active one.
 
     Yields
     ------
@@ -167,7 +174,7 @@ def read_scene_task(
         # The scene may have changed since the last step. All instances are read in one step, the
         # last, so that the caller can read what belongs to them before it yields.
         depsgraph.update()
-        reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors)
+        reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors, uv_maps or {})
         for instance in rendered_instances(depsgraph):
             reader.add(instance)
     reader.check_complete(objects)
@@ -180,6 +187,7 @@ def read_scene_task(
         [instance for instance, _ in reader.field_instances] + reader.occluders,
         [owner for _, owner in reader.field_instances],
         tuple(f"{error}. It was left out" for error in (errors or {}).values()),
+        reader.uvs,
     )
 
 
@@ -252,6 +260,8 @@ class _SceneReader:
         Instances with a field, and their original objects.
     occluders : list of MeshInstance
         All other instances.
+    uvs : dict of bpy.types.Object to (C, 2) float32 ndarray
+        As in `SceneData`.
     mesh_data : dict
         The data of each evaluated mesh; None if it has no faces. The key is the pointer of the mesh,
         and the original object or, for an occluder, None.
@@ -264,8 +274,11 @@ class _SceneReader:
         cache: Cache,
         tone_request: ToneRequest | None,
         errors: Errors | None,
+        uv_maps: Mapping[bpy.types.Object, str],
     ) -> None:
         self.layouts = layouts
+        self.uv_maps = uv_maps
+        self.uvs: dict[bpy.types.Object, np.ndarray] = {}
         self.errors = errors
         self.nonfinite = nonfinite
         self.cache = cache
@@ -314,6 +327,9 @@ class _SceneReader:
             surface = mesh_surface(mesh, label, read_rest=True, cache=self.cache)
             field = read_evaluated_field(mesh, layout, surface, self.nonfinite, label, self.cache)
             tone = read_tone(mesh, obj.original, surface, self.tone_request, self.cache)
+            uv_map = self.uv_maps.get(obj.original)
+            if uv_map is not None:
+                self.uvs[obj.original] = read_uvs(mesh, uv_map, label, "the texture")
             return surface, field, tone
 
     def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:

@@ -112,7 +112,7 @@ def _note_changes(_scene: Any, depsgraph: bpy.types.Depsgraph | None = None) -> 
     SCENE_STATES.note_changes(depsgraph)
 
 
-def difference(recorded: PictureState, present: PictureState, camera: str) -> str:
+def difference(recorded: PictureState, present: PictureState, source: str) -> str:
     """Return why a picture is out of date; empty if it is up to date.
 
     Parameters
@@ -121,15 +121,15 @@ def difference(recorded: PictureState, present: PictureState, camera: str) -> st
         What the picture was drawn from.
     present : PictureState
         What it would be drawn from now.
-    camera : str
-        Name of the camera.
+    source : str
+        The camera, or the UV map of a texture, for the reason.
     """
     if recorded.look != present.look:
         return "the look was changed"
     if recorded.size != present.size and present.size:
         return f"the size was changed to {present.size[0]} x {present.size[1]}"
     if recorded.camera != present.camera:
-        return f"camera '{camera}' was changed"
+        return f"{source} was changed"
     return (
         _object_difference(recorded.objects, present.objects, "the mesh or field of ")
         or _object_difference(recorded.occluders, present.occluders)

@@ -21,6 +21,7 @@ from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties
 from .face_values import scalar_values
+from .meshes import read_uvs
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,9 @@ def read_tone(
         values, image = _corner_scalars(mesh, surface, tone_request.attribute, label), None
     else:
         image = owner.rosy.tone_image if has_rosy_properties() else None
-        values = None if image is None else _tone_uvs(mesh, owner.rosy.tone_uv_map, label)
+        values = (
+            None if image is None else read_uvs(mesh, owner.rosy.tone_uv_map, label, "the tone")
+        )
         image = None if image is None else image_luminance(image)
     if values is None:
         return None
@@ -112,7 +115,7 @@ def tone_source_digest(
         image = owner.rosy.tone_image if has_rosy_properties() else None
         if image is None:
             return b""
-        uvs = _tone_uvs(mesh, owner.rosy.tone_uv_map, owner.name)
+        uvs = read_uvs(mesh, owner.rosy.tone_uv_map, owner.name, "the tone")
         return content_hash(uvs, image_luminance(image))
     except RosyError as error:
         return content_hash(str(error))
@@ -185,17 +188,6 @@ def _tone_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | No
     attribute = mesh.attributes.get(name or mesh.color_attributes.active_color_name)
     # In edit mode, attributes are empty.
     return attribute if attribute is not None and len(attribute.data) else None
-
-
-def _tone_uvs(mesh: bpy.types.Mesh, name: str, label: str) -> np.ndarray:
-    """Return texture coordinates, (C, 2) float32, from a UV map; by default the active one."""
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    if layer is None:
-        missing = f"no UV map '{name}'" if name else "no UV map"
-        raise RosyError(f"{label}: its mesh has {missing}, which the image of the tone needs")
-    values = np.empty(2 * len(mesh.loops), dtype=np.float32)
-    layer.uv.foreach_get("vector", values)
-    return values.reshape(-1, 2)
 
 
 def image_luminance(image: bpy.types.Image) -> np.ndarray:

@@ -35,6 +35,13 @@ FINE_FRACTION = 0.05
 #: Smallest length of a step, in texels of the mean size.
 MIN_STEP = 0.25
 
+#: The settings of a look that a texture is drawn with. All others have no effect on it.
+TEXTURE_SETTINGS = (
+    *("ink", "display", "unit", "unit_size", "length", "taper", "step", "grain", "density"),
+    *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
+    *("magnitude", "magnitude_range", "colour_map"),
+)
+
 #: Texels on each side of a texture: default and range.
 DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = 2048, 16, 16384
 

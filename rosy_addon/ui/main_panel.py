@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..compositor.look import is_hatched
 from ..errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
@@ -141,6 +142,7 @@ def _draw_bakes(
     row = layout.row(align=True)
     row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
     row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
+    _draw_texture_settings(layout, context)
     if not objects:
         layout.label(text="Needs a field to draw", icon="INFO")
     if has_pictures(context.scene):
@@ -152,9 +154,27 @@ def _draw_bakes(
 
 def bake_label(bake_infos: list[BakeInfo]) -> str:
     """Return the label of the button that bakes a single picture."""
-    if any(bake.frame_range and bake.is_shown for bake in bake_infos):
+    pictures = [bake for bake in bake_infos if not bake.is_texture]
+    if any(bake.frame_range and bake.is_shown for bake in pictures):
         return "Bake Still"
-    return "Bake Again" if bake_infos else "Bake"
+    return "Bake Again" if pictures else "Bake"
+
+
+def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the settings and the button of textures."""
+    header, body = layout.panel("rosy_texture", default_closed=True)
+    header.label(text="Texture")
+    if body is None:
+        return
+    obj = context.view_layer.objects.active
+    column = body.column()
+    if obj is not None and obj.type == "MESH" and obj.data.uv_layers:
+        column.prop_search(obj.rosy, "texture_uv_map", obj.data, "uv_layers")
+    column.prop(context.scene.rosy, "texture_size")
+    column.prop(context.scene.rosy, "texture_margin")
+    if is_hatched(context.scene.rosy.look):
+        column.label(text="Textures have the ink style Soft only", icon="ERROR")
+    column.operator("rosy.bake_texture", icon="TEXTURE")
 
 
 def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -177,9 +197,12 @@ def _draw_bake_info(
     layout: bpy.types.UILayout, context: bpy.types.Context, bake: BakeInfo, several: bool
 ) -> None:
     box = layout.box().column(align=True)
-    box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
+    if bake.is_texture:
+        box.label(text=f"Texture of {bake.camera}", icon="TEXTURE")
+    else:
+        box.label(text=f"From {bake.camera}", icon="CAMERA_DATA")
     row = box.row()
-    row.label(text=f"{bake.width} x {bake.height} pixels")
+    row.label(text=f"{bake.width} x {bake.height} {'texels' if bake.is_texture else 'pixels'}")
     if bake.frame_range:
         box.label(text=f"Frames {bake.frame_range}", icon="RENDER_ANIMATION")
     if several and bake.is_shown:

@@ -17,6 +17,7 @@ from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
+from ..surface_texture.draw import DEFAULT_MARGIN, DEFAULT_SIZE, MAX_MARGIN, MAX_SIZE, MIN_SIZE
 from . import preset_library
 
 CAMERA_ITEMS = [
@@ -112,9 +113,10 @@ class RosyBake(bpy.types.PropertyGroup):
     image: bpy.props.PointerProperty(type=bpy.types.Image)
     material: bpy.props.PointerProperty(type=bpy.types.Material)
     camera: bpy.props.PointerProperty(
-        type=bpy.types.Object, description="Empty for a 3D view and for frames of several cameras"
+        type=bpy.types.Object,
+        description="Empty for a 3D view, for frames of several cameras and for textures",
     )
-    view: bpy.props.StringProperty(description="Camera of a 3D view, as JSON")
+    view: bpy.props.StringProperty(description="Camera of a 3D view, as JSON; or 'texture'")
     width: bpy.props.IntProperty()
     height: bpy.props.IntProperty()
     frames: bpy.props.StringProperty(
@@ -277,6 +279,22 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Bit depth and file format of the picture",
         items=IMAGE_FORMAT_ITEMS,
     )
+    texture_size: bpy.props.IntProperty(
+        name="Size",
+        description="Width and height of textures in texels",
+        subtype="PIXEL",
+        min=MIN_SIZE,
+        max=MAX_SIZE,
+        default=DEFAULT_SIZE,
+    )
+    texture_margin: bpy.props.IntProperty(
+        name="Margin",
+        description="Width of the margin around the charts of textures, in texels",
+        subtype="PIXEL",
+        min=0,
+        max=MAX_MARGIN,
+        default=DEFAULT_MARGIN,
+    )
     backdrop: bpy.props.BoolProperty(
         name="Backdrop",
         description="Fill the background of cameras that have pictures with the paper of the hatching",
@@ -346,6 +364,9 @@ class RosyObject(bpy.types.PropertyGroup):
     )
     tone_uv_map: bpy.props.StringProperty(
         name="UV Map", description="UV map of the image. Empty: the active UV map"
+    )
+    texture_uv_map: bpy.props.StringProperty(
+        name="UV Map", description="UV map of the texture. Empty: the active UV map"
     )
 
 

@@ -269,6 +269,23 @@ def bake(monkey):
         yield from modal(monkey, "bake", **settings)
 
 
+@action(3, uses_rosy=True)
+def bake_texture(monkey):
+    prepare(monkey)
+    obj, settings = select_mesh(monkey), bpy.context.scene.rosy
+    settings.texture_size = monkey.pick([16, 64, 128])
+    settings.texture_margin = monkey.pick([0, 2, 16])
+    if monkey.chance(0.7):
+        settings.look.ink = "soft"
+    if obj is not None and obj.library is None:
+        obj.rosy.texture_uv_map = monkey.pick(["", "", "UVMap", monkey.name()])
+    unwrap = monkey.chance(0.5)
+    if not monkey.window or not unwrap or monkey.chance(0.3):
+        monkey.rosy("bake_texture", unwrap=unwrap)
+    else:
+        yield from modal(monkey, "bake_texture", unwrap=True)
+
+
 @action(2, uses_rosy=True)
 def bake_animation(monkey):
     prepare(monkey)

@@ -310,6 +310,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     ),
     "bake": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
     "bake_animation": (*_PICTURE, "scenes/SCENE/rosy/bakes/*"),
+    "bake_texture": (*_PICTURE, "scenes/SCENE/rosy/bakes/*", "meshes/SELECTED/*", "context"),
     "remove": (*_PICTURE, "scenes/SCENE/rosy/bakes/*", *_APPLIED),
     "show": ("owned/node_groups/*", "picture/*"),
     "show_here": (),

@@ -53,12 +53,14 @@ MAY_IMPORT = {
         "projection",
         "compositor",
         "line_drawing",
+        "surface_texture",
         "rendering",
         "cache",
         "image_io",
         "presets",
     },
     "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
+    "bake_texture": BASE_ROOMS | {"compositor", "surface_texture", "scene", "image_io", "cache"},
     "animation": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu", "cache"},
     "viewport": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "scene", "cache"},
@@ -71,6 +73,7 @@ MAY_IMPORT = {
         "projection",
         "compositor",
         "line_drawing",
+        "surface_texture",
         "scene",
         "gpu",
         "bake",
@@ -136,6 +139,11 @@ NUMPY_ROOMS = (
     "rendering",
 )
 
+#: What may use Blender everywhere.
+BLENDER_ROOMS = (
+    *("scene", "ui", "bake", "bake_texture", "draw_strokes", "viewport", "cli", "animation"),
+)
+
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
 
@@ -173,7 +181,7 @@ def test_imports_run_one_way(path):
     rooms = {name.split(".")[0] for name in inside} - {room}
     assert rooms <= MAY_IMPORT[room]
     allowed = set(sys.stdlib_module_names) | {"numpy"}
-    if room in ("scene", "ui", "bake", "draw_strokes", "viewport", "cli", "animation"):
+    if room in BLENDER_ROOMS:
         allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}

@@ -1,0 +1,131 @@
+"""The job of textures: read objects with their UV maps, draw their fields, and apply the textures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from .cache import BAKE_CACHE
+from .compositor.look import Look
+from .image_io.png import png_task
+from .progress import Progress, Task, run_to_completion, subtask
+from .scene.blender_images import ImageData
+from .scene.look_properties import read_look
+from .scene.picture_state import read_texture_state
+from .scene.pictures import OutputSettings, check_targets, read_output_settings
+from .scene.read_view import scene_depsgraph
+from .scene.textures import apply_texture, read_texture_input_task, uv_map_name
+from .surface_texture.draw import check_texture_look, draw_texture_task
+
+#: Smallest fraction of a UV map under other charts that the user is told of.
+NOTABLE_OVERLAP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class TextureResult:
+    """The texture of an object.
+
+    Attributes
+    ----------
+    object : bpy.types.Object
+    image : bpy.types.Image
+    warnings : tuple of str
+        Messages for the user.
+    """
+
+    object: bpy.types.Object
+    image: bpy.types.Image
+    warnings: tuple[str, ...]
+
+
+def bake_texture_task(
+    scene: bpy.types.Scene,
+    objects: Sequence[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph | None = None,
+    *,
+    look: Look | None = None,
+    settings: OutputSettings | None = None,
+) -> Task[list[TextureResult]]:
+    """Draw the fields of objects as textures for their UV maps, and show them on the objects.
+
+    The size and the margin are those of the scene, and the UV map is chosen on the object. The scene is
+    changed in the last step. Closing the generator earlier leaves it unchanged.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    objects : sequence of bpy.types.Object
+        Meshes with a field.
+    depsgraph : bpy.types.Depsgraph, optional
+        By default `scene_depsgraph`.
+    look : Look, optional
+        By default the scene's.
+    settings : OutputSettings, optional
+        How the textures are stored; by default as the pictures of the scene.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    list of TextureResult
+
+    Raises
+    ------
+    RosyError
+        If an object has no field or no UV map, or the texture cannot be drawn or stored.
+    """
+    look = read_look(scene.rosy) if look is None else look
+    settings = read_output_settings(scene) if settings is None else settings
+    for obj in objects:
+        check_texture_look(look, f"object '{obj.name}'")
+        uv_map_name(obj)
+    check_targets(objects, settings)
+    yield Progress(0.0, "reading the scene")
+    depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    size, margin = scene.rosy.texture_size, scene.rosy.texture_margin
+    drawn = []
+    for index, obj in enumerate(objects):
+        start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
+        reading = read_texture_input_task(scene, depsgraph, obj, margin, BAKE_CACHE)
+        texture_input = yield from subtask(reading, start, start)
+        state = read_texture_state(scene, depsgraph, obj)
+        task = draw_texture_task(
+            texture_input.instance, texture_input.uv, look, size, margin=margin, cache=BAKE_CACHE
+        )
+        texture = yield from subtask(task, start, stop)
+        png = None
+        if not settings.as_float:
+            png = yield from subtask(png_task(texture.rgba), stop, stop)
+        warnings = ()
+        if texture.overlap > NOTABLE_OVERLAP:
+            warnings = (
+                f"'{obj.name}': {texture.overlap:.0%} of its UV map lies under other charts, which "
+                "show the same texels",
+            )
+        drawn.append((texture_input.source, ImageData(texture.rgba, png), state, warnings))
+    BAKE_CACHE.evict_over_limit()
+    yield Progress(0.98, "applying the textures")
+    return [
+        TextureResult(
+            source.obj, apply_texture(scene, source, image_data, settings, state), warnings
+        )
+        for source, image_data, state, warnings in drawn
+    ]
+
+
+def bake_texture(
+    scene: bpy.types.Scene,
+    objects: Sequence[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph | None = None,
+    *,
+    look: Look | None = None,
+    settings: OutputSettings | None = None,
+) -> list[TextureResult]:
+    """Run `bake_texture_task` to its end."""
+    return run_to_completion(
+        bake_texture_task(scene, objects, depsgraph, look=look, settings=settings)
+    )

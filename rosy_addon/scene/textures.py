@@ -1,0 +1,121 @@
+"""Textures on objects: read a mesh with its UV map, and show the texture on the object.
+
+A texture is shown like a picture, by RoSy's modifier at the end of the object's stack. The user's mesh,
+material slots and modifiers are not changed. Its record is among those of the pictures of the scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..cache import Cache
+from ..errors import RosyError
+from ..progress import Task
+from ..projection.gbuffer import MeshInstance
+from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
+from .blender_images import ImageData, new_image
+from .file_names import picture_stem
+from .owned_data import delete_unused, rollback_on_error
+from .picture_nodes import new_group, new_texture_material, set_picture_modifier
+from .picture_state import PictureState
+from .pictures import OutputSettings
+from .read_view import nonfinite_policy
+from .scene_reader import read_scene_task
+
+
+@dataclass(frozen=True, eq=False)
+class TextureInput:
+    """What a texture is drawn from.
+
+    Attributes
+    ----------
+    instance : MeshInstance
+        With a field, in world space. If the object has several instances, one of them.
+    uv : (C, 2) float32 ndarray
+        u and v at its corners.
+    source : TextureSource
+    """
+
+    instance: MeshInstance
+    uv: np.ndarray
+    source: TextureSource
+
+
+def uv_map_name(obj: bpy.types.Object) -> str:
+    """Return the name of the UV map that the texture of an object is for.
+
+    Raises
+    ------
+    RosyError
+        If there is none.
+    """
+    name, layers = obj.rosy.texture_uv_map, obj.data.uv_layers
+    layer = layers.get(name) if name else layers.active
+    if layer is None:
+        missing = f"no UV map '{name}'" if name else "no UV map"
+        raise RosyError(f"object '{obj.name}': has {missing}: unwrap its mesh first")
+    return layer.name
+
+
+def read_texture_input_task(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    obj: bpy.types.Object,
+    margin: int,
+    cache: Cache | None = None,
+) -> Task[TextureInput]:
+    """Read an object with a field, and the UV map of its texture, as it is evaluated.
+
+    Raises
+    ------
+    RosyError
+        If there is no field or no UV map, or a modifier loses one of them.
+    """
+    name = uv_map_name(obj)
+    scene_data = yield from read_scene_task(
+        depsgraph, [obj], nonfinite_policy(scene), cache, uv_maps={obj: name}
+    )
+    return TextureInput(
+        scene_data.instances[0], scene_data.uvs[obj], TextureSource(obj, name, margin)
+    )
+
+
+def apply_texture(
+    scene: bpy.types.Scene,
+    source: TextureSource,
+    image_data: ImageData,
+    settings: OutputSettings,
+    state: PictureState,
+) -> bpy.types.Image:
+    """Show a texture on its object, and return its image. An older one is replaced.
+
+    If an error is raised, the scene is not changed.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written.
+    """
+    obj = source.obj
+    name = f"RoSy {obj.name}"
+    stem = None
+    if settings.folder is not None:
+        stem = settings.folder / picture_stem(obj.name, "texture")
+    with rollback_on_error() as created:
+        image = new_image(name, image_data, as_float=settings.as_float, stem=stem)
+        created.append(image)
+        material = new_texture_material(name, image, source.uv_map)
+        created.append(material)
+        node_group = new_group(name, material, None)
+        created.append(node_group)
+    size = image_data.pixels.shape[1], image_data.pixels.shape[0]
+    store_record(
+        scene, obj.name, image, material, DrawnFrom(source, {None: state}, "cpu"), size=size
+    )
+    # The object keeps its pictures, but no other texture.
+    set_picture_modifier(obj, node_group, recorded_materials(textures=False))
+    delete_unused()
+    return image

@@ -1,0 +1,52 @@
+"""Textures in Blender: bake, unwrap, undo, remove, and the file without the extension."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from conftest import contents, error_of
+from test_bake import baked_images, material_of, pixels, render
+
+
+def test_texture_is_lit_like_any_material(with_field, scene, tmp_path):
+    """Seen from both sides, dark where no light falls, and the same in a file that was saved."""
+    scene.rosy.texture_size = 256
+    assert bpy.ops.rosy.bake_texture() == {"FINISHED"}
+    nodes = material_of(with_field).node_tree.nodes
+    assert "Principled BSDF" in nodes and nodes["UV Map"].uv_map == "UVMap"
+    bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0.0, 0.0))
+    front = render(scene, tmp_path)
+    scene.camera.location.y, scene.camera.rotation_euler.z = 6.0, np.pi
+    back = render(scene, tmp_path)
+    covered = front[..., 3] > 0.9
+    assert front[covered][:, 0].std() > 0.05
+    assert back[back[..., 3] > 0.9][:, 0].mean() < 0.5 * front[covered][:, 0].mean()
+
+
+def test_meshes_without_a_uv_map_can_be_unwrapped(scene):
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    cube.data.uv_layers.remove(cube.data.uv_layers[0])
+    cube.data.polygons[2].hide = True
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    scene.rosy.texture_size = 64
+    assert "unwrap its mesh first" in error_of(bpy.ops.rosy.bake_texture)
+    assert bpy.ops.rosy.bake_texture(unwrap=True) == {"FINISHED"}
+    assert len(cube.data.uv_layers) == 1 and cube.mode == "OBJECT" and cube.select_get()
+    assert [face.hide for face in cube.data.polygons] == [False, False, True, False, False, False]
+    assert pixels(baked_images()[0])[..., 0].std() > 0.05
+
+
+def test_undo_and_remove(with_field, scene):
+    scene.rosy.texture_size = 64
+    before = contents()
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.rosy.bake_texture()
+    after = contents()
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    assert contents() == before
+    bpy.ops.ed.redo()
+    assert contents() == after
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert contents() == before

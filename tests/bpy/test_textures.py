@@ -1,0 +1,147 @@
+"""Textures baked into UV maps: what they show, when they are up to date, and how they go."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.bake_texture import bake_texture
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
+from rosy.rosy_addon.scene.pictures import show_bake
+from scenes import add_field, contents
+
+
+@pytest.fixture
+def textured(scene, camera, monkey):
+    """Suzanne, smoothed, with a texture of 128 x 128 texels."""
+    monkey.modifiers.new("Smooth", "SUBSURF").levels = 1
+    scene.rosy.texture_size = 128
+    bpy.context.view_layer.update()
+    (result,) = bake_texture(scene, [monkey])
+    assert result.image.size[:] == (128, 128)
+    return monkey
+
+
+def stale_reason(scene):
+    (info,) = list_bakes(scene)
+    assert info.is_texture
+    return info.stale_reason
+
+
+def test_the_texture_is_on_the_evaluated_mesh(scene, textured):
+    """In a plain material on the UV map, which the modifier sets. The user's slots stay empty."""
+    bpy.context.view_layer.update()
+    evaluated = textured.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    (material,) = evaluated.data.materials
+    nodes = {node.bl_idname: node for node in material.original.node_tree.nodes}
+    assert nodes["ShaderNodeUVMap"].uv_map == textured.data.uv_layers.active.name
+    assert nodes["ShaderNodeTexImage"].image.name == f"RoSy {textured.name}"
+    assert not textured.data.materials
+    pixels = np.array(nodes["ShaderNodeTexImage"].image.pixels).reshape(128, 128, 4)
+    assert pixels[..., 0].std() > 0.05 and (pixels[..., 3] == 1).all()
+
+
+def test_what_makes_a_texture_out_of_date(scene, textured):
+    """Its field, UV map, look and size; not where it is, how it is lit, and how it deforms."""
+    assert stale_reason(scene) == ""
+    textured.location.x = 3
+    textured.modifiers["Smooth"].levels = 1
+    bend = textured.modifiers.new("Bend", "SIMPLE_DEFORM")
+    textured.modifiers.move(textured.modifiers.find(bend.name), 0)
+    scene.rosy.look.shading = 0.1
+    bpy.context.view_layer.update()
+    assert stale_reason(scene) == ""
+    for change, undo, expected in (
+        (lambda: setattr(scene.rosy.look, "grain", 3.0), lambda: setattr(scene.rosy.look, "grain", 1.5), "look"),
+        (lambda: setattr(scene.rosy, "texture_size", 64), lambda: setattr(scene.rosy, "texture_size", 128), "64 x 64"),
+        (lambda: setattr(scene.rosy, "texture_margin", 3), lambda: setattr(scene.rosy, "texture_margin", 16), "UV map"),
+    ):  # fmt: skip
+        change()
+        assert expected in stale_reason(scene)
+        undo()
+        assert stale_reason(scene) == ""
+    textured.data.uv_layers.active.uv[0].vector = (0.5, 0.5)
+    textured.data.update_tag()
+    bpy.context.view_layer.update()
+    assert "the UV map" in stale_reason(scene)
+    bake_texture(scene, [textured])
+    assert stale_reason(scene) == ""
+    add_field(textured, kind="axis")
+    bpy.context.view_layer.update()
+    assert "field" in stale_reason(scene)
+
+
+def test_pictures_and_textures_take_turns(scene, textured):
+    """An object shows the last of them that was baked, or the one that is chosen."""
+    bake(scene)
+    shown = {info.camera: info.is_shown for info in list_bakes(scene)}
+    assert shown == {"Camera": True, textured.name: False}
+    show_bake(scene, textured.name)
+    shown = {info.camera: info.is_shown for info in list_bakes(scene)}
+    assert shown == {"Camera": False, textured.name: True}
+
+
+def test_baking_again_replaces_the_texture(scene, textured):
+    before = len(bpy.data.images), len(bpy.data.materials), len(bpy.data.node_groups)
+    bake_texture(scene, [textured])
+    assert (len(bpy.data.images), len(bpy.data.materials), len(bpy.data.node_groups)) == before
+    assert len(textured.modifiers) == 2
+
+
+def test_copies_share_a_texture_until_they_are_baked(scene, textured):
+    """Then each has its own. The texture follows an object that is renamed."""
+    copy = textured.copy()
+    copy.data = textured.data.copy()
+    scene.collection.objects.link(copy)
+    textured.name = "Renamed"
+    bpy.context.view_layer.update()
+    assert [info.camera for info in list_bakes(scene)] == ["Renamed"]
+    copy.name = "Copy"
+    add_field(copy, kind="axis")
+    bpy.context.view_layer.update()
+    bake_texture(scene, [copy])
+    assert [(info.camera, info.stale_reason) for info in list_bakes(scene)] == [
+        ("Copy", ""),
+        ("Renamed", ""),
+    ]
+    bpy.data.objects.remove(copy)
+    bpy.context.view_layer.update()
+    assert len(bpy.data.objects) == 2
+    info = list_bakes(scene)[0]
+    assert info.camera == "Copy" and "does not show it" in info.unknown_reason
+
+
+def test_remove_leaves_nothing(scene, camera, monkey):
+    scene.rosy.texture_size = 64
+    bpy.context.view_layer.update()
+    before = contents()
+    bake_texture(scene, [monkey])
+    assert contents() != before
+    remove_bakes(scene)
+    assert contents() == before
+
+
+def test_folder_gets_a_file(scene, camera, monkey, tmp_path):
+    scene.rosy.texture_size = 64
+    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path)
+    bake_texture(scene, [monkey])
+    assert [file.name for file in tmp_path.iterdir()] == [f"RoSy_{monkey.name}_texture.png"]
+
+
+def test_what_is_refused_changes_nothing(scene, camera, monkey):
+    scene.rosy.texture_size = 64
+    monkey.rosy.texture_uv_map = "None"
+    with pytest.raises(RosyError, match="has no UV map 'None'"):
+        bake_texture(scene, [monkey])
+    monkey.rosy.texture_uv_map = ""
+    scene.rosy.look.ink = "hatch"
+    with pytest.raises(RosyError, match="ink style Soft"):
+        bake_texture(scene, [monkey])
+    scene.rosy.look.ink = "soft"
+    while monkey.data.uv_layers:
+        monkey.data.uv_layers.remove(monkey.data.uv_layers[0])
+    with pytest.raises(RosyError, match="unwrap its mesh first"):
+        bake_texture(scene, [monkey])
+    assert not bpy.data.images and not bpy.data.materials and not monkey.modifiers

@@ -67,11 +67,18 @@ class SeamTable:
         self.sheet_shift = steps.rotation * np.float32(sheets_per_turn / (2 * np.pi))
 
     def find(self, cell: np.ndarray, bit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which steps from (n,) cells cross seams, and the numbers of these steps."""
+        """Find the steps from (n,) cells that cross seams.
+
+        Returns
+        -------
+        crosses : (n,) bool ndarray
+        seam : (k,) intp ndarray
+            The numbers of those that do.
+        """
         key = cell.astype(np.int64) * 9 + bit
-        place = np.minimum(np.searchsorted(self._key, key), max(len(self._key) - 1, 0))
-        crossing = np.flatnonzero(self._key.take(place) == key)
-        return crossing, place[crossing]
+        place = np.minimum(np.searchsorted(self._key, key), len(self._key) - 1)
+        crosses = self._key.take(place) == key
+        return crosses, place[crosses]
 
 
 @dataclass(frozen=True, eq=False)

@@ -257,16 +257,14 @@ class StreamlineBatch:
         """
         crossing = seam = np.empty(0, dtype=np.intp)
         blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
-        if len(blocked):
-            bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
-            is_blocked = mask[blocked] >> bit & 1 == 0
-            blocked, bit = blocked[is_blocked], bit[is_blocked]
-        ended = blocked[cell[blocked] != SINK_CELL]
-        seams = self._covering.seams
-        if seams is not None and len(blocked):
-            crossing, seam = seams.find(cell[blocked], bit)
-            crossing = blocked[crossing]
-            ended = np.setdiff1d(ended, crossing, assume_unique=True)
+        bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
+        is_blocked = mask[blocked] >> bit & 1 == 0
+        blocked, bit = blocked[is_blocked], bit[is_blocked]
+        is_tracing = cell[blocked] != SINK_CELL
+        ended, seams = blocked[is_tracing], self._covering.seams
+        if seams is not None and len(ended):
+            is_crossing, seam = seams.find(cell[ended], bit[is_tracing])
+            crossing, ended = ended[is_crossing], ended[~is_crossing]
         cell_offset = row * np.float32(self._covering.width)
         cell_offset += column
         cell += cell_offset.astype(np.intp)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
 from ..progress import Progress, Task
 from .texels import TextureFrame
@@ -43,18 +44,16 @@ def margin_task(
     flat[field.pixel] = color
     filled = np.zeros(height * width, dtype=bool)
     filled[field.pixel] = True
+    if not margin:
+        return image
     outer, values = _beyond_seams(frame, field, color, filled)
-    if margin:
-        flat[outer] = values
-        filled[outer] = True
-    tiles = len(frame.tiles) if frame.is_udim else 1
-    tile_rows = height // tiles
-    for ring in range(margin):
-        yield Progress((ring + 1) / (margin + 1), STEP_LABEL)
-        for tile in range(tiles):
-            rows = slice(tile * tile_rows, (tile + 1) * tile_rows)
-            if not _dilate(image[rows], filled.reshape(height, width)[rows]):
-                break
+    flat[outer] = values
+    filled[outer] = True
+    is_border = field.neighbor_mask != ALL_NEIGHBORS
+    ring = np.union1d(field.pixel[is_border], outer)
+    for number in range(margin):
+        yield Progress((number + 1) / (margin + 1), STEP_LABEL)
+        ring = _dilate(frame, flat, filled, ring)
     return image
 
 
@@ -70,17 +69,10 @@ def _beyond_seams(
     values : (n, K) float32 ndarray
     """
     steps: SeamSteps = field.seam_steps
-    offsets = np.array(NEIGHBOR_OFFSETS)[steps.bit]
-    row, column = np.divmod(field.pixel.take(steps.source).astype(np.intp), frame.width)
-    beside = (offsets == 0).any(axis=1)
-    column, outer_row = column + offsets[:, 0], row + offsets[:, 1]
-    beside &= (column >= 0) & (column < frame.width)
-    # The rows of other tiles are not beside those of this one.
-    beside &= (outer_row >= 0) & (outer_row < frame.height)
-    beside &= outer_row // frame.size == row // frame.size
-    kept = np.flatnonzero(beside)
-    outer = outer_row[kept] * frame.width + column[kept]
-    empty = ~filled.take(outer)
+    kept = np.flatnonzero(np.isin(steps.bit, (1, 3, 5, 7)))
+    dx, dy = np.array(NEIGHBOR_OFFSETS)[steps.bit[kept]].T
+    outer = _neighbors(frame, field.pixel.take(steps.source[kept]), dx, dy)
+    empty = (outer >= 0) & ~filled.take(outer)
     kept, outer = kept[empty], outer[empty]
     values = _interpolated(field, color, steps.target[kept], steps.offset[kept])
     outer, place, count = np.unique(outer, return_inverse=True, return_counts=True)
@@ -112,24 +104,49 @@ def _interpolated(
     return total / weights[:, None]
 
 
-def _dilate(image: np.ndarray, filled: np.ndarray) -> bool:
-    """Fill the empty texels beside filled ones with their mean, in place; return if there were any."""
-    height, width, channels = image.shape
-    beside = np.zeros_like(filled)
-    beside[1:] |= filled[:-1]
-    beside[:-1] |= filled[1:]
-    beside[:, 1:] |= filled[:, :-1]
-    beside[:, :-1] |= filled[:, 1:]
-    beside &= ~filled
-    row, column = np.nonzero(beside)
-    total = np.zeros((len(row), channels), dtype=np.float32)
-    count = np.zeros(len(row), dtype=np.float32)
-    for dx, dy in NEIGHBOR_OFFSETS:
-        neighbor_row = np.clip(row + dy, 0, height - 1)
-        neighbor_column = np.clip(column + dx, 0, width - 1)
-        weight = filled[neighbor_row, neighbor_column].astype(np.float32)
-        total += weight[:, None] * image[neighbor_row, neighbor_column]
+def _dilate(
+    frame: TextureFrame, flat: np.ndarray, filled: np.ndarray, ring: np.ndarray
+) -> np.ndarray:
+    """Fill the empty texels beside a ring of filled ones with the mean of those, in place.
+
+    Parameters
+    ----------
+    frame : TextureFrame
+    flat : (H W, K) float32 ndarray
+    filled : (H W,) bool ndarray
+    ring : (n,) ndarray of int
+        Flat indices into the frame.
+
+    Returns
+    -------
+    (m,) intp ndarray
+        The texels that were filled.
+    """
+    found = []
+    for offset in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        index = _neighbors(frame, ring, *offset)
+        index = index[index >= 0]
+        index = index[~filled[index]]
+        filled[index] = True
+        # No index occurs twice: each texel of the ring has another neighbor there.
+        found.append(index)
+    beside = np.concatenate(found)
+    filled[beside] = False
+    total = np.zeros((len(beside), flat.shape[1]), dtype=np.float32)
+    count = np.zeros(len(beside), dtype=np.float32)
+    for offset in NEIGHBOR_OFFSETS:
+        neighbor = _neighbors(frame, beside, *offset)
+        weight = (filled.take(neighbor) & (neighbor >= 0)).astype(np.float32)
+        total += weight[:, None] * flat.take(neighbor, axis=0)
         count += weight
-    image[row, column] = total / count[:, None]
-    filled[row, column] = True
-    return bool(len(row))
+    flat[beside] = total / count[:, None]
+    filled[beside] = True
+    return beside
+
+
+def _neighbors(frame: TextureFrame, index: np.ndarray, dx: int, dy: int) -> np.ndarray:
+    """Return the (n,) intp flat indices of neighbors; -1 outside of the tile."""
+    row, column = np.divmod(index.astype(np.intp), frame.width)
+    inside = (column + dx >= 0) & (column + dx < frame.width)
+    inside &= (row + dy >= 0) & ((row + dy) // frame.size == row // frame.size)
+    return np.where(inside, index + dy * frame.width + dx, -1)

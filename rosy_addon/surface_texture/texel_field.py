@@ -7,8 +7,6 @@ leads to the texel where it ends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
@@ -80,17 +78,19 @@ def texel_field_task(
     if mesh.family_z is not None:
         channels[family] = np.empty(count, dtype=np.complex64)
     to_texels = size * step
+    corner_z = mesh.z.astype(np.complex64)
+    corner_harmonics = [(number, values.astype(np.complex64)) for number, values in mesh.harmonics]
     for block in pixel_blocks(count):
         yield Progress(0.3 * block.start / count, "finding directions")
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         frame = frames_at(charts, triangle, weights)
-        z[block] = np.einsum("nk,nk->n", weights, mesh.z[triangle]) * power(frame.conj(), degree)
+        z[block] = _interpolated(weights, corner_z, triangle) * power(frame.conj(), degree)
         for axis, tangent in enumerate((frame, 1j * frame)):
             jacobian[block, axis] = to_texels * charts.to_uv(triangle, tangent)
-        for number, values in mesh.harmonics:
+        for number, values in corner_harmonics:
             channel = ("deviation", number)
             turn = signed_power(frame.conj(), rotation_order(channel, degree))
-            channels[channel][block] = np.einsum("nk,nk->n", weights, values[triangle]) * turn
+            channels[channel][block] = _interpolated(weights, values, triangle) * turn
         if mesh.family_z is not None:
             turn = signed_power(frame.conj(), rotation_order(family, degree))
             channels[family][block] = mesh.family_z[triangle] * turn
@@ -110,12 +110,17 @@ def texel_field_task(
     )
 
 
+def _interpolated(weights: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """(n,) values at (n, 3) barycentric coordinates, given those at the (T, 3) corners."""
+    a, b, c = corners.take(triangle, axis=0).T
+    return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c
+
+
 def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return (n,) complex128: the unit tangents `UvCharts.frame` at (n, 3) barycentric coordinates."""
-    corner = charts.frame[triangle]
-    frame = np.einsum("nk,nk->n", weights, corner)
+    frame = _interpolated(weights, charts.frame, triangle)
     norm = np.abs(frame)
-    return np.divide(frame, norm, out=corner[:, 0].copy(), where=norm > 1e-6)
+    return np.divide(frame, norm, out=charts.frame[triangle, 0], where=norm > 1e-6)
 
 
 def _neighbor_masks_task(
@@ -127,61 +132,57 @@ def _neighbor_masks_task(
 ) -> Task[np.ndarray]:
     """(P,) uint16 `PixelField.neighbor_mask`: the neighbors in the same chart, near on the surface."""
     masks = np.zeros(len(texels), dtype=np.uint16)
-    masks[defined] = 1 << 4
-    # Squared length on the surface that a texel is stretched to at most, and points and normals.
+    # Squared length on the surface that a texel is stretched to at most.
     stretch = charts.stretch()[1] * texels.frame.size
     reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
     reach_squared = (reach * reach).astype(np.float32)
     min_cosine = None if crease_angle is None else np.cos(crease_angle)
     width, height = texels.frame.width, texels.frame.height
     band_rows = max((1 << 16) // width, 1)
+    corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
     for first_row in range(0, height, band_rows):
         yield Progress(first_row / height, STEP_LABEL)
-        rows = min(band_rows + 1, height - first_row)
+        # One more row: the first of the next band, or an empty one.
         first, stop = np.searchsorted(
-            texels.index, [first_row * width, (first_row + rows) * width]
+            texels.index, [first_row * width, (first_row + band_rows + 1) * width]
         ).tolist()
+        place = texels.index[first:stop] - np.int32(first_row * width)
         triangle, weights = texels.triangle[first:stop], texels.barycentric[first:stop]
-        point = np.einsum("nk,nki->ni", weights, mesh.points[triangle].astype(np.float32))
+        point = np.einsum("nk,nki->ni", weights, corners.take(triangle, axis=0))
         normal = None
         if min_cosine is not None:
-            normal = np.einsum("nk,nki->ni", weights, mesh.corner_normal[triangle].astype("f4"))
+            normal = np.einsum("nk,nki->ni", weights, normals.take(triangle, axis=0))
             normal /= np.sqrt(np.maximum(dot(normal, normal), 1e-20))[:, None]
-        grid = np.full((rows, width), -1, dtype=np.int32)
-        grid.reshape(-1)[texels.index[first:stop] - first_row * width] = np.arange(stop - first)
-        for source, target, bit in _neighbor_pairs(grid):
-            a, b = triangle[source], triangle[target]
+        shape = band_rows + 1, width
+        texel_at, triangle_at = np.empty(shape, np.int32), np.full(shape, -1, np.int32)
+        texel_at.reshape(-1)[place] = np.arange(len(place), dtype=np.int32)
+        triangle_at.reshape(-1)[place] = np.where(defined[first:stop], triangle, np.int32(-1))
+        mask_at = np.zeros(shape, np.uint16)
+        for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
+            left, right = max(-dx, 0), width - max(dx, 0)
+            source = slice(0, band_rows + 1 - dy), slice(left, right)
+            target = slice(dy, band_rows + 1), slice(left + dx, right + dx)
+            a, b = triangle_at[source], triangle_at[target]
             linked = a == b
-            other = np.flatnonzero(~linked)
-            a, b, own, neighbor = a[other], b[other], source[other], target[other]
-            offset = point[own] - point[neighbor]
-            dx, dy = NEIGHBOR_OFFSETS[bit]
-            near = dot(offset, offset) <= (dx * dx + dy * dy) * np.maximum(
-                reach_squared[a], reach_squared[b]
+            linked &= a >= 0
+            other = np.nonzero((a != b) & (a >= 0) & (b >= 0))
+            own, neighbor = texel_at[source][other], texel_at[target][other]
+            a, b = a[other], b[other]
+            offset = point.take(own, axis=0) - point.take(neighbor, axis=0)
+            near = dot(offset, offset) <= np.float32(dx * dx + dy * dy) * np.maximum(
+                reach_squared.take(a), reach_squared.take(b)
             )
-            near &= charts.chart[a] == charts.chart[b]
+            near &= charts.chart.take(a) == charts.chart.take(b)
             if normal is not None:
-                near &= dot(normal[own], normal[neighbor]) >= min_cosine
+                near &= dot(normal.take(own, axis=0), normal.take(neighbor, axis=0)) >= min_cosine
             linked[other] = near
-            linked &= defined[first + source] & defined[first + target]
-            source, target = first + source[linked], first + target[linked]
-            masks[source] |= np.uint16(1 << bit)
-            masks[target] |= np.uint16(1 << (8 - bit))
+            bit = NEIGHBOR_OFFSETS.index((dx, dy))
+            linked = linked.astype(np.uint16)
+            mask_at[source] |= linked << np.uint16(bit)
+            mask_at[target] |= linked << np.uint16(8 - bit)
+        masks[first:stop] |= mask_at.reshape(-1).take(place)
+    masks[defined] |= np.uint16(1 << 4)
     return masks
-
-
-def _neighbor_pairs(grid: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, int]]:
-    """Yield the pairs of neighbors in an image of indices, and the bit of the step between them.
-
-    -1 stands for no texel. Each pair is yielded in one direction.
-    """
-    height, width = grid.shape
-    for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
-        left, right = max(-dx, 0), width - max(dx, 0)
-        source = grid[: height - dy, left:right].ravel()
-        target = grid[dy:, left + dx : right + dx].ravel()
-        both = (source >= 0) & (target >= 0)
-        yield source[both], target[both], NEIGHBOR_OFFSETS.index((dx, dy))
 
 
 def _seam_steps_task(

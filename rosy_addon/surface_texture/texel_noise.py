@@ -24,6 +24,9 @@ MAX_GRID_SIDE = 256
 #: their cell and interpolated from them, both linearly.
 GRID_CELL_SIGMAS = 3**0.5
 
+#: Of so many texels, one is spread over the grid.
+SAMPLE_STRIDE = 3
+
 #: Texels that are spread over the grid at once.
 GRID_BLOCK = 1 << 18
 
@@ -139,6 +142,7 @@ def _subtract_local_means_task(
     sums = np.zeros((1 + len(channels), int(shape.prod())))
     for number, block in enumerate(blocks):
         yield Progress(0.7 + 0.15 * number / len(blocks), STEP_LABEL)
+        block = slice(block.start, block.stop, SAMPLE_STRIDE)
         first, place = cells(block)
         weight = area[texels.triangle[block]]
         for offset, share in _corner_shares(place, stride):

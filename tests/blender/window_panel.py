@@ -298,6 +298,30 @@ def stop_with_escape():
     yield from check_interruption(press_escape, screenshot="baking")
 
 
+def start_texture():
+    bpy.context.scene.rosy.texture_size = 2048
+    yield from start_task(bpy.ops.rosy.bake_texture)
+
+
+def texture_stopped_with_escape():
+    yield from check_interruption(press_escape, start_texture)
+
+
+def texture_with_progress():
+    """The view shows the texture with its light, also from a side that no camera sees."""
+    yield from fresh_scene()
+    make_field()
+    bpy.context.scene.rosy.texture_size = 1024
+    yield from start_task(bpy.ops.rosy.bake_texture)
+    yield from wait_until(lambda: status().current is None, 60.0)
+    check_idle()
+    (bake,) = bake_records().list_bakes(bpy.context.scene)
+    assert bake.is_texture and bake.is_shown and not bake.stale_reason
+    view()[1].spaces.active.shading.type = "MATERIAL"
+    yield 3.0
+    yield from save_screenshot("panel-7-texture")
+
+
 def workers_stopped_with_escape():
     """The processes that draw a large picture together end, and their files are removed."""
     module = rosy("rosy_addon.rendering.band_workers")
@@ -691,6 +715,8 @@ run_steps(
     eevee_shows_the_picture,
     undo_after_bake,
     stop_with_escape,
+    texture_stopped_with_escape,
+    texture_with_progress,
     workers_stopped_with_escape,
     strokes_stopped_with_escape,
     field_stopped_with_escape,

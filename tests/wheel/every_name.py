@@ -88,6 +88,12 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
     lines: list[NDArray[np.float64]] = drawing.polylines
     names: list[str] = drawing.family_names
     assert svg.startswith("<?xml") and len(lines) == len(names) == len(drawing)
+    flat = rf.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], uv=[[0, 0], [1, 0], [0, 1]])
+    texture: rf.Texture = rf.texture(flat, rf.along_uv(flat), size=32, margin=2, udim=False)
+    texture.save(folder / "flat.png")
+    tiles: dict[int, rf.Picture] = texture.tiles
+    overlap: float = texture.overlap
+    assert list(tiles) == [1001] and overlap == 0
     file: Path = rf.turntable(
         cube, field, path=folder / "cube.gif", pictures=2, size=(16, 16), workers=1
     )

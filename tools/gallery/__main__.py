@@ -28,6 +28,7 @@ OTHERS = (
     "hatching-page",
     "peers",
     "strokes-page",
+    "textures-page",
     "fields-page",
     "turntable",
     "listing",

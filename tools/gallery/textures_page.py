@@ -1,0 +1,138 @@
+"""The pictures of docs/textures.md, whose text is written by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosy_addon.color import to_linear
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.shading import KEY_LIGHT
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.surface_texture.charts import uv_charts_task
+from rosy_addon.surface_texture.draw import draw_texture
+
+from .looks_page import IMAGES
+from .sheet import Panel, display, save, sheet
+
+#: Side of a picture, samples per pixel in each direction, and side of the texture.
+SIDE, SAMPLES, TEXTURE_SIDE = 402, 3, 2048
+
+#: Views from the front and from behind, azimuth and elevation in degrees.
+FRONT, BACK = (-26.0, 8.0), (150.0, 14.0)
+
+
+def write() -> None:
+    """Draw and save the pictures."""
+    surface, uv = unwrapped_suzanne()
+    field = generate(surface, GeneratorSettings("form"), 4)
+    instance = MeshInstance(surface, np.eye(4), field)
+    texture = draw_texture(instance, uv, Look(), TEXTURE_SIDE).rgba
+    charts = run_to_completion(uv_charts_task(surface, build_tangent_mesh(instance), uv))
+    hue = np.random.default_rng(3).uniform(0.25, 0.95, (int(charts.chart.max()) + 1, 3))
+    chart_color = to_linear(hue)[charts.chart]
+
+    def textured(gbuffer: GBuffer) -> np.ndarray:
+        return texture_at(texture, uv[surface.triangles], gbuffer)
+
+    panels = [
+        Panel(view(instance, FRONT, lambda g: chart_color[g.triangle]), "the charts of the UV map"),
+        Panel(view(instance, FRONT, textured), "the texture"),
+        Panel(view(instance, BACK, textured), "from behind"),
+        Panel(display(_reduced(texture, SIDE)), "the file"),
+    ]
+    save(sheet([panels[:2], panels[2:]]), IMAGES / "textures.png")
+    close = project([instance], _zoomed(instance))
+    color = _lit(textured(close), close)
+    chart = chart_color[close.triangle]
+    crops = [_picture(close, color), _picture(close, _lit(chart, close))]
+    labels = ["the texture from near", "the charts in the same view"]
+    save(
+        sheet([[Panel(crop, label) for crop, label in zip(crops, labels, strict=True)]]),
+        IMAGES / "textures-seams.png",
+    )
+
+
+def unwrapped_suzanne() -> tuple[Surface, np.ndarray]:
+    """Return Blender's monkey, subdivided and unwrapped into charts, and (C, 2) coordinates."""
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add()
+    obj = bpy.context.object
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    bpy.ops.object.modifier_apply(modifier="Subdivision")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.uv.smart_project(angle_limit=np.radians(66), island_margin=0.003)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    mesh = obj.data
+    vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    start = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", start)
+    uv = np.empty((len(corners), 2), dtype=np.float32)
+    mesh.uv_layers.active.uv.foreach_get("vector", uv.ravel())
+    return build_surface(vertices, corners, np.append(start, len(corners)), name="Suzanne"), uv
+
+
+def view(instance: MeshInstance, angles: tuple[float, float], color_of) -> np.ndarray:
+    """Return a picture, lit by a lamp; `color_of` returns the colors of the pixels of a G-buffer."""
+    side = SIDE * SAMPLES
+    camera = orbit_camera(instance.surface.vertices, *angles, side, side, margin=0.03)
+    gbuffer = project([instance], camera)
+    return _picture(gbuffer, _lit(color_of(gbuffer), gbuffer))
+
+
+def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
+    """(P, 3) linear colors of a texture, interpolated as a renderer does."""
+    place = np.einsum("nk,nki->ni", gbuffer.barycentric, corner_uv[gbuffer.triangle])
+    height, width = texture.shape[:2]
+    x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    x, y = (x - column)[:, None], (y - row)[:, None]
+
+    def at(dx: int, dy: int) -> np.ndarray:
+        return texture[(row + dy) % height, (column + dx) % width, :3]
+
+    return (at(0, 0) * (1 - x) + at(1, 0) * x) * (1 - y) + (at(0, 1) * (1 - x) + at(1, 1) * x) * y
+
+
+def _lit(color: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
+    """Light colors by a lamp over the left shoulder of the viewer."""
+    cosine = gbuffer.normal @ KEY_LIGHT.vector.astype(np.float32)
+    return color * (0.35 + 1.1 * np.maximum(cosine, 0))[:, None]
+
+
+def _picture(gbuffer: GBuffer, color: np.ndarray) -> np.ndarray:
+    """Return (h, w, 3) uint8 from the top, with the mean of the samples of each pixel."""
+    camera = gbuffer.camera
+    rgba = np.zeros((camera.height * camera.width, 4), dtype=np.float32)
+    rgba[gbuffer.pixel, :3], rgba[gbuffer.pixel, 3] = color, 1
+    shape = camera.height // SAMPLES, SAMPLES, camera.width // SAMPLES, SAMPLES, 4
+    rgba[:, :3] *= rgba[:, 3:]
+    mean = rgba.reshape(shape).mean(axis=(1, 3))
+    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
+    return display(mean)
+
+
+def _zoomed(instance: MeshInstance):
+    """Return a camera that sees the forehead from near."""
+    vertices = instance.surface.vertices
+    near = vertices[np.linalg.norm(vertices - [-0.25, -0.75, 0.55], axis=1) < 0.32]
+    side = SIDE * SAMPLES
+    return orbit_camera(near, *FRONT, side, side, margin=-0.1)
+
+
+def _reduced(texture: np.ndarray, side: int) -> np.ndarray:
+    """Return a texture with about `side` pixels on each side, as the mean of its texels."""
+    factor = len(texture) // side
+    used = texture[: side * factor, : side * factor]
+    return used.reshape(side, factor, side, factor, 4).mean(axis=(1, 3))

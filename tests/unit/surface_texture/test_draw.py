@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import mainly
 from shapes import cube, from_quads, plane, torus
 from uv_maps import colors_at, patches_uv, surface_points, torus_uv
 
@@ -24,7 +25,7 @@ def instance_of(surface, degree: int, kind: str = "smoothest") -> MeshInstance:
     return MeshInstance(surface, np.eye(4), generate(surface, settings, degree))
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize("degree", mainly([1, 3, 4], [1, 2, 3, 4, 6]))
 def test_texture_does_not_depend_on_the_charts(degree):
     """64 square charts, turned and mirrored at random, show the picture of a single one."""
     surface = torus()
@@ -47,12 +48,12 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     instance = MeshInstance(surface, np.eye(4), RosyField(4, field.vectors * middle))
     points = surface_points(surface, 20_000)
     for changes in ({"noise": "colour"}, {"magnitude": "both"}, {"taper": True}):
-        look = WIDE.with_settings(changes)
+        look = WIDER.with_settings(changes)
         colors = [
-            colors_at(draw_texture(instance, uv, look, 1024).rgba, surface, uv, points)
+            colors_at(draw_texture(instance, uv, look, 512).rgba, surface, uv, points)
             for uv in (torus_uv(), patches_uv(1))
         ]
-        assert np.corrcoef(colors)[0, 1] > 0.95, changes
+        assert np.corrcoef(colors)[0, 1] > 0.93, changes
 
 
 def test_stretched_charts_show_the_same_lines():

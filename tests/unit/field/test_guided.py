@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sparse
+from conftest import long
 from field_helpers import MESHES, angle_differences, as_scipy, bumpy
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
@@ -46,7 +47,7 @@ def test_hard_guides_are_met_exactly(degree):
         assert find_singularities(surface, field)[1].sum() == degree * euler_characteristic(surface)
 
 
-@pytest.mark.parametrize("degree", [1, 4])
+@pytest.mark.parametrize("degree", [4, *long(1)])
 def test_soft_guides_match_a_direct_solver(degree):
     surface = bumpy(icosphere(4))
     guides, weight = random_guides(surface, 30), 40.0

@@ -39,6 +39,16 @@ class Texture:
         picture, with the number 1001.
     overlap : float
         Fraction of the area of the UV map that lies under other charts, which show the same texels.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> corners, uv = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0], [1, 0], [0, 1]]
+    >>> triangle = rf.Surface(corners, [[0, 1, 2]], uv=uv)
+    >>> texture = rf.texture(triangle, rf.along_uv(triangle), size=32)
+    >>> texture.tiles
+    {1001: <Picture: 32 x 32 pixels>}
+    >>> texture.save("triangle.png")
     """
 
     def __init__(self, tiles: dict[int, Picture], overlap: float) -> None:

@@ -142,7 +142,6 @@ def _draw_bakes(
     row = layout.row(align=True)
     row.operator("rosy.bake_animation", text="Animation", icon="RENDER_ANIMATION")
     row.operator("rosy.turntable", text="Turntable", icon="FILE_MOVIE")
-    _draw_texture_settings(layout, context)
     if not objects:
         layout.label(text="Needs a field to draw", icon="INFO")
     if has_pictures(context.scene):
@@ -150,6 +149,7 @@ def _draw_bakes(
     if bake_infos:
         _draw_view_hints(layout, context, bake_infos)
         _draw_view_transform_warning(layout, context.scene)
+    _draw_texture_settings(layout, context)
 
 
 def bake_label(bake_infos: list[BakeInfo]) -> str:

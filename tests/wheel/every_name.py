@@ -93,7 +93,7 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
     texture.save(folder / "flat.png")
     tiles: dict[int, rf.Picture] = texture.tiles
     overlap: float = texture.overlap
-    assert list(tiles) == [1001] and overlap == 0
+    assert list(tiles) == [1001] and overlap < 0.5
     file: Path = rf.turntable(
         cube, field, path=folder / "cube.gif", pictures=2, size=(16, 16), workers=1
     )

@@ -19,9 +19,6 @@ from .scene.read_view import scene_depsgraph
 from .scene.textures import apply_texture, read_texture_input_task, uv_map_name
 from .surface_texture.draw import check_texture_look, draw_texture_task
 
-#: Smallest fraction of a UV map under other charts that the user is told of.
-NOTABLE_OVERLAP = 0.05
-
 
 @dataclass(frozen=True, eq=False)
 class TextureResult:
@@ -90,7 +87,7 @@ def bake_texture_task(
     drawn = []
     for index, obj in enumerate(objects):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
-        reading = read_texture_input_task(scene, depsgraph, obj, margin, BAKE_CACHE)
+        reading = read_texture_input_task(scene, depsgraph, obj, BAKE_CACHE)
         texture_input = yield from subtask(reading, start, start)
         state = read_texture_state(scene, depsgraph, obj)
         task = draw_texture_task(
@@ -100,12 +97,8 @@ def bake_texture_task(
         png = None
         if not settings.as_float:
             png = yield from subtask(png_task(texture.rgba), stop, stop)
-        warnings = ()
-        if texture.overlap > NOTABLE_OVERLAP:
-            warnings = (
-                f"'{obj.name}': {texture.overlap:.0%} of its UV map lies under other charts, which "
-                "show the same texels",
-            )
+        note = texture.overlap_note(f"object '{obj.name}'")
+        warnings = (note,) if note else ()
         drawn.append((texture_input.source, ImageData(texture.rgba, png), state, warnings))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.98, "applying the textures")

@@ -25,9 +25,6 @@ from .surface import Surface
 #: What stands for the number of the tile in the name of a file, as in Blender.
 UDIM_TOKEN = "<UDIM>"
 
-#: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
-NOTABLE_OVERLAP = 0.05
-
 
 class Texture:
     """A texture for the UV map of a surface. A notebook shows its first tile.
@@ -163,11 +160,7 @@ def texture(
             upright_instance(surface, field, None), uv, look, size, margin=margin, is_udim=udim
         )
     )
-    if drawn.overlap > NOTABLE_OVERLAP:
-        warn(
-            f"{surface.name}: {drawn.overlap:.0%} of its UV map lies under other charts, which show the "
-            "same texels: unwrap the mesh without overlaps if they are to differ"
-        )
+    warn(drawn.overlap_note(surface.name))
     return Texture({number: Picture(rgba) for number, rgba in drawn.tiles().items()}, drawn.overlap)
 
 

@@ -84,13 +84,10 @@ class TextureSource:
     obj : bpy.types.Object
     uv_map : str
         Name of the UV map.
-    margin : int
-        Texels.
     """
 
     obj: bpy.types.Object
     uv_map: str
-    margin: int
 
 
 @dataclass(frozen=True)

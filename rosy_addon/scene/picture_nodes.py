@@ -55,12 +55,8 @@ def new_material(
     diffuse : float
         Factor of the diffuse color.
     """
-    material = bpy.data.materials.new(name)
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    build = _NodeBuilder(tree)
+    material, build = _new_empty_material(name)
+    tree = build.tree
     image_node = build(
         "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
     )
@@ -95,6 +91,15 @@ def new_material(
     return material
 
 
+def _new_empty_material(name: str) -> tuple[bpy.types.Material, _NodeBuilder]:
+    """Create a material without nodes, and return what adds them."""
+    material = bpy.data.materials.new(name)
+    if not has_nodes_by_default(material):
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    return material, _NodeBuilder(material.node_tree)
+
+
 def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:
     """Create a material that shows a texture on a UV map, lit like any other surface.
 
@@ -105,12 +110,8 @@ def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.
     uv_map : str
         Name of the UV map.
     """
-    material = bpy.data.materials.new(name)
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    build = _NodeBuilder(tree)
+    material, build = _new_empty_material(name)
+    tree = build.tree
     coordinates = build("ShaderNodeUVMap", uv_map=uv_map)
     image_node = build("ShaderNodeTexImage", image=image)
     shader = build("ShaderNodeBsdfPrincipled")

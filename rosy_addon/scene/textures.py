@@ -64,7 +64,6 @@ def read_texture_input_task(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     obj: bpy.types.Object,
-    margin: int,
     cache: Cache | None = None,
 ) -> Task[TextureInput]:
     """Read an object with a field, and the UV map of its texture, as it is evaluated.
@@ -78,9 +77,7 @@ def read_texture_input_task(
     scene_data = yield from read_scene_task(
         depsgraph, [obj], nonfinite_policy(scene), cache, uv_maps={obj: name}
     )
-    return TextureInput(
-        scene_data.instances[0], scene_data.uvs[obj], TextureSource(obj, name, margin)
-    )
+    return TextureInput(scene_data.instances[0], scene_data.uvs[obj], TextureSource(obj, name))
 
 
 def apply_texture(

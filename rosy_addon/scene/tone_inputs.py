@@ -86,7 +86,9 @@ def read_tone(
     else:
         image = owner.rosy.tone_image if has_rosy_properties() else None
         values = (
-            None if image is None else read_uvs(mesh, owner.rosy.tone_uv_map, label, "the tone")
+            None
+            if image is None
+            else read_uvs(mesh, owner.rosy.tone_uv_map, label, "the image of the tone")
         )
         image = None if image is None else image_luminance(image)
     if values is None:
@@ -115,7 +117,7 @@ def tone_source_digest(
         image = owner.rosy.tone_image if has_rosy_properties() else None
         if image is None:
             return b""
-        uvs = read_uvs(mesh, owner.rosy.tone_uv_map, owner.name, "the tone")
+        uvs = read_uvs(mesh, owner.rosy.tone_uv_map, owner.name, "the image of the tone")
         return content_hash(uvs, image_luminance(image))
     except RosyError as error:
         return content_hash(str(error))

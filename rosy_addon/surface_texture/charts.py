@@ -67,13 +67,15 @@ class UvCharts:
 
     def to_surface(self, triangle: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """Map (n,) complex displacements in the UV map to tangents; 0 if there is no area."""
-        linear, conjugate = self.inverse()
-        return linear[triangle] * displacement + conjugate[triangle] * displacement.conj()
+        linear, conjugate = self.inverse(triangle)
+        return linear * displacement + conjugate * displacement.conj()
 
-    def inverse(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return (T,) a and b of the map from the UV map to tangents; 0 if there is no area."""
-        scale = np.divide(1, self.density, out=np.zeros(len(self.uv)), where=self.density != 0)
-        return self.linear.conj() * scale, -self.conjugate * scale
+    def inverse(self, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (n,) a and b of the map from the UV map to tangents; 0 if there is no area."""
+        linear, conjugate = self.linear[triangle], self.conjugate[triangle]
+        density = np.abs(linear) ** 2 - np.abs(conjugate) ** 2
+        scale = np.divide(1, density, out=np.zeros(len(density)), where=density != 0)
+        return linear.conj() * scale, -conjugate * scale
 
     def stretch(self) -> tuple[np.ndarray, np.ndarray]:
         """(T,) largest and smallest length in the UV map of a Blender unit."""

@@ -48,6 +48,9 @@ DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = 2048, 16, 16384
 #: Margin in texels: default and maximum.
 DEFAULT_MARGIN, MAX_MARGIN = 16, 512
 
+#: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
+NOTABLE_OVERLAP = 0.05
+
 #: Bytes of a texel of the frame, of each line there, and of the same with colored noise; of a texel of a
 #: chart, and of each line there for each channel of the noise. Fitted to measurements.
 TEXEL_BYTES, LINE_BYTES, COLORED_LINE_BYTES = 14, 24, 48
@@ -70,6 +73,15 @@ class Texture:
     frame: TextureFrame
     rgba: np.ndarray
     overlap: float
+
+    def overlap_note(self, name: str) -> str:
+        """Return what to tell the user of overlapping charts of the mesh `name`; empty if nothing."""
+        if self.overlap <= NOTABLE_OVERLAP:
+            return ""
+        return (
+            f"{name}: {self.overlap:.0%} of its UV map lies under other charts, which show the same "
+            "texels: unwrap the mesh without overlaps if they are to differ"
+        )
 
     def tiles(self) -> dict[int, np.ndarray]:
         """Return the (size, size, 4) picture of each tile, by its UDIM number."""

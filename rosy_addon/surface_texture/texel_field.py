@@ -252,7 +252,7 @@ def _seam_steps(
     arrived[arrived] &= defined[target[arrived]]
     # Tangents are rotated by this from the frame of the one triangle to that of the other.
     turn = direction * unit.conj()
-    back, back_conjugate = (part[triangle] for part in charts.inverse())
+    back, back_conjugate = charts.inverse(triangle)
     ahead, ahead_conjugate = charts.linear[end.triangle], charts.conjugate[end.triangle]
     linear = ahead * turn * back + ahead_conjugate * (turn * back_conjugate).conj()
     conjugate = ahead * turn * back_conjugate + ahead_conjugate * (turn * back).conj()

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import bpy
 
 from ..rosy_addon.bake_texture import TextureResult, bake_texture_task
-from ..rosy_addon.errors import RosyError
 from ..rosy_addon.progress import Task
-from ..rosy_addon.scene.compat import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
 from .modal_task import DialogTaskMixin
 from .poll import poll_active_field, poll_idle, selected_mesh_objects
 from .reports import report_warnings
-
-#: Angle between the faces of a chart, and distance between charts as a fraction of the map, with which
-#: meshes are unwrapped.
-UNWRAP_ANGLE, UNWRAP_MARGIN = math.radians(66), 0.003
+from .unwrap import unwrapping_task
 
 
 class ROSY_OT_bake_texture(DialogTaskMixin, bpy.types.Operator):
@@ -54,11 +48,9 @@ class ROSY_OT_bake_texture(DialogTaskMixin, bpy.types.Operator):
         column.label(text="Unwrap with Smart UV Project, and bake the texture?")
 
     def make_task(self, context: bpy.types.Context) -> Task[list[TextureResult]]:
-        missing = self._without_uv_map(context)
-        if self.unwrap and missing:
-            _unwrap(context, missing)
-            self.cancel_note = "the new UV maps were kept"
-        return bake_texture_task(context.scene, self._objects(context))
+        missing = self._without_uv_map(context) if self.unwrap else []
+        task = bake_texture_task(context.scene, self._objects(context))
+        return unwrapping_task(context, missing, task) if missing else task
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return self._objects(context)
@@ -78,56 +70,6 @@ class ROSY_OT_bake_texture(DialogTaskMixin, bpy.types.Operator):
             for obj in self._objects(context)
             if not obj.data.uv_layers and not obj.rosy.texture_uv_map
         ]
-
-
-def _unwrap(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
-    """Unwrap the meshes of objects with Smart UV Project.
-
-    Raises
-    ------
-    RosyError
-        If a mesh is linked from a library.
-    """
-    for obj in objects:
-        if not is_editable(obj.data):
-            raise RosyError(
-                f"object '{obj.name}': its mesh is linked and has no UV map: make it local"
-            )
-    active = context.view_layer.objects.active
-    selected, mode = list(context.selected_objects), context.mode
-    if mode != "OBJECT":
-        bpy.ops.object.mode_set(mode="OBJECT")
-    try:
-        for obj in selected:
-            obj.select_set(False)
-        for obj in objects:
-            context.view_layer.objects.active = obj
-            obj.select_set(True)
-            states = _element_states(obj.data)
-            bpy.ops.object.mode_set(mode="EDIT")
-            bpy.ops.mesh.reveal(select=False)
-            bpy.ops.mesh.select_all(action="SELECT")
-            bpy.ops.uv.smart_project(angle_limit=UNWRAP_ANGLE, island_margin=UNWRAP_MARGIN)
-            bpy.ops.object.mode_set(mode="OBJECT")
-            for elements, name, values in states:
-                elements.foreach_set(name, values)
-            obj.data.update()
-            obj.select_set(False)
-    finally:
-        for obj in selected:
-            obj.select_set(True)
-        context.view_layer.objects.active = active
-
-
-def _element_states(mesh: bpy.types.Mesh) -> list[tuple[bpy.types.bpy_prop_collection, str, list]]:
-    """Return which vertices, edges and faces of a mesh are hidden, and which are selected."""
-    states = []
-    for elements in (mesh.vertices, mesh.edges, mesh.polygons):
-        for name in ("hide", "select"):
-            values = [False] * len(elements)
-            elements.foreach_get(name, values)
-            states.append((elements, name, values))
-    return states
 
 
 CLASSES = (ROSY_OT_bake_texture,)

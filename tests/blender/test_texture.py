@@ -37,6 +37,19 @@ def test_meshes_without_a_uv_map_can_be_unwrapped(scene):
     assert pixels(baked_images()[0])[..., 0].std() > 0.05
 
 
+def test_unwrapping_is_undone_if_the_bake_fails(with_field, scene):
+    with_field.rosy.texture_uv_map = "None"
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    cube.data.uv_layers.remove(cube.data.uv_layers[0])
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    with_field.select_set(True)
+    before = contents()
+    assert "no UV map 'None'" in error_of(bpy.ops.rosy.bake_texture, unwrap=True)
+    assert contents() == before
+    assert bpy.context.object == cube and len(bpy.context.selected_objects) == 2
+
+
 def test_undo_and_remove(with_field, scene):
     scene.rosy.texture_size = 64
     before = contents()

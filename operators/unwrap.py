@@ -1,0 +1,109 @@
+"""Unwrapping of meshes with Blender's Smart UV Project, for tasks that need a UV map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.progress import Progress, Task
+from ..rosy_addon.scene.compat import is_editable
+
+#: Angle between the faces of a chart, and distance between charts as a fraction of the map.
+ANGLE, MARGIN = math.radians(66), 0.003
+
+#: Name of the new UV maps, as Blender's own.
+UV_MAP_NAME = "UVMap"
+
+
+def unwrapping_task(
+    context: bpy.types.Context, objects: Sequence[bpy.types.Object], task: Task[Any]
+) -> Task[Any]:
+    """Add a UV map to the meshes of objects, and return a task that removes them if `task` is not finished.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    objects : sequence of bpy.types.Object
+        Meshes without a UV map.
+    task : Task
+        Work that needs the UV maps.
+
+    Raises
+    ------
+    RosyError
+        If a mesh is linked from a library.
+    """
+    meshes = {obj.data: obj for obj in objects}
+    for mesh, obj in meshes.items():
+        if not is_editable(mesh):
+            raise RosyError(
+                f"object '{obj.name}': its mesh is linked and has no UV map: make it local"
+            )
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for mesh in meshes:
+        uv = _unwrapped(context, mesh)
+        mesh.uv_layers.new(name=UV_MAP_NAME).data.foreach_set("uv", uv)
+    with_cleanup = _removing_maps_task(list(meshes), task)
+    next(with_cleanup)  # from here on, it removes the maps also if it is closed
+    return with_cleanup
+
+
+def _removing_maps_task(meshes: Sequence[bpy.types.Mesh], task: Task[Any]) -> Task[Any]:
+    """Run a task. If it is not finished, the UV maps of `unwrapping_task` are removed from meshes."""
+    try:
+        yield Progress(0.0, "unwrapping")
+        return (yield from task)
+    except BaseException:
+        for mesh in meshes:
+            if (layer := mesh.uv_layers.get(UV_MAP_NAME)) is not None:
+                mesh.uv_layers.remove(layer)
+        raise
+
+
+def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the (2 C,) float32 coordinates of an unwrapped copy of a mesh.
+
+    Blender's operator changes what is hidden and selected, and needs an object that is visible. The copy
+    keeps both away from the user's mesh.
+    """
+    with _only_selected_copy(context, mesh) as copy:
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.reveal(select=False)
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=MARGIN)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        uv = np.zeros(2 * len(copy.data.loops), dtype=np.float32)
+        if copy.data.uv_layers:
+            copy.data.uv_layers[0].data.foreach_get("uv", uv)
+        return uv
+
+
+@contextmanager
+def _only_selected_copy(
+    context: bpy.types.Context, mesh: bpy.types.Mesh
+) -> Iterator[bpy.types.Object]:
+    """Yield an object with a copy of a mesh, which alone is selected and active."""
+    active = context.view_layer.objects.active
+    selected = list(context.selected_objects)
+    copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())
+    try:
+        context.scene.collection.objects.link(copy)
+        for obj in selected:
+            obj.select_set(False)
+        copy.select_set(True)
+        context.view_layer.objects.active = copy
+        yield copy
+    finally:
+        data = copy.data
+        bpy.data.objects.remove(copy)
+        bpy.data.meshes.remove(data)
+        for obj in selected:
+            obj.select_set(True)
+        context.view_layer.objects.active = active

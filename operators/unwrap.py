@@ -48,7 +48,8 @@ def unwrapping_task(
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
     for mesh in meshes:
-        uv = _unwrapped(context, mesh)
+        # The operator refuses meshes without faces.
+        uv = _unwrapped(context, mesh) if mesh.polygons else np.zeros(0, dtype=np.float32)
         mesh.uv_layers.new(name=UV_MAP_NAME).data.foreach_set("uv", uv)
     with_cleanup = _removing_maps_task(list(meshes), task)
     next(with_cleanup)  # from here on, it removes the maps also if it is closed

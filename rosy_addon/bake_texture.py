@@ -9,6 +9,7 @@ import bpy
 
 from .cache import BAKE_CACHE
 from .compositor.look import Look
+from .field.directional_field import field_symmetry
 from .image_io.png import png_task
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.blender_images import ImageData
@@ -16,8 +17,8 @@ from .scene.look_properties import read_look
 from .scene.picture_state import read_texture_state
 from .scene.pictures import OutputSettings, check_targets, read_output_settings
 from .scene.read_view import scene_depsgraph
-from .scene.textures import apply_texture, read_texture_input_task, uv_map_name
-from .surface_texture.draw import check_texture_look, draw_texture_task
+from .scene.textures import Hatching, apply_texture, read_texture_input_task, uv_map_name
+from .surface_texture.draw import draw_texture_task
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,6 @@ def bake_texture_task(
     look = read_look(scene.rosy) if look is None else look
     settings = read_output_settings(scene) if settings is None else settings
     for obj in objects:
-        check_texture_look(look, f"object '{obj.name}'")
         uv_map_name(obj)
     check_targets(objects, settings)
     yield Progress(0.0, "reading the scene")
@@ -96,17 +96,25 @@ def bake_texture_task(
         texture = yield from subtask(task, start, stop)
         png = None
         if not settings.as_float:
-            png = yield from subtask(png_task(texture.rgba), stop, stop)
+            png = yield from subtask(
+                png_task(texture.rgba, is_color=not texture.has_thresholds), stop, stop
+            )
         note = texture.overlap_note(f"object '{obj.name}'")
         warnings = (note,) if note else ()
-        drawn.append((texture_input.source, ImageData(texture.rgba, png), state, warnings))
+        hatching = None
+        if texture.has_thresholds:
+            hatching = Hatching(look, field_symmetry(texture_input.instance.field).line_count)
+        image_data = ImageData(texture.rgba, png)
+        drawn.append((texture_input.source, image_data, state, hatching, warnings))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.98, "applying the textures")
     return [
         TextureResult(
-            source.obj, apply_texture(scene, source, image_data, settings, state), warnings
+            source.obj,
+            apply_texture(scene, source, image_data, settings, state, hatching),
+            warnings,
         )
-        for source, image_data, state, warnings in drawn
+        for source, image_data, state, hatching, warnings in drawn
     ]
 
 

@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..color import to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..presets.store import default_user_folder, load_preset
@@ -13,7 +16,6 @@ from ..progress import run_to_completion
 from ..surface_texture.draw import (
     DEFAULT_MARGIN,
     DEFAULT_SIZE,
-    check_texture_look,
     check_texture_size,
     draw_texture_task,
 )
@@ -28,6 +30,10 @@ UDIM_TOKEN = "<UDIM>"
 
 class Texture:
     """A texture for the UV map of a surface. A notebook shows its first tile.
+
+    A texture of hatching does not hold ink, but thresholds: red, green and blue are the fractions of the
+    paper that the first, second and third lines cover when they reach the texel, so that a shader can draw
+    the hatching of any light. They are stored as they are, in a file without a color space.
 
     Attributes
     ----------
@@ -138,8 +144,8 @@ def texture(
     Raises
     ------
     RosyError
-        If there is no UV map, it cannot be drawn, a setting or the preset is not possible or draws ink,
-        or there is not enough memory.
+        If there is no UV map, it cannot be drawn, a setting or the preset is not possible, or there is
+        not enough memory.
 
     Examples
     --------
@@ -152,7 +158,7 @@ def texture(
     >>> rf.texture(square, rf.along_axis(square, (1, 1, 0), degree=2), size=64)
     <Texture: 64 x 64 texels>
     """
-    look = texture_look(surface.name, preset, settings)
+    look = texture_look(preset, settings)
     check_texture_size(size, margin)
     uv = uv_map(surface)
     drawn = run_to_completion(
@@ -161,20 +167,22 @@ def texture(
         )
     )
     warn(drawn.overlap_note(surface.name))
-    return Texture({number: Picture(rgba) for number, rgba in drawn.tiles().items()}, drawn.overlap)
+    tiles = drawn.tiles()
+    if drawn.has_thresholds:  # display values, as pictures are saved
+        tiles = {
+            number: np.concatenate([to_linear(rgba[..., :3]), rgba[..., 3:]], axis=-1)
+            for number, rgba in tiles.items()
+        }
+    return Texture({number: Picture(rgba) for number, rgba in tiles.items()}, drawn.overlap)
 
 
-def texture_look(
-    name: str, preset: str | os.PathLike[str] | None, settings: dict[str, Any]
-) -> Look:
-    """Return the look of a texture of the mesh `name`.
+def texture_look(preset: str | os.PathLike[str] | None, settings: dict[str, Any]) -> Look:
+    """Return the look of a texture.
 
     Raises
     ------
     RosyError
-        If a setting is not possible, or the look cannot be drawn as a texture.
+        If a setting is not possible.
     """
     look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
-    look = look.with_settings(dict(settings))
-    check_texture_look(look, name)
-    return look
+    return look.with_settings(dict(settings))

@@ -49,7 +49,7 @@ def run_texture(options: argparse.Namespace) -> None:
     check_output(options, ".png")
     preset, settings = requested_preset(options), requested_settings(options)
     # Mistakes are reported before the mesh is read.
-    texture_look(str(options.mesh), preset, settings)
+    texture_look(preset, settings)
     surface, field = load_mesh_and_field(options)
     with printed_warnings():
         texture = api.texture(

@@ -146,8 +146,7 @@ class EvenLines:
             between = np.float32(0.5) * self.growth[pixels] * width
             covered = _box_filtered(position, width - between, edge)
             covered += _box_filtered(np.float32(0.5) - position, between, edge)
-        low, high = (np.float32(pixels * look.supersampling) for pixels in FADE_PIXELS)
-        return smoothstep((period - low) / (high - low)) * (covered - width)
+        return resolved_share(period, look.supersampling) * (covered - width)
 
     def crowding(self, line: int, look: Look) -> np.ndarray:
         """Compute how much one line is crowded.
@@ -165,6 +164,20 @@ class EvenLines:
         """
         low, high = (np.float32(pixels) for pixels in crowded_pixels(look))
         return 1 - smoothstep((self.period[line] - low) / (high - low))
+
+
+def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
+    """Compute how much of the contrast of lines is drawn: 0 if they are too close for the pixels, up to 1.
+
+    Parameters
+    ----------
+    period : ndarray
+        Distance between lines, in pixels of the frame.
+    supersampling : int
+        Of the frame.
+    """
+    low, high = (np.float32(pixels * supersampling) for pixels in FADE_PIXELS)
+    return smoothstep((period - low) / (high - low))
 
 
 def crowded_pixels(look: Look) -> tuple[float, float]:

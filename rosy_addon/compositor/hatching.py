@@ -240,10 +240,10 @@ def _streak_coverage(
 ) -> np.ndarray:
     """`line_coverage` of the streaks of LIC images."""
     statistics = look_streak_statistics(look)
-    streak, slope = _standard_streak(images, line, statistics.std)
+    streak, slope = standard_streak(images, line, statistics.std)
     if modulation.break_images is not None:
         amount = break_amount(target_coverage, look.breaks, look.wobble)
-        broken = _standard_streak(modulation.break_images, line, statistics.break_std)
+        broken = standard_streak(modulation.break_images, line, statistics.break_std)
         streak += amount * (broken[0] - streak)
         if slope is not None:
             slope += amount * (broken[1] - slope)
@@ -252,7 +252,7 @@ def _streak_coverage(
     return _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
 
 
-def _standard_streak(
+def standard_streak(
     images: LicImages, line: int, std: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Streaks of a line with mean 0 and standard deviation 1, and their slopes if these are known."""

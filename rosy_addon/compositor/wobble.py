@@ -80,7 +80,7 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
         Radians, with a mean of about 0 and a standard deviation of about `WOBBLE_STD`.
     """
     count = len(gbuffer.pixel)
-    wavelength = np.float32(look.grain * MEAN_WAVELENGTH_GRAINS)
+    grain = np.float32(look.grain)
     cell_size, rest = cell_size_args(look), None
     if look.anchor == "surface":
         units = instance_units(gbuffer, cell_size["pixel"])
@@ -97,9 +97,27 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
             instance_id = gbuffer.instance_id[block]
             scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
-        level = np.log2(np.maximum(size, 1e-30) * wavelength)
-        angle[block] = _wave_sum(position, level)
-    return np.float32(WOBBLE_STD) * angle
+        angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * grain)
+    return angle
+
+
+def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
+    """Compute the angle between lines and field at `Look.wobble` 1, at positions in rest space.
+
+    Parameters
+    ----------
+    position : (3, n) float32 ndarray
+    grain : (n,) or () float32 ndarray
+        Size of the cells of the noise there.
+
+    Returns
+    -------
+    (n,) float32 ndarray
+        Radians.
+    """
+    level = np.log2(grain * np.float32(MEAN_WAVELENGTH_GRAINS))
+    level = np.broadcast_to(level, position.shape[1:])
+    return np.float32(WOBBLE_STD) * _wave_sum(position, level)
 
 
 def rotate_pixel_field_task(field: PixelField, angle: np.ndarray) -> Task[PixelField]:

@@ -44,27 +44,37 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
     """Convert an (H, W, 4) linear picture to uint8 display values (sRGB). Alpha stays linear."""
-    display = np.concatenate([to_display(rgba[..., :3]), np.clip(rgba[..., 3:], 0, 1)], axis=-1)
-    return np.rint(display * 255).astype(np.uint8)
+    display = np.concatenate([to_display(rgba[..., :3]), rgba[..., 3:]], axis=-1)
+    return _to_uint8(display)
 
 
-def png_task(rgba: np.ndarray) -> Task[bytes]:
-    """Encode a picture as a PNG file; see `write_png`."""
+def _to_uint8(values: np.ndarray) -> np.ndarray:
+    """Convert values from 0 to 1 to uint8."""
+    return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
+
+
+def png_task(rgba: np.ndarray, *, is_color: bool = True) -> Task[bytes]:
+    """Encode a picture as a PNG file; see `write_png`.
+
+    If it is not a color but data, values are stored as they are.
+    """
     height, width = rgba.shape[:2]
     compressor = zlib.compressobj(ZLIB_LEVEL)
     compressed = []
     for start in range(0, height, BLOCK_ROWS):
         yield Progress(start / height, "writing the picture")
-        block = to_srgb_uint8(rgba[::-1][start : start + BLOCK_ROWS])
+        block = rgba[::-1][start : start + BLOCK_ROWS]
+        block = to_srgb_uint8(block) if is_color else _to_uint8(block)
         # Each row starts with its filter type. It is 0, none, as filters do not help with noise.
         rows = np.zeros((len(block), 1 + width * 4), dtype=np.uint8)
         rows[:, 1:] = block.reshape(len(block), -1)
         compressed.append(compressor.compress(rows.tobytes()))
     compressed.append(compressor.flush())
     header = struct.pack(">IIBBBBB", width, height, _BIT_DEPTH, _RGBA_COLOR_TYPE, 0, 0, 0)
+    color_space = [(b"sRGB", bytes([_PERCEPTUAL_INTENT]))] if is_color else []
     chunks = [
         (b"IHDR", header),
-        (b"sRGB", bytes([_PERCEPTUAL_INTENT])),
+        *color_space,
         (b"IDAT", b"".join(compressed)),
         (b"IEND", b""),
     ]

@@ -70,7 +70,12 @@ def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
 
 
 def new_image(
-    name: str, image_data: ImageData, *, as_float: bool = False, stem: Path | None = None
+    name: str,
+    image_data: ImageData,
+    *,
+    as_float: bool = False,
+    is_color: bool = True,
+    stem: Path | None = None,
 ) -> bpy.types.Image:
     """Create a Blender image.
 
@@ -82,6 +87,8 @@ def new_image(
         From `image_data_task`, with the same parameters.
     as_float : bool
         Whether linear values are stored in single precision.
+    is_color : bool
+        Whether 8-bit values are colors (sRGB), and not data.
     stem : Path, optional
         Path to save the image at, without the suffix. By default it is packed into the .blend file.
 
@@ -94,7 +101,7 @@ def new_image(
     image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
     try:
         image.alpha_mode = "CHANNEL_PACKED"
-        image.colorspace_settings.name = "Non-Color" if as_float else "sRGB"
+        image.colorspace_settings.name = "sRGB" if is_color and not as_float else "Non-Color"
         if as_float:
             image.pixels.foreach_set(image_data.pixels.ravel())
             image.update()

@@ -67,14 +67,14 @@ def delete_unused() -> dict[str, int]:
     dict of str to int
         The numbers of deleted datablocks, by "node_groups", "materials" and "images".
     """
-    counts = {}
-    # A group uses its material, and that its image.
-    for name in ("node_groups", "materials", "images"):
+    counts = {"node_groups": 0, "materials": 0, "images": 0}
+    # A geometry group uses its material, and that its image and its shader group.
+    for name in ("node_groups", "materials", "node_groups", "images"):
         unused = [
             block
             for block in getattr(bpy.data, name)
             if block.get(OWNED_TAG) and not block.users and block.library is None
         ]
         bpy.data.batch_remove(unused)
-        counts[name] = len(unused)
+        counts[name] += len(unused)
     return counts

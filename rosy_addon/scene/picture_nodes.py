@@ -6,14 +6,14 @@ The user may have applied the modifier. Then the data of the object have the mat
 from __future__ import annotations
 
 from collections.abc import Container
-from typing import Any
 
 import bpy
 import numpy as np
 
 from .blender_images import NEUTRAL_GRAY
-from .compat import has_nodes_by_default, is_editable
+from .compat import is_editable
 from .meshes import read_attribute
+from .node_builder import NodeBuilder, new_empty_material
 from .owned_data import OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
 
 #: Name of the modifier that shows a picture.
@@ -55,7 +55,7 @@ def new_material(
     diffuse : float
         Factor of the diffuse color.
     """
-    material, build = _new_empty_material(name)
+    material, build = new_empty_material(name)
     tree = build.tree
     image_node = build(
         "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
@@ -91,38 +91,6 @@ def new_material(
     return material
 
 
-def _new_empty_material(name: str) -> tuple[bpy.types.Material, _NodeBuilder]:
-    """Create a material without nodes, and return what adds them."""
-    material = bpy.data.materials.new(name)
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
-    material.node_tree.nodes.clear()
-    return material, _NodeBuilder(material.node_tree)
-
-
-def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:
-    """Create a material that shows a texture on a UV map, lit like any other surface.
-
-    Parameters
-    ----------
-    name : str
-    image : bpy.types.Image
-    uv_map : str
-        Name of the UV map.
-    """
-    material, build = _new_empty_material(name)
-    tree = build.tree
-    coordinates = build("ShaderNodeUVMap", uv_map=uv_map)
-    image_node = build("ShaderNodeTexImage", image=image)
-    shader = build("ShaderNodeBsdfPrincipled")
-    output = build("ShaderNodeOutputMaterial")
-    shader.inputs["Roughness"].default_value = 1.0
-    tree.links.new(coordinates.outputs["UV"], image_node.inputs["Vector"])
-    tree.links.new(image_node.outputs["Color"], shader.inputs["Base Color"])
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
-    return material
-
-
 def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> None:
     """Set the frame range of a material's image sequence. Each file is shown at its own frame."""
     for node in material.node_tree.nodes:
@@ -133,7 +101,7 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
             image_user.use_auto_refresh = True
 
 
-def _clip_position(build: _NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
+def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
     """Return a node whose outputs X, Y and Z are the clip-space x, y and w."""
     links = build.tree.links
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE)
@@ -168,7 +136,7 @@ def new_group(
     group.is_modifier = True
     for direction in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    build = _NodeBuilder(group)
+    build = NodeBuilder(group)
     group_input = build("NodeGroupInput")
     set_material = build("GeometryNodeSetMaterial")
     set_material.inputs["Material"].default_value = material
@@ -241,74 +209,6 @@ def _image_node(material: bpy.types.Material) -> bpy.types.Node | None:
 def _clip_rows(matrix: np.ndarray) -> np.ndarray:
     """Return the rows of a (4, 4) matrix for the clip-space x, y and w: (3, 4)."""
     return np.asarray(matrix)[[0, 1, 3]]
-
-
-class _NodeBuilder:
-    """Adds nodes to a tree, laid out in rows from left to right.
-
-    Calling it adds a node of a type, and sets its properties.
-    """
-
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
-        self.tree = tree
-        self.node_count = 0
-
-    def __call__(self, kind: str, **settings: Any) -> bpy.types.Node:
-        node = self.tree.nodes.new(kind)
-        node.location = (180 * (self.node_count % 12), -220 * (self.node_count // 12))
-        self.node_count += 1
-        for name, value in settings.items():
-            setattr(node, name, value)
-        return node
-
-    def connect(self, value: Any, socket: bpy.types.NodeSocket) -> None:
-        """Link a socket to an input, or set the input to a constant."""
-        if isinstance(value, bpy.types.NodeSocket):
-            self.tree.links.new(value, socket)
-        else:
-            socket.default_value = value
-
-    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
-        """Add a math node, and return its output. Values are sockets or constants."""
-        node = self("ShaderNodeMath", operation=operation)
-        for value, socket in zip(values, node.inputs, strict=False):
-            self.connect(value, socket)
-        return node.outputs["Value"]
-
-    def mix(self, kind: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
-        """Add a mix node for a data type, and return its output: a for factor 0, b for factor 1."""
-        node = self("ShaderNodeMix", data_type=kind)
-        enabled = {socket.name: socket for socket in node.inputs if socket.enabled}
-        for name, value in (("Factor", factor), ("A", a), ("B", b)):
-            self.connect(value, enabled[name])
-        return next(socket for socket in node.outputs if socket.enabled)
-
-    def stored_attribute(
-        self,
-        geometry: bpy.types.NodeSocket,
-        name: str,
-        data_type: str,
-        domain: str,
-        value: bpy.types.NodeSocket,
-    ) -> bpy.types.NodeSocket:
-        """Add a node that stores a named attribute, and return the geometry with it."""
-        node = self("GeometryNodeStoreNamedAttribute", data_type=data_type, domain=domain)
-        node.inputs["Name"].default_value = name
-        self.tree.links.new(geometry, node.inputs["Geometry"])
-        enabled = (socket for socket in node.inputs if socket.name == "Value" and socket.enabled)
-        self.tree.links.new(value, next(enabled))
-        return node.outputs["Geometry"]
-
-    def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
-        """Add nodes that multiply a point by a (3, 4) matrix, and return the output."""
-        combined = self("ShaderNodeCombineXYZ")
-        for axis, row in zip("XYZ", rows.tolist(), strict=True):
-            product = self("ShaderNodeVectorMath", operation="DOT_PRODUCT")
-            self.connect(point, product.inputs[0])
-            product.inputs[1].default_value = row[:3]
-            component = self.math("ADD", product.outputs["Value"], row[3])
-            self.tree.links.new(component, combined.inputs[axis])
-        return combined.outputs[0]
 
 
 def set_picture_modifier(

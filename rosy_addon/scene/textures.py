@@ -7,23 +7,27 @@ material slots and modifiers are not changed. Its record is among those of the p
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..cache import Cache
+from ..compositor.look import Look
 from ..errors import RosyError
 from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
 from .blender_images import ImageData, new_image
 from .file_names import picture_stem
+from .hatching_nodes import hatching_group
 from .owned_data import delete_unused, rollback_on_error
-from .picture_nodes import new_group, new_texture_material, set_picture_modifier
+from .picture_nodes import new_group, set_picture_modifier
 from .picture_state import PictureState
 from .pictures import OutputSettings
 from .read_view import nonfinite_policy
 from .scene_reader import read_scene_task
+from .texture_nodes import new_hatching_material, new_texture_material
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,21 @@ class TextureInput:
     instance: MeshInstance
     uv: np.ndarray
     source: TextureSource
+
+
+class Hatching(NamedTuple):
+    """How a texture of thresholds is drawn.
+
+    Attributes
+    ----------
+    look : Look
+        The settings of the ink.
+    line_count : int
+        Number of lines through a point.
+    """
+
+    look: Look
+    line_count: int
 
 
 def uv_map_name(obj: bpy.types.Object) -> str:
@@ -86,10 +105,21 @@ def apply_texture(
     image_data: ImageData,
     settings: OutputSettings,
     state: PictureState,
+    hatching: Hatching | None = None,
 ) -> bpy.types.Image:
     """Show a texture on its object, and return its image. An older one is replaced.
 
     If an error is raised, the scene is not changed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    source : TextureSource
+    image_data : ImageData
+    settings : OutputSettings
+    state : PictureState
+    hatching : Hatching, optional
+        How hatching is drawn, if the image has thresholds of ink and not colors.
 
     Raises
     ------
@@ -102,9 +132,17 @@ def apply_texture(
     if settings.folder is not None:
         stem = settings.folder / picture_stem(obj.name, "texture")
     with rollback_on_error() as created:
-        image = new_image(name, image_data, as_float=settings.as_float, stem=stem)
+        image = new_image(
+            name, image_data, as_float=settings.as_float, is_color=hatching is None, stem=stem
+        )
         created.append(image)
-        material = new_texture_material(name, image, source.uv_map)
+        if hatching is None:
+            material = new_texture_material(name, image, source.uv_map)
+        else:
+            group, is_new = hatching_group()
+            if is_new:
+                created.append(group)
+            material = new_hatching_material(name, image, source.uv_map, group, *hatching)
         created.append(material)
         node_group = new_group(name, material, None)
         created.append(node_group)

@@ -12,17 +12,19 @@ from ..compositor.lic import lic_lengths_task
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, is_hatched
 from ..compositor.look_units import look_on_surface
+from ..compositor.pixel_field import PixelField
 from ..errors import RosyError
 from ..line_drawing.tangent_mesh import TangentMesh, tangent_mesh_task
 from ..memory import check_memory, raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.rest_coordinates import matrix_scale
 from .charts import UvCharts, uv_charts_task
+from .hatching import thresholds_task
 from .margin import margin_task
 from .texel_field import texel_field_task
 from .texel_noise import texel_noise_task
+from .texel_surface import TexelSurface
 from .texels import Texels, TextureFrame, texels_task, texture_frame
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
@@ -40,6 +42,7 @@ TEXTURE_SETTINGS = (
     *("ink", "display", "unit", "unit_size", "length", "taper", "step", "grain", "density"),
     *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
     *("magnitude", "magnitude_range", "colour_map"),
+    *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 
 #: Texels on each side of a texture: default and range.
@@ -65,14 +68,18 @@ class Texture:
     ----------
     frame : TextureFrame
     rgba : (H, W, 4) float32 ndarray
-        Linear, opaque, rows from the bottom. The tiles of a UDIM texture are stacked.
+        Rows from the bottom. The tiles of a UDIM texture are stacked. Linear and opaque, or thresholds
+        of ink.
     overlap : float
         Fraction of the area of the UV map that lies under other parts of it. They show the same texels.
+    has_thresholds : bool
+        Whether the pixels are thresholds of ink; see `compositor.ink_thresholds`.
     """
 
     frame: TextureFrame
     rgba: np.ndarray
     overlap: float
+    has_thresholds: bool = False
 
     def overlap_note(self, name: str) -> str:
         """Return what to tell the user of overlapping charts of the mesh `name`; empty if nothing."""
@@ -122,8 +129,7 @@ def draw_texture_task(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        With soft ink. The light, the tone and the settings of a camera have no effect. With the unit
-        "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
+        The light, the tone and the settings of a camera have no effect. With the unit "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
         each side.
     size : int
         Texels on each side of the texture, or of a tile of it.
@@ -145,11 +151,10 @@ def draw_texture_task(
     Raises
     ------
     RosyError
-        If there is no field, the look is one of ink, the size or the margin is out of range, the UV map
+        If there is no field, the size or the margin is out of range, the UV map
         cannot be drawn, or there is not enough memory.
     """
     name = instance.surface.name
-    check_texture_look(look, name)
     check_texture_size(size, margin)
     raise_mmap_threshold()
     mesh = yield from subtask(
@@ -168,27 +173,22 @@ def draw_texture_task(
     _check_texture_memory(frame, charts, mesh, look)
     texels = yield from subtask(texels_task(charts, frame, name), 0.1, 0.15)
     step = step_length(mesh, charts, texels)
-    look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    color_task = _colors_task(instance, mesh, charts, texels, look, step)
-    field, color = yield from subtask(color_task, 0.15, 0.95)
-    image = yield from subtask(margin_task(frame, field, color, margin), 0.95, 1.0)
+    crease_angle = None if look.cross_creases else look.crease_angle
+    field_task = texel_field_task(mesh, charts, texels, step, crease_angle)
+    field = yield from subtask(field_task, 0.15, 0.3)
+    on = TexelSurface(instance, mesh, charts, texels, step)
+    surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
+    if is_hatched(look):
+        pixels_task = thresholds_task(on, field, surface_look, look.guiding_angle, cache)
+    else:
+        pixels_task = _colors_task(on, field, surface_look)
+    pixels = yield from subtask(pixels_task, 0.3, 0.95)
+    image = yield from subtask(margin_task(frame, field, pixels, margin), 0.95, 1.0)
+    if is_hatched(look):
+        return Texture(frame, image, texels.overlap, has_thresholds=True)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = image
     return Texture(frame, rgba, texels.overlap)
-
-
-def check_texture_look(look: Look, name: str) -> None:
-    """Check that a look can be drawn as a texture.
-
-    Raises
-    ------
-    RosyError
-        If its ink is not soft.
-    """
-    if is_hatched(look):
-        raise RosyError(
-            f"{name}: a texture shows soft streaks, but the look has ink: choose the ink style Soft"
-        )
 
 
 def check_texture_size(size: int, margin: int) -> None:
@@ -237,22 +237,10 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _colors_task(
-    instance: MeshInstance,
-    mesh: TangentMesh,
-    charts: UvCharts,
-    texels: Texels,
-    look: Look,
-    step: float,
-):
-    """Return the field at texels, and their (P, 3) linear colors."""
-    crease_angle = None if look.cross_creases else look.crease_angle
-    field_task = texel_field_task(mesh, charts, texels, step, crease_angle)
-    field = yield from subtask(field_task, 0.0, 0.2)
-    scale = matrix_scale(instance.matrix)
-    noise_task = texel_noise_task(instance.surface, charts, texels, look, step, scale)
-    noise = yield from subtask(noise_task, 0.2, 0.45)
-    (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.45, 0.95)
+def _colors_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.ndarray]:
+    """(P, 3) linear colors of the field at texels."""
+    noise = yield from subtask(texel_noise_task(on, look), 0.0, 0.3)
+    (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.3, 0.95)
     layer = yield from subtask(layer_task(field, look, images), 0.95, 0.95)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
@@ -260,4 +248,4 @@ def _colors_task(
     for block in pixel_blocks(len(color)):
         yield Progress(0.95 + 0.05 * block.start / len(color), "drawing the colors")
         color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
-    return field, color
+    return color

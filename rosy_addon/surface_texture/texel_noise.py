@@ -10,8 +10,9 @@ from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..field.surface import Surface
 from ..progress import Progress, Task
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.rest_coordinates import RestCoordinates, rest_positions
+from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .charts import UvCharts
+from .texel_surface import TexelSurface
 from .texels import Texels
 
 #: Smallest side of a cell of the noise, in texels of the coarser direction.
@@ -34,33 +35,23 @@ GRID_BLOCK = 1 << 18
 STEP_LABEL = "making noise"
 
 
-def texel_noise_task(
-    surface: Surface,
-    charts: UvCharts,
-    texels: Texels,
-    look: Look,
-    step: float,
-    scale: float,
-) -> Task[np.ndarray]:
+def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
     """Make noise that is anchored to the surface, at its texels.
 
     Parameters
     ----------
-    surface : Surface
-    charts : UvCharts
-    texels : Texels
+    on : TexelSurface
     look : Look
         In steps of streamlines. Its `grain`, `density`, `high_pass`, `noise` and `seed` are used.
-    step : float
-        Length of a step, in Blender units.
-    scale : float
-        Blender units of the world in one of object space.
 
     Returns
     -------
     (P, K) float32 ndarray
         With the mean `NOISE_MEAN`.
     """
+    surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
+    # Blender units of the world in one of object space.
+    scale = matrix_scale(on.instance.matrix)
     channels = 3 if look.noise == "colour" else 1
     rest = rest_positions(surface).astype(np.float32)
     triangle_vertex = surface.triangle_vertex

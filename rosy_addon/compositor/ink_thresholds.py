@@ -1,0 +1,233 @@
+"""Thresholds of hatching: the coverage from which each point is covered by ink.
+
+Hatching draws ink where a streak exceeds the threshold of a target coverage (`hatching`). Its inverse
+does not depend on the tone: the target coverage from which the streak exceeds the threshold. It is
+evenly distributed from 0 to 1, as are the values of a halftone screen. With the thresholds of each
+line, the hatching of any tone is a comparison: there is ink where the threshold is below the coverage.
+
+Lines share the ink in their order: the first covers the light tones, and further ones join in darker
+tones. The thresholds are stored in that order. Where two lines swap, they are merged such that those of
+the first and of the second are still independent and evenly distributed. With the density
+E = -log(1 - threshold), a line of the share s has ink from the density E / s of the tone on. The first
+ink of several lines is the smallest of these; the densities have an exponential distribution, and so do
+the smallest, and what is left of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .even_lines import uneven_width
+from .hatching import ONSET_LEAD, ONSET_RANGE, LineModulation, standard_streak
+from .lic_images import LicImages
+from .look import Look
+from .paper_grain import PAPER_GRAIN_STRENGTH
+from .streak_statistics import (
+    COVERAGE_STEPS,
+    break_amount,
+    look_streak_statistics,
+    smoothstep,
+)
+
+#: Number of lines whose thresholds are stored.
+MAX_LAYERS = 3
+
+#: Steps of the bisection that finds the thresholds of uneven lines: to 1 / 1024.
+BISECTION_STEPS = 10
+
+#: Entries of the table of densities of the first line, and its largest density.
+DENSITY_STEPS, MAX_DENSITY = 1024, 16.0
+
+
+def sharp_look(look: Look) -> Look:
+    """Return a look whose streak statistics are those of lines with sharp edges."""
+    return replace(look, crispness=1.0)
+
+
+def line_thresholds(
+    line: int, images: LicImages, look: Look, modulation: LineModulation
+) -> np.ndarray:
+    """Compute the coverage from which each pixel is covered by one line.
+
+    Parameters
+    ----------
+    line : int
+        Index into `images.members`.
+    images : LicImages
+    look : Look
+        A `sharp_look`, in pixels of the frame.
+    modulation : LineModulation
+        Without `line_tones` and `outline`, which have no effect.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        0 to 1, evenly distributed.
+    """
+    statistics = look_streak_statistics(look)
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+    relief = break_streak = None
+    if modulation.paper_grain is not None:
+        relief = np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
+    if modulation.break_images is not None:
+        break_streak, _ = standard_streak(modulation.break_images, line, statistics.break_std)
+    if modulation.even_lines is not None:
+        position = 1 - modulation.even_lines.streaks[line]
+        if break_streak is None and relief is None:
+            result = position
+        else:
+            grain = None if relief is None else modulation.paper_grain[line]
+            result = _bisect(
+                lambda coverage: uneven_width(coverage, look, break_streak, grain) - position,
+                len(position),
+            )
+    else:
+        streak, _ = standard_streak(images, line, statistics.std)
+        if relief is not None:
+            streak = streak + relief
+        if break_streak is None:
+            result = np.interp(streak, statistics.threshold[::-1], coverages[::-1])
+        else:
+            difference = break_streak - streak if relief is None else break_streak + relief - streak
+
+            def excess(coverage: np.ndarray) -> np.ndarray:
+                amount = break_amount(coverage, look.breaks, look.wobble)
+                threshold = np.interp(coverage, coverages, statistics.threshold)
+                return streak + amount * difference - threshold
+
+            result = _bisect(excess, len(streak))
+    result = result.astype(np.float32, copy=False)
+    if modulation.undirected is not None:
+        undefined = np.flatnonzero(~np.isnan(modulation.undirected))
+        spots = modulation.undirected[undefined] / np.float32(statistics.disc_std)
+        if relief is not None:
+            spots += relief[undefined]
+        result[undefined] = np.interp(spots, statistics.disc_threshold[::-1], coverages[::-1])
+    return result
+
+
+def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
+    """(count,) float32 coverages, 0 to 1, from which `excess` of the coverage is above 0."""
+    low, high = np.zeros((2, count), dtype=np.float32)
+    high += 1
+    for _ in range(BISECTION_STEPS):
+        middle = np.float32(0.5) * (low + high)
+        is_covered = excess(middle) > 0
+        high[is_covered], low[~is_covered] = middle[is_covered], middle[~is_covered]
+    return np.float32(0.5) * (low + high)
+
+
+def ordered_thresholds(
+    thresholds: np.ndarray, first_weights: np.ndarray, undefined: np.ndarray, look: Look
+) -> np.ndarray:
+    """Sort the thresholds of lines by their order.
+
+    Parameters
+    ----------
+    thresholds : (M, P) float32 ndarray
+        From `line_thresholds`.
+    first_weights : (M, P) float32 ndarray
+        How much each line comes first; the sum is 1. The other lines follow in the order of M.
+    undefined : (P,) bool ndarray
+        Where there are no lines, and the thresholds of the first hold for all ink together.
+    look : Look
+        Its `layers` and `layering` are used where the field is undefined.
+
+    Returns
+    -------
+    (min(M, MAX_LAYERS), P) float32 ndarray
+        Independent of each other, and evenly distributed from 0 to 1.
+    """
+    count = len(thresholds)
+    layers = min(count, MAX_LAYERS)
+    if count == 1:
+        return thresholds
+    # What is left of the density of each line, and whether it has begun.
+    density = -np.log1p(-np.minimum(thresholds, np.float32(1 - np.exp(-MAX_DENSITY))))
+    has_begun = np.zeros(density.shape, dtype=bool)
+    weights = np.zeros_like(first_weights)
+    ordered = np.empty((layers, density.shape[1]), dtype=np.float32)
+    points = np.arange(density.shape[1])
+    for layer in range(layers):
+        # A line has the weight of being this one or an earlier one.
+        weights += np.roll(first_weights, layer, axis=0)
+        share = np.where(has_begun, np.float32(0), weights)
+        share /= np.maximum(share.sum(axis=0), np.float32(1e-6))
+        begin = np.full(density.shape, np.inf, dtype=np.float32)
+        np.divide(density, share, out=begin, where=share > 0)
+        begin[has_begun] = np.inf
+        next_line = begin.argmin(axis=0)
+        earliest = np.minimum(begin[next_line, points], np.float32(MAX_DENSITY))
+        ordered[layer] = -np.expm1(-earliest)
+        density -= share * earliest
+        np.maximum(density, 0, out=density)
+        has_begun[next_line, points] = True
+    if undefined.any():
+        ordered[0, undefined] = _first_of_all(
+            thresholds[0, undefined], min(look.layers, layers), look.layering
+        )
+        ordered[1:, undefined] = 1
+    return ordered
+
+
+def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.ndarray]:
+    """Compute the shares of the lines, by their order, as `hatching.line_shares` does.
+
+    Parameters
+    ----------
+    darkness : ndarray
+        1 - transmittance.
+    layers : int
+        Number of lines.
+    layering : float
+        Of the look.
+    """
+    begun = [
+        smoothstep((darkness - layer * layering + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
+        for layer in range(layers)
+    ]
+    total = np.add.reduce(begun)
+    return [weight / total for weight in begun]
+
+
+def _first_of_all(threshold: np.ndarray, layers: int, layering: float) -> np.ndarray:
+    """Thresholds of the first line, with which it alone has the coverage of all lines together."""
+    density = np.linspace(0, MAX_DENSITY, DENSITY_STEPS)
+    first = density * layer_shares(-np.expm1(-density), layers, layering)[0]
+    first = np.maximum.accumulate(first)
+    total = -np.log1p(-np.minimum(threshold, 1 - np.exp(-MAX_DENSITY)))
+    return -np.expm1(-np.interp(total, density, first))
+
+
+def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) -> np.ndarray:
+    """Store ordered thresholds as the channels of pixels.
+
+    Parameters
+    ----------
+    ordered : (L, P) float32 ndarray
+        From `ordered_thresholds`.
+    resolved : (P,) ndarray or float
+        0 to 1: how much of the contrast of the lines is drawn. They are a mean tone where it is 0.
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        The thresholds in red, green and blue, rounded to multiples of 1 / 255; missing ones repeat the
+        first. Alpha is the mean of (2 t - 1)^2 of the three thresholds t. Where pixels are averaged, it
+        exceeds that of the averages by the spread of the thresholds, so that what is finer than a
+        pixel can be drawn as its mean.
+    """
+    rgba = np.empty((ordered.shape[1], 4), dtype=np.float32)
+    for channel in range(3):
+        layer = channel if channel < len(ordered) else 0
+        value = 0.5 + resolved * (ordered[layer] - np.float32(0.5))
+        rgba[:, channel] = np.rint(255 * value) / np.float32(255)
+    centered = 2 * rgba[:, :3] - 1
+    rgba[:, 3] = (centered * centered).mean(axis=1)
+    rgba[:, 3] += (
+        1 - np.square(resolved)
+    ) / 3  # what is not drawn has the spread of all thresholds
+    return rgba

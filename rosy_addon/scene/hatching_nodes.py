@@ -1,0 +1,247 @@
+"""The node group *RoSy Hatching*, which draws the hatching of a tone from thresholds.
+
+It compares the thresholds of up to three lines (`compositor.ink_thresholds`) with the coverages that a tone
+requires. Its numbers are those of `compositor.hatching`, so it draws what a picture of the same light
+shows. It has only nodes of Blender, and works where RoSy is not installed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import bpy
+
+from ..color import from_hex, to_linear
+from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
+from ..compositor.ink_thresholds import MAX_LAYERS
+from ..compositor.inks import inks_of
+from ..compositor.look import Look
+from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
+from ..compositor.target_tone import MIN_TONE_RANGE
+from .node_builder import NodeBuilder, Number
+from .owned_data import OWNED_TAG
+
+#: Name of the node group.
+GROUP_NAME = "RoSy Hatching"
+
+#: The density of normally distributed streaks is about this times c (1 - c) at the threshold of the
+#: coverage c.
+DENSITY_FACTOR = 1.6
+
+#: Spread of thresholds that is due to their storage with 8 bits.
+ROUNDING_SPREAD = 0.001
+
+#: Half the width of the sharpest edges, in thresholds.
+MIN_EDGE = 0.002
+
+#: Smallest transmittance, and smallest difference to it.
+MIN_TRANSMITTANCE = 1e-3
+
+#: Names of the inks of the lines, in their order.
+INK_NAMES = ("Ink", "Second Ink", "Third Ink")
+
+
+class _Input(NamedTuple):
+    """An input of the group."""
+
+    name: str
+    kind: str
+    default: Any
+    description: str
+    low: float = 0.0
+    high: float = 1.0
+
+
+_COLOR, _FLOAT, _FACTOR = "NodeSocketColor", "NodeSocketFloat", "FACTOR"
+
+#: The inputs of the group, in the order of its panel.
+_INPUTS = (
+    _Input("Thresholds", _COLOR, (1.0, 1.0, 1.0, 1.0), "Color of the texture of thresholds"),
+    _Input("Spread", _FLOAT, 1.0, "Alpha of the texture of thresholds"),
+    _Input("Tone", _FLOAT, 0.5, "How light the hatching is: 0 is covered by ink, 1 is paper"),
+    _Input("Shading", _FLOAT, 1.0, "Strength of the tone. 0: paper everywhere"),
+    _Input("Black", _FLOAT, 0.0, "Tone that becomes black", -1e6, 1e6),
+    _Input("White", _FLOAT, 1.0, "Tone that becomes white", -1e6, 1e6),
+    _Input("Gamma", _FLOAT, 1.0, "Gamma of the tones between", 0.05, 20.0),
+    _Input("Layers", _FLOAT, 3.0, "Maximum number of lines that cross in the darkest tones", 1, 3),
+    _Input("Layering", _FLOAT, 0.3, "Difference in darkness at which the next lines begin"),
+    _Input("Crispness", _FLOAT, 0.7, "Edges of lines, from soft to sharp"),
+    _Input("Ink", _COLOR, (0.0, 0.0, 0.0, 1.0), "Color of the first lines"),
+    _Input("Second Ink", _COLOR, (0.0, 0.0, 0.0, 1.0), "Color of the second lines"),
+    _Input("Third Ink", _COLOR, (0.0, 0.0, 0.0, 1.0), "Color of the third lines"),
+    _Input("Highlights", _FLOAT, 0.0, "How much the inks become the highlight color in the lights"),
+    _Input("Highlight Color", _COLOR, (0.5, 0.2, 0.1, 1.0), "Color of the inks in the lights"),
+    _Input("Paper", _COLOR, (1.0, 1.0, 1.0, 1.0), "Color of the paper"),
+)
+
+
+def hatching_group() -> tuple[bpy.types.NodeTree, bool]:
+    """Return the node group, and whether it was created: it is made once for a file."""
+    for group in bpy.data.node_groups:
+        if (
+            group.bl_idname == "ShaderNodeTree"
+            and group.library is None
+            and group.get(OWNED_TAG)
+            and group.name.startswith(GROUP_NAME)
+        ):
+            return group, False
+    return _new_hatching_group(), True
+
+
+def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None:
+    """Set the inputs of a node of the group to the settings of a look.
+
+    Parameters
+    ----------
+    node : bpy.types.Node
+    look : Look
+    line_count : int
+        Number of lines through a point.
+    """
+    layers = min(look.layers, line_count, MAX_LAYERS)
+    ramp = look.ink_colour_light if look.ink_ramp else look.ink_colour
+    inks = inks_of(look, layers if look.hue != "one" else 1).dark
+    values = {
+        "Shading": look.shading,
+        "Black": look.tone_black,
+        "White": look.tone_white,
+        "Gamma": look.tone_gamma,
+        "Layers": layers,
+        "Layering": look.layering,
+        "Crispness": look.crispness,
+        "Highlights": float(look.ink_ramp),
+        "Highlight Color": (*to_linear(from_hex(ramp)).tolist(), 1.0),
+        "Paper": (*to_linear(from_hex(look.paper_colour)).tolist(), 1.0),
+    }
+    for layer, name in enumerate(INK_NAMES):
+        values[name] = (*inks[min(layer, len(inks) - 1)].tolist(), 1.0)
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+
+
+def _new_hatching_group() -> bpy.types.NodeTree:
+    """Create the node group."""
+    group = bpy.data.node_groups.new(GROUP_NAME, "ShaderNodeTree")
+    interface = group.interface
+    for item in _INPUTS:
+        socket = interface.new_socket(
+            item.name, description=item.description, in_out="INPUT", socket_type=item.kind
+        )
+        socket.default_value = item.default
+        if item.kind == _FLOAT:
+            socket.min_value, socket.max_value = item.low, item.high
+            if (item.low, item.high) == (0.0, 1.0):
+                socket.subtype = _FACTOR
+    for name, kind, description in (
+        ("Color", _COLOR, "Ink on paper"),
+        ("Ink", _COLOR, "Color of the ink alone"),
+        ("Coverage", _FLOAT, "How much of the paper is covered by ink"),
+    ):
+        interface.new_socket(name, description=description, in_out="OUTPUT", socket_type=kind)
+    build = NodeBuilder(group)
+    source = build("NodeGroupInput").outputs
+    _build_hatching(build, source, build("NodeGroupOutput").inputs)
+    return group
+
+
+def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
+    """Add the nodes between the inputs and the outputs of the group."""
+
+    def number(name: str) -> Number:
+        return Number(build, source[name])
+
+    def luminance(color: bpy.types.NodeSocket) -> Number:
+        node = build("ShaderNodeRGBToBW")
+        build.connect(color, node.inputs["Color"])
+        return Number(build, node.outputs["Val"])
+
+    tone = _tone(number)
+    paper = luminance(source["Paper"])
+    # If the ink is lighter than the paper, both are complemented: lighter tones need more ink.
+    is_light = luminance(source["Ink"]) > paper
+
+    def complement_if_light(value: Number) -> Number:
+        return value + is_light * (1 - value * 2)
+
+    paper_light = complement_if_light(paper).at_least(MIN_TRANSMITTANCE)
+
+    def transmittance(ink: bpy.types.NodeSocket) -> Number:
+        return complement_if_light(luminance(ink)) / paper_light
+
+    solid = transmittance(source[INK_NAMES[0]])
+    for name in INK_NAMES[1:]:
+        solid = solid.at_least(transmittance(source[name]))
+    required = solid + complement_if_light(tone) * (1 - solid)
+    highlights = number("Highlights") * tone
+    inks = [
+        build.mix("RGBA", highlights.socket, source[name], source["Highlight Color"])
+        for name in INK_NAMES
+    ]
+    # The part of the light that the ink would leave, if it could be black.
+    left = [
+        1 - ((1 - required) / (1 - transmittance(ink)).at_least(MIN_TRANSMITTANCE)).at_most(1.0)
+        for ink in inks
+    ]
+    darkness = 1 - left[0]
+    layers, layering = number("Layers"), number("Layering")
+    begun = []
+    for layer in range(MAX_LAYERS):
+        onset = layering * float(layer)
+        weight = darkness.smoothstep(onset - ONSET_LEAD, onset + ONSET_RANGE)
+        begun.append(weight * (layers > layer + 0.5) if layer else weight)
+    total = begun[0]
+    for weight in begun[1:]:
+        total = total + weight
+    total = total.at_least(1e-6)
+    thresholds = build("ShaderNodeSeparateColor")
+    build.connect(source["Thresholds"], thresholds.inputs["Color"])
+    channels = [Number(build, socket) for socket in thresholds.outputs]
+    filtered_edge = _filtered_edge(number("Spread"), channels)
+    softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
+    edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
+    bare, color, ink_color = None, source["Paper"], inks[0]
+    for layer, threshold in enumerate(channels):
+        share = begun[layer] / total
+        coverage = 1 - left[layer].at_least(MIN_TRANSMITTANCE) ** share
+        # Edges as wide as this leave the mean coverage of all thresholds unchanged.
+        room = coverage.at_most(1 - coverage)
+        edge = (edge_factor * (coverage * (1 - coverage))).at_most(room)
+        within = threshold.at_most(1 - threshold).at_least(0.0)
+        edge = edge.at_least(filtered_edge.at_most(within)).at_least(MIN_EDGE)
+        covered = (coverage - threshold) / (edge * 2) + 0.5
+        covered = covered.at_least(0.0).at_most(1.0)
+        color = build.mix("RGBA", covered.socket, color, inks[layer])
+        if layer:
+            ink_color = build.mix("RGBA", covered.socket, ink_color, inks[layer])
+        bare = 1 - covered if bare is None else bare * (1 - covered)
+    build.connect(color, sink["Color"])
+    build.connect(ink_color, sink["Ink"])
+    build.connect((1 - bare).socket, sink["Coverage"])
+
+
+def _tone(number: Any) -> Number:
+    """Apply the strength of the shading and the tone curve."""
+    shading = number("Shading")
+    tone = 1 - shading + shading * number("Tone")
+    black, white = number("Black"), number("White")
+    difference = white - black
+    # A range of 0 is replaced by a small one.
+    is_small = (difference * difference) > MIN_TONE_RANGE**2
+    difference = difference * is_small + (1 - is_small) * MIN_TONE_RANGE
+    stretched = ((tone - black) / difference).at_least(0.0)
+    return (stretched ** (1.0 / number("Gamma"))).at_most(1.0)
+
+
+def _filtered_edge(spread: Number, channels: list[Number]) -> Number:
+    """Half the width of the range of thresholds that a filter of the texture has averaged.
+
+    The variance of thresholds t is a quarter of that of 2 t - 1, and a uniform distribution of the half
+    width h has the variance h^2 / 3.
+    """
+    mean_square = None
+    for threshold in channels:
+        centered = threshold * 2 - 1.0
+        square = centered * centered
+        mean_square = square if mean_square is None else mean_square + square
+    variance = (spread - mean_square * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)
+    return (variance * 0.75).square_root()

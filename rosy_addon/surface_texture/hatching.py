@@ -1,0 +1,228 @@
+"""Hatching at texels: the thresholds of the lines of a field, whatever the light (`ink_thresholds`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..cache import Cache
+from ..compositor.even_lines import (
+    SPACING_GRAINS,
+    WOBBLE_SHIFT,
+    EvenLines,
+    has_even_lines,
+    resolved_share,
+)
+from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
+from ..compositor.image_noise import NOISE_MEAN
+from ..compositor.ink_thresholds import (
+    line_thresholds,
+    ordered_thresholds,
+    sharp_look,
+    threshold_pixels,
+)
+from ..compositor.lic import lic_lengths_task
+from ..compositor.lic_images import LicImages, lic_images_task
+from ..compositor.look import Look
+from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
+from ..compositor.pixel_field import PixelField, all_members
+from ..compositor.streak_statistics import (
+    break_steps,
+    look_streak_statistics,
+    look_streak_statistics_task,
+)
+from ..compositor.undirected import undirected_texture_task
+from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field_task, solid_wobble_angle
+from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.rest_coordinates import matrix_scale, rest_positions
+from ..projection.surface_lines import SurfaceLines, cached_surface_lines_task
+from .line_order import first_line_weights, line_order_task
+from .texel_field import frames_at
+from .texel_noise import texel_noise_task
+from .texel_surface import TexelSurface
+
+#: Width of the strip in which two lines swap, in widths of a line.
+SWAP_GRAINS = 8.0
+
+#: Label of all steps.
+STEP_LABEL = "drawing hatching"
+
+
+def thresholds_task(
+    on: TexelSurface,
+    field: PixelField,
+    look: Look,
+    guiding_angle: float,
+    cache: Cache | None = None,
+) -> Task[np.ndarray]:
+    """Compute the thresholds of hatching at texels.
+
+    Parameters
+    ----------
+    on : TexelSurface
+    field : PixelField
+        At the texels.
+    look : Look
+        With ink, in steps of streamlines.
+    guiding_angle : float
+        Direction of the lines that come first; see `line_order`.
+    cache : Cache, optional
+        Stores evenly spaced lines.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        As of `threshold_pixels`.
+    """
+    look = sharp_look(look)
+    order_task = line_order_task(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
+    order = yield from subtask(order_task, 0.0, 0.1)
+    wobble_angle = None
+    if has_wobble(look):
+        wobble_angle = yield from subtask(_wobble_angle_task(on, look), 0.1, 0.15)
+        field = yield from rotate_pixel_field_task(field, np.float32(look.wobble) * wobble_angle)
+    images, modulation = yield from subtask(
+        _lines_task(on, field, look, wobble_angle, cache), 0.15, 0.85
+    )
+    members = all_members(field, look.guiding_angle)[: field.line_count]
+    pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
+    for block in pixel_blocks(len(pixels)):
+        yield Progress(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
+        part_images, part = images.part(block), modulation.part(block)
+        thresholds = np.stack(
+            [line_thresholds(line, part_images, look, part) for line in range(field.line_count)]
+        )
+        triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
+        frame = frames_at(on.charts, triangle, weights)
+        in_frame = np.stack([member[block] * frame for member in members])
+        first = first_line_weights(order.first_at(triangle, weights), in_frame, order.degree)
+        undefined = field.representation[block] == 0
+        ordered = ordered_thresholds(thresholds, first, undefined, look)
+        resolved = 1.0
+        if part.even_lines is not None:
+            resolved = resolved_share(part.even_lines.period.min(axis=0))
+        pixels[block] = threshold_pixels(ordered, resolved)
+    return pixels
+
+
+def _lines_task(
+    on: TexelSurface,
+    field: PixelField,
+    look: Look,
+    wobble_angle: np.ndarray | None,
+    cache: Cache | None,
+) -> Task[tuple[LicImages, LineModulation]]:
+    """Draw the streaks or the even lines of a field, and what makes them uneven."""
+    is_even, is_broken = has_even_lines(look), has_breaks(look)
+    undefined = not field.representation.all()
+    even_lines = break_images = noise = undirected = paper_grain = None
+    if not is_even or is_broken or undefined:
+        noise = yield from subtask(texel_noise_task(on, look), 0.0, 0.3)
+    break_look = replace(look, length=break_steps(look))
+    if is_even:
+        even_task = _even_lines_task(on, field, look, wobble_angle, cache)
+        even_lines = yield from subtask(even_task, 0.3, 0.6)
+        nothing = np.zeros((field.line_count, len(field.pixel), 1), dtype=np.float32)
+        images = yield from lic_images_task(nothing, np.ones(len(field.pixel), dtype=np.float32))
+        if is_broken:
+            task = lic_lengths_task(field, [break_look], noise)
+            (break_images,) = yield from subtask(task, 0.6, 0.8)
+    elif is_broken:
+        task = lic_lengths_task(field, [look, break_look], noise)
+        images, break_images = yield from subtask(task, 0.3, 0.8)
+    else:
+        (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.3, 0.8)
+    yield from look_streak_statistics_task(look)
+    if undefined:
+        area = np.abs(on.charts.density[on.texels.triangle]).mean()
+        texels_per_step = float(np.sqrt(area)) * on.texels.frame.size * on.step
+        grain = look.grain * texels_per_step
+        undirected = yield from undirected_texture_task(field, noise, grain)
+    if has_paper_grain(look):
+        paper_grain = yield from subtask(_paper_grain_task(on, field, look), 0.8, 1.0)
+    return images, LineModulation(
+        break_images=break_images,
+        paper_grain=paper_grain,
+        undirected=undirected,
+        even_lines=even_lines,
+    )
+
+
+def _paper_grain_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.ndarray]:
+    """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    args = surface_paper_grain_args(look)
+    args.pop("channels")
+    noise = yield from texel_noise_task(on, replace(look, noise="colour", **args))
+    noise -= np.float32(NOISE_MEAN)
+    noise /= np.float32(look_streak_statistics(look).paper_grain_std)
+    return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
+
+
+def _wobble_angle_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
+    """(P,) float32 angles between lines and field at `Look.wobble` 1."""
+    surface, texels = on.instance.surface, on.texels
+    rest = rest_positions(surface).astype(np.float32)
+    grain = look.grain * on.step / matrix_scale(on.instance.matrix)
+    angle = np.empty(len(texels), dtype=np.float32)
+    for block in pixel_blocks(len(angle)):
+        yield Progress(block.start / len(angle), "bending lines")
+        corners = surface.triangle_vertex.take(texels.triangle[block], axis=0).T
+        position = sum(
+            weight * rest.take(corner, axis=0).T
+            for weight, corner in zip(texels.barycentric[block].T, corners, strict=True)
+        )
+        angle[block] = solid_wobble_angle(position, np.float32(grain))
+    return angle
+
+
+def _even_lines_task(
+    on: TexelSurface,
+    field: PixelField,
+    look: Look,
+    wobble_angle: np.ndarray | None,
+    cache: Cache | None,
+) -> Task[EvenLines]:
+    """Evaluate evenly spaced lines at the texels."""
+    instance, texels = on.instance, on.texels
+    spacing = SPACING_GRAINS * look.grain * on.step
+    lines: SurfaceLines = yield from subtask(
+        cached_surface_lines_task(
+            instance.surface, instance.matrix, instance.field, look.display, spacing, cache
+        ),
+        0.0,
+        0.8,
+    )
+    sides = on.mesh.points[:, 1:] - on.mesh.points[:, :1]
+    sides = np.einsum("tkj,tj->kt", sides, on.mesh.x) + 1j * np.einsum(
+        "tkj,tj->kt", sides, on.mesh.y
+    )
+    members = all_members(field, look.guiding_angle)
+    streaks, period = np.empty((2, field.line_count, len(texels)), dtype=np.float32)
+    jacobian = field.screen_jacobian
+    area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
+    for block in pixel_blocks(len(texels)):
+        yield Progress(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        triangle, weights = texels.triangle[block], texels.barycentric[block]
+        leaf, in_leaf = lines.tree.locate(triangle, weights)
+        first, second = lines.heading.take(leaf, axis=1)
+        heading = first * sides[0].take(triangle) + second * sides[1].take(triangle)
+        member = members[0][block] * frames_at(on.charts, triangle, weights)
+        turn = np.angle(member * heading.conj()) * (field.degree / (2 * np.pi))
+        direction = np.rint(turn).astype(np.int32)
+        part = field.part(block)
+        for line, out in enumerate(streaks):
+            along = part.to_screen(part.member_direction(members[line][block]), foreshorten=True)
+            across = area[block] / np.maximum(np.abs(along), np.float32(1e-6))
+            period[line, block] = SPACING_GRAINS * look.grain * across
+            family = (direction + line) % field.degree % field.line_count
+            phase = lines.pattern.evaluate(leaf, in_leaf, family)
+            if wobble_angle is not None:
+                phase += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[block]
+            out[block] = 1 - 2 * np.abs(phase - np.rint(phase))
+    return EvenLines(streaks, period, growth=None)

@@ -1,0 +1,212 @@
+"""The order of the lines of a field on a surface: which line comes first in light tones.
+
+In a picture, the line nearest to the guiding angle comes first. Where the field turns, another line
+becomes the nearest, and the hatching changes its direction there. On a surface the first line can
+continue instead, as far as the field allows. Around singularities it cannot: somewhere, two lines
+have to swap.
+
+The order is found by threshold dynamics: each point takes the line nearest to the guide, the lines are
+averaged over a length, and so again with shorter lengths. The curves where lines swap then shrink. The
+last average is over a few widths of lines, and blends the lines where they swap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.bisection import BisectionTree, bisection_task
+from ..field.connection import connection_task, laplacian_task
+from ..field.representation import power, signed_power
+from ..field.surface import connected_components_task, surface_task
+from ..field.surface_averages import SurfaceAverages
+from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
+from ..progress import Progress, Task, subtask
+
+#: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
+#: as large as the surface; and the most triangles, unless the mesh has more.
+MAX_EDGE, MAX_TRIANGLES = 1 / 100, 200_000
+
+#: Lengths of the averages, as fractions of that side.
+AVERAGE_LENGTHS = (0.2, 0.1, 0.1, 0.05, 0.05, 0.025, 0.025)
+
+#: Sharpness of the choice between lines. Those whose weight is below `MIN_WEIGHT` are not drawn.
+SHARPNESS, MIN_WEIGHT = 6.0, 0.02
+
+#: Label of all steps.
+STEP_LABEL = "ordering lines"
+
+
+@dataclass(frozen=True, eq=False)
+class LineOrder:
+    """The first line at the points of a surface.
+
+    Attributes
+    ----------
+    degree : int
+        Of the representation of a line: 1 if opposite directions are on different lines, else 2.
+    tree : BisectionTree
+        The triangles of the tangent mesh, and the L smaller ones in them.
+    first : (L, 3) complex64 ndarray
+        Representation of the first line at their corners, in the frame of the triangle of the mesh. The
+        modulus is 1, and less where lines swap.
+    """
+
+    degree: int
+    tree: BisectionTree
+    first: np.ndarray
+
+    def first_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return (n,) complex64 representations of the first line.
+
+        Parameters
+        ----------
+        triangle : (n,) ndarray of int
+        weights : (n, 3) float32 ndarray
+            Barycentric coordinates.
+        """
+        leaf, weights = self.tree.locate(triangle, weights)
+        return sum(
+            weight * corner.take(leaf) for weight, corner in zip(weights, self.first.T, strict=True)
+        )
+
+
+def first_line_weights(first: np.ndarray, members: np.ndarray, degree: int) -> np.ndarray:
+    """Return (M, n) float32: how much each line comes first; the sum is 1.
+
+    Parameters
+    ----------
+    first : (n,) complex ndarray
+        From `LineOrder.first_at`.
+    members : (M, n) complex ndarray
+        Unit directions of the lines, in the same frames.
+    degree : int
+        Of `first`.
+    """
+    count = len(members)
+    if count == 1:
+        return np.ones(members.shape, dtype=np.float32)
+    scale = SHARPNESS / (1 - np.cos(2 * np.pi / count))
+    weights = np.stack([(first * power(member, degree).conj()).real for member in members])
+    weights = np.exp(np.float32(scale) * (weights - weights.max(axis=0)))
+    weights /= weights.sum(axis=0)
+    np.maximum(weights - np.float32(MIN_WEIGHT), 0, out=weights)
+    weights /= weights.sum(axis=0)
+    return weights.astype(np.float32, copy=False)
+
+
+def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Task[LineOrder]:
+    """Find the order of the lines of a field.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    guiding_angle : float
+        Direction that the first line is near to: the angle from the horizontal direction, in radians,
+        counter-clockwise as seen from outside.
+    blend : float
+        Width of the strip in which two lines swap, in Blender units.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    LineOrder
+
+    References
+    ----------
+    Threshold dynamics: Merriman, Bence and Osher, "Diffusion Generated Motion by Mean Curvature", 1992.
+    On fields of directions: Viertel and Osting, "An Approach to Quad Meshing Based on Harmonic
+    Cross-Valued Maps and the Ginzburg-Landau Theory", SIAM J. Sci. Comput. 41(1), 2019.
+    """
+    yield Progress(0.0, STEP_LABEL)
+    degree = mesh.degree // mesh.family_count
+    side = float(np.sqrt(mesh.area.sum()))
+    points, triangle_vertex = yield from subtask(_welded_task(mesh), 0.0, 0.1)
+    # Lengths are fractions of the side from here on, so that no number is very large or small.
+    points = (points - points.mean(axis=0)) / side
+    max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
+    tree_task = bisection_task(points, triangle_vertex, MAX_EDGE, max_triangles)
+    tree = yield from subtask(tree_task, 0.1, 0.15)
+    root = tree.leaf_root
+    start = np.arange(0, 3 * len(root) + 1, 3, dtype=np.int32)
+    leaves = yield from subtask(
+        surface_task(tree.vertices, tree.leaf_vertex.ravel(), start), 0.15, 0.3
+    )
+    z = np.einsum("lck,lk->l", tree.leaf_weights / np.float32(3), mesh.z.take(root, axis=0))
+    connection = yield from subtask(connection_task(leaves), 0.3, 0.45)
+    averages = SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root])
+    laplacian = yield from subtask(laplacian_task(connection, degree), 0.45, 0.5)
+    laplacian = laplacian.with_values(laplacian.data.astype(np.complex64))
+    first = _known_lines(mesh, root)
+    lengths = AVERAGE_LENGTHS
+    if first is None:
+        first = _guide(mesh, guiding_angle, degree)[root]
+    elif first is not None:
+        lengths = ()
+    nodes = None
+    for number, length in enumerate([*lengths, blend / side]):
+        done = 0.5 + 0.5 * number / (len(lengths) + 1)
+        yield Progress(done, STEP_LABEL)
+        snapped = power(nearest_member(_root(first, degree), z, mesh.degree), degree)
+        sums = averages.node_sums(snapped, degree)
+        task = averages.smooth_task(laplacian, length**2, sums, nodes)
+        nodes = yield from subtask(task, done, done, STEP_LABEL)
+        first = averages.face_means(nodes, degree)
+    angle = averages.frame_angle.reshape(-1, 3)
+    corners = nodes[connection.corner_node].reshape(-1, 3) * np.exp(1j * degree * angle)
+    return LineOrder(degree, tree, corners.astype(np.complex64))
+
+
+def _root(values: np.ndarray, degree: int) -> np.ndarray:
+    """Return (n,) unit directions of representations."""
+    return np.exp(1j * np.angle(values) / degree)
+
+
+def _known_lines(mesh: TangentMesh, triangle: np.ndarray) -> np.ndarray | None:
+    """Return (n,) representations of the stored line, if the field distinguishes its lines."""
+    return None if mesh.family_z is None else mesh.family_z[triangle]
+
+
+def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
+    """(T,) representations of the direction at an angle to the horizontal one.
+
+    Its modulus decreases toward horizontal triangles, which have none.
+    """
+    # The vertical direction in the frames; a quarter turn clockwise, seen from outside, is to the right.
+    direction = (mesh.x[:, 2] + 1j * mesh.y[:, 2]) * np.exp(1j * (guiding_angle - np.pi / 2))
+    return signed_power(direction, degree)
+
+
+def _welded_task(mesh: TangentMesh) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Join the corners of triangles between which streamlines can cross.
+
+    Returns
+    -------
+    points : (n, 3) float64 ndarray
+    triangle_vertex : (T, 3) int32 ndarray
+        Indices of the corners into the points.
+    """
+    triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
+    neighbor = mesh.neighbor[triangle, edge].astype(np.intp)
+    neighbor_edge = mesh.neighbor_edge[triangle, edge].astype(np.intp)
+    pairs = np.concatenate(
+        [
+            np.stack(
+                [
+                    3 * triangle + (edge + own) % 3,
+                    3 * neighbor + (neighbor_edge + other) % 3,
+                ],
+                axis=1,
+            )
+            for own, other in ((1, 2), (2, 1))
+        ]
+    )
+    task = connected_components_task(3 * len(mesh.neighbor), pairs)
+    group = yield from subtask(task, 0.0, 1.0)
+    points = np.empty((int(group.max()) + 1, 3))
+    points[group] = mesh.points.reshape(-1, 3)
+    return points, group.reshape(-1, 3).astype(np.int32)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..field.bisection import BisectionTree, bisection_task
 from ..field.connection import connection_task, laplacian_task
-from ..field.representation import power, signed_power
+from ..field.representation import power
 from ..field.surface import connected_components_task, surface_task
 from ..field.surface_averages import SurfaceAverages
 from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
@@ -29,7 +29,10 @@ from ..progress import Progress, Task, subtask
 MAX_EDGE, MAX_TRIANGLES = 1 / 100, 200_000
 
 #: Lengths of the averages, as fractions of that side.
-AVERAGE_LENGTHS = (0.2, 0.1, 0.1, 0.05, 0.05, 0.025, 0.025)
+AVERAGE_LENGTHS = (0.4, 0.2, 0.1, 0.05, 0.025)
+
+#: Weight of the x axis as a guide on triangles that are nearly horizontal.
+X_AXIS_WEIGHT = 0.01
 
 #: Sharpness of the choice between lines. Those whose weight is below `MIN_WEIGHT` are not drawn.
 SHARPNESS, MIN_WEIGHT = 6.0, 0.02
@@ -141,12 +144,10 @@ def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Ta
     averages = SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root])
     laplacian = yield from subtask(laplacian_task(connection, degree), 0.45, 0.5)
     laplacian = laplacian.with_values(laplacian.data.astype(np.complex64))
-    first = _known_lines(mesh, root)
-    lengths = AVERAGE_LENGTHS
-    if first is None:
-        first = _guide(mesh, guiding_angle, degree)[root]
-    elif first is not None:
-        lengths = ()
+    if mesh.family_z is None:
+        first, lengths = _guide(mesh, guiding_angle, degree)[root], AVERAGE_LENGTHS
+    else:  # the field distinguishes its lines
+        first, lengths = mesh.family_z[root], ()
     nodes = None
     for number, length in enumerate([*lengths, blend / side]):
         done = 0.5 + 0.5 * number / (len(lengths) + 1)
@@ -166,19 +167,15 @@ def _root(values: np.ndarray, degree: int) -> np.ndarray:
     return np.exp(1j * np.angle(values) / degree)
 
 
-def _known_lines(mesh: TangentMesh, triangle: np.ndarray) -> np.ndarray | None:
-    """Return (n,) representations of the stored line, if the field distinguishes its lines."""
-    return None if mesh.family_z is None else mesh.family_z[triangle]
-
-
 def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
     """(T,) representations of the direction at an angle to the horizontal one.
 
-    Its modulus decreases toward horizontal triangles, which have none.
+    Its modulus decreases toward horizontal triangles, where the x axis takes its place.
     """
-    # The vertical direction in the frames; a quarter turn clockwise, seen from outside, is to the right.
-    direction = (mesh.x[:, 2] + 1j * mesh.y[:, 2]) * np.exp(1j * (guiding_angle - np.pi / 2))
-    return signed_power(direction, degree)
+    x, _, z = (mesh.x + 1j * mesh.y).T
+    turn = np.exp(1j * guiding_angle)
+    # Seen from outside, the direction to the right is a quarter turn clockwise from the z axis.
+    return power(-1j * turn * z, degree) + X_AXIS_WEIGHT * power(turn * x, degree)
 
 
 def _welded_task(mesh: TangentMesh) -> Task[tuple[np.ndarray, np.ndarray]]:

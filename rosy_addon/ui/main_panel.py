@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..compositor.look import is_hatched
 from ..errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
@@ -172,8 +171,6 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
         column.prop_search(obj.rosy, "texture_uv_map", obj.data, "uv_layers")
     column.prop(context.scene.rosy, "texture_size")
     column.prop(context.scene.rosy, "texture_margin")
-    if is_hatched(context.scene.rosy.look):
-        column.label(text="Textures have the ink style Soft only", icon="ERROR")
     column.operator("rosy.bake_texture", icon="TEXTURE")
 
 

@@ -136,10 +136,6 @@ def test_what_is_refused_changes_nothing(scene, camera, monkey):
     with pytest.raises(RosyError, match="has no UV map 'None'"):
         bake_texture(scene, [monkey])
     monkey.rosy.texture_uv_map = ""
-    scene.rosy.look.ink = "hatch"
-    with pytest.raises(RosyError, match="ink style Soft"):
-        bake_texture(scene, [monkey])
-    scene.rosy.look.ink = "soft"
     while monkey.data.uv_layers:
         monkey.data.uv_layers.remove(monkey.data.uv_layers[0])
     with pytest.raises(RosyError, match="unwrap its mesh first"):

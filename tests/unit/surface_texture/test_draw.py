@@ -181,8 +181,6 @@ def test_bad_maps_and_looks_are_named(error_of):
     assert "more than 100 tiles" in error_of(draw_texture, instance, uv * 50, WIDE, 64)
     assert "UDIM" in error_of(draw_texture, instance, uv - 1, WIDE, 64, is_udim=True)
     assert "has no texel" in error_of(draw_texture, instance, uv * 1e-3, WIDE, 64)
-    ink = Look(ink="hatch")
-    assert "ink style Soft" in error_of(draw_texture, instance, uv, ink, 64)
 
 
 def test_single_triangles_and_quads():

@@ -1,0 +1,141 @@
+"""Thresholds of hatching: the coverage from which each point is covered by ink."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rosy_addon.compositor.hatching import LineModulation, line_coverage
+from rosy_addon.compositor.ink_thresholds import (
+    layer_shares,
+    line_thresholds,
+    ordered_thresholds,
+    sharp_look,
+    threshold_pixels,
+)
+from rosy_addon.compositor.lic import lic_lengths_task, look_noise
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.paper_grain import picture_paper_grain
+from rosy_addon.compositor.pixel_field import planar_pixel_field
+from rosy_addon.compositor.streak_statistics import break_steps
+from rosy_addon.compositor.undirected import undirected_texture_task
+from rosy_addon.progress import run_to_completion
+
+SIZE = 400
+INK = Look(ink="hatch", length=30, grain=2.0, density=0.3, high_pass=8.0)
+
+
+def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
+    """A planar field, the images of its lines, and what makes them uneven."""
+    row, column = np.indices((SIZE, SIZE)) / SIZE
+    angles = 0.5 * np.sin(4 * row) + 0.5 * column
+    angles[undefined] = np.nan
+    field = planar_pixel_field(angles, degree)
+    noise = look_noise(field, look)
+    looks = [look, replace(look, length=break_steps(look))]
+    images, breaks = run_to_completion(lic_lengths_task(field, looks, noise))
+    grain = None
+    if look.paper_grain:
+        grain = picture_paper_grain(field.pixel, SIZE, look.grain, 1, 1, field.line_count)
+    undirected = run_to_completion(undirected_texture_task(field, noise, look.grain))
+    has_breaks = look.breaks > 0 or look.wobble > 0
+    return (
+        field,
+        images,
+        LineModulation(breaks if has_breaks else None, grain, undirected=undirected),
+    )
+
+
+@pytest.mark.parametrize("breaks, wobble, grain", [(0, 0, 0), (0.7, 0, 0.4), (0, 0.4, 0)])
+def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
+    """They are evenly distributed, and comparing them with a coverage draws `line_coverage`."""
+    look = sharp_look(replace(INK, breaks=breaks, wobble=wobble, paper_grain=grain))
+    _, images, modulation = drawn_lines(look, undefined=slice(0, 80))
+    thresholds = line_thresholds(1, images, look, modulation)
+    expected = np.linspace(0.1, 0.9, 9)
+    np.testing.assert_allclose(np.quantile(thresholds, expected), expected, atol=0.025)
+    for coverage in (0.15, 0.5, 0.8):
+        target = np.full(len(thresholds), coverage)
+        covered = line_coverage(1, target, images, look, modulation)
+        is_clear = np.abs(covered - 0.5) > 0.05
+        np.testing.assert_array_equal((thresholds < coverage)[is_clear], (covered > 0.5)[is_clear])
+        assert is_clear.mean() > 0.9
+
+
+def random_lines(lines: int, count: int = 200_000, seed: int = 1):
+    """Independent thresholds, evenly distributed, and random weights."""
+    rng = np.random.default_rng(seed)
+    weights = rng.dirichlet(np.ones(lines), count).T.astype(np.float32)
+    return rng.random((lines, count), dtype=np.float32), weights
+
+
+@pytest.mark.parametrize("lines", [2, 3, 5])
+def test_ordered_thresholds_are_independent_and_evenly_distributed(lines):
+    """Wherever lines swap, so that the ink of any shares transmits what the tone asks."""
+    thresholds, weights = random_lines(lines)
+    undefined = np.zeros(weights.shape[1], dtype=bool)
+    ordered = ordered_thresholds(thresholds, weights, undefined, INK)
+    expected = np.linspace(0.1, 0.9, 9)
+    for layer in ordered:
+        np.testing.assert_allclose(np.quantile(layer, expected), expected, atol=0.006)
+    np.testing.assert_allclose(np.corrcoef(ordered), np.eye(len(ordered)), atol=0.01)
+    for transmittance in (0.1, 0.5, 0.8):
+        coverages = [
+            1 - transmittance**share
+            for share in layer_shares(np.array(1 - transmittance), len(ordered), 0.3)
+        ]
+        bare = np.all([t > c for t, c in zip(ordered, coverages, strict=True)], axis=0)
+        assert bare.mean() == pytest.approx(transmittance, abs=0.005)
+
+
+def test_lines_keep_their_thresholds_where_none_swap():
+    """The first is that of the weight 1, and the others follow in turn."""
+    thresholds, _ = random_lines(3, 1000)
+    weights = np.zeros_like(thresholds)
+    weights[2] = 1
+    undefined = np.zeros(1000, dtype=bool)
+    ordered = ordered_thresholds(thresholds, weights, undefined, INK)
+    np.testing.assert_allclose(ordered, thresholds[[2, 0, 1]], atol=1e-5)
+
+
+def test_ordered_thresholds_are_continuous():
+    """Neither where two lines swap, nor where one of them begins before the other, is there a jump."""
+    count = 200_001
+    share = np.linspace(0, 1, count, dtype=np.float32)
+    undefined = np.zeros(count, dtype=bool)
+    for first, second, third in np.random.default_rng(5).random((20, 3), dtype=np.float32) * 0.9:
+        thresholds = np.broadcast_to(np.array([[first], [second], [third]]), (3, count))
+        weights = np.stack([share, 1 - share, 0 * share])
+        ordered = ordered_thresholds(thresholds, weights, undefined, INK)
+        # A jump would not get smaller with the steps.
+        assert np.abs(np.diff(ordered, axis=1)).max() < 0.005
+
+
+def test_undefined_pixels_have_the_ink_of_all_lines():
+    """There the first line alone transmits what the tone asks."""
+    rng = np.random.default_rng(2)
+    thresholds = rng.random((3, 100_000), dtype=np.float32)
+    everywhere = np.ones(100_000, dtype=bool)
+    weights = np.full_like(thresholds, 1 / 3)
+    ordered = ordered_thresholds(thresholds, weights, everywhere, INK)
+    assert (ordered[1:] == 1).all()
+    for transmittance in (0.1, 0.5, 0.8):
+        share = layer_shares(np.array(1 - transmittance), 3, INK.layering)[0]
+        bare = (ordered[0] > 1 - transmittance**share).mean()
+        assert bare == pytest.approx(transmittance, abs=0.02)
+
+
+def test_the_spread_of_averaged_pixels():
+    """The mean of single pixels has no spread, that of many has the spread of an even distribution."""
+    thresholds, _ = random_lines(3, 4096)
+    pixels = threshold_pixels(thresholds)
+    for size, spread in ((1, 0.0), (4096, 1 / 3)):
+        mean = pixels[:size].mean(axis=0)
+        centered = 2 * mean[:3] - 1
+        assert mean[3] - np.mean(centered**2) == pytest.approx(spread, abs=0.015)
+    unresolved = threshold_pixels(thresholds, np.zeros(4096))
+    np.testing.assert_allclose(unresolved[:, :3], 0.5, atol=0.003)
+    np.testing.assert_allclose(unresolved[:, 3], 1 / 3, atol=0.003)
+    np.testing.assert_array_equal(threshold_pixels(thresholds[:2])[:, 2], pixels[:, 0])

@@ -34,6 +34,9 @@ ROUNDING_SPREAD = 0.001
 #: Half the width of the sharpest edges, in thresholds.
 MIN_EDGE = 0.002
 
+#: Coverages that differ from 0 or 1 by less than this fade to it.
+EXACT_ENDS = 0.02
+
 #: Smallest transmittance, and smallest difference to it.
 MIN_TRANSMITTANCE = 1e-3
 
@@ -206,10 +209,12 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
         # Edges as wide as this leave the mean coverage of all thresholds unchanged.
         room = coverage.at_most(1 - coverage)
         edge = (edge_factor * (coverage * (1 - coverage))).at_most(room)
-        within = threshold.at_most(1 - threshold).at_least(0.0)
-        edge = edge.at_least(filtered_edge.at_most(within)).at_least(MIN_EDGE)
+        edge = edge.at_least(filtered_edge).at_least(MIN_EDGE)
         covered = (coverage - threshold) / (edge * 2) + 0.5
-        covered = covered.at_least(0.0).at_most(1.0)
+        # No ink at all, and nothing but ink, are exact.
+        end = (room * (1 / EXACT_ENDS)).at_most(1.0)
+        is_dark = coverage > 0.5
+        covered = is_dark + end * (covered.at_least(0.0).at_most(1.0) - is_dark)
         color = build.mix("RGBA", covered.socket, color, inks[layer])
         if layer:
             ink_color = build.mix("RGBA", covered.socket, ink_color, inks[layer])

@@ -23,6 +23,42 @@ def test_texture_is_lit_like_any_material(with_field, scene, tmp_path):
     assert back[back[..., 3] > 0.9][:, 0].mean() < 0.5 * front[covered][:, 0].mean()
 
 
+def hatching_node(obj):
+    """The node of the group RoSy Hatching in the material of an object."""
+    nodes = material_of(obj).node_tree.nodes
+    return next(node for node in nodes if node.bl_idname == "ShaderNodeGroup")
+
+
+def test_hatching_follows_the_tone(scene, tmp_path):
+    """The paper and the ink of a texture have the mean that the tone asks, without a new texture."""
+    from bl_ext.user_default.rosy.rosy_addon.color import to_linear
+
+    bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
+    plane = bpy.context.object
+    bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(1.0, 0.0, 0.3))
+    scene.rosy.texture_size = 1024
+    scene.view_settings.view_transform = "Standard"
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 8.0
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -5.0, 0.0), (np.pi / 2, 0.0, 0.0)
+    for preset, light_ink in (("cross-hatch", False), ("white-on-black", True)):
+        bpy.ops.rosy.preset_apply(preset=preset)
+        scene.rosy.look.shading = 1.0
+        assert bpy.ops.rosy.bake_texture() == {"FINISHED"}
+        node = hatching_node(plane)
+        tree = node.id_data
+        tree.links.remove(node.inputs["Tone"].links[0])
+        colors = [node.inputs[name].default_value[0] for name in ("Ink", "Paper")]
+        for tone in (0.0, 0.25, 0.5, 0.75, 1.0):
+            node.inputs["Tone"].default_value = tone
+            mean = to_linear(render(scene, tmp_path)[..., 0]).mean()
+            share = 1 - tone if not light_ink else tone
+            expected = colors[1] + share * (colors[0] - colors[1])
+            assert abs(mean - expected) < 0.03, (preset, tone)
+    assert len([g for g in bpy.data.node_groups if g.name.startswith("RoSy Hatching")]) == 1
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert not bpy.data.node_groups and not bpy.data.materials and not baked_images()
+
+
 def test_meshes_without_a_uv_map_can_be_unwrapped(scene):
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object

@@ -55,9 +55,11 @@ DEFAULT_MARGIN, MAX_MARGIN = 16, 512
 NOTABLE_OVERLAP = 0.05
 
 #: Bytes of a texel of the frame, of each line there, and of the same with colored noise; of a texel of a
-#: chart, and of each line there for each channel of the noise. Fitted to measurements.
+#: chart, and of each line there for each channel of the noise; and further ones of a texel of a chart and
+#: of each line there with hatching. Fitted to measurements.
 TEXEL_BYTES, LINE_BYTES, COLORED_LINE_BYTES = 14, 24, 48
 CHART_TEXEL_BYTES, CHART_LINE_BYTES = 64, 8
+HATCHING_TEXEL_BYTES, HATCHING_LINE_BYTES = 32, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +220,8 @@ def _check_texture_memory(
     lines, is_colored = mesh.family_count, look.noise == "colour"
     needed = texels * (TEXEL_BYTES + lines * (COLORED_LINE_BYTES if is_colored else LINE_BYTES))
     needed += used * (CHART_TEXEL_BYTES + lines * CHART_LINE_BYTES * (3 if is_colored else 1))
+    if is_hatched(look):
+        needed += used * (HATCHING_TEXEL_BYTES + lines * HATCHING_LINE_BYTES)
     tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
     check_memory(
         needed,

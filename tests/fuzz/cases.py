@@ -299,6 +299,8 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
     )
     leave_out = {"size", *({"generate", "degree"} if len(inputs) > 1 else ())}
     words = random_options(rng, "texture", rate=0.12, leave_out=leave_out)
+    if rng.random() < 0.5:
+        words += ["--set", "ink=hatch"]
     output = "out.<UDIM>.png" if rng.random() < 0.2 else "out.png"
     outputs = {output, *(f"out.{number}.png" for number in range(1001, 1101))}
     return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)

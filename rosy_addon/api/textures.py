@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..color import to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..presets.store import default_user_folder, load_preset
 from ..progress import run_to_completion
+from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
     DEFAULT_MARGIN,
     DEFAULT_SIZE,
@@ -103,13 +105,14 @@ def texture(
     size: int = DEFAULT_SIZE,
     margin: int = DEFAULT_MARGIN,
     udim: bool = False,
+    light: ArrayLike | None = None,
     preset: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> Texture:
     """Draw a field as a texture for the UV map of a surface.
 
-    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. Without light, as
-    the renderer that shows the texture lights it.
+    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. The renderer that
+    shows the texture lights it. A texture of hatching has thresholds for a shader; see `Texture`.
 
     Parameters
     ----------
@@ -125,6 +128,9 @@ def texture(
     udim : bool
         Whether each tile of the UV map has a picture of its own. Otherwise, the texture repeats beyond u
         and v from 0 to 1.
+    light : (3,) array_like, optional
+        Direction to a lamp, in the space of the surface. Hatching is then drawn as ink for this lamp, for
+        renderers that have no shader for thresholds.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     **settings
@@ -161,11 +167,17 @@ def texture(
     look = texture_look(preset, settings)
     check_texture_size(size, margin)
     uv = uv_map(surface)
-    drawn = run_to_completion(
-        draw_texture_task(
-            upright_instance(surface, field, None), uv, look, size, margin=margin, is_udim=udim
-        )
+    instance = upright_instance(surface, field, None)
+    task = draw_texture_task(
+        instance,
+        uv,
+        look,
+        size,
+        margin=margin,
+        is_udim=udim,
+        light=None if light is None else _in_world(light, instance),
     )
+    drawn = run_to_completion(task)
     warn(drawn.overlap_note(surface.name))
     tiles = drawn.tiles()
     if drawn.has_thresholds:  # display values, as pictures are saved
@@ -174,6 +186,23 @@ def texture(
             for number, rgba in tiles.items()
         }
     return Texture({number: Picture(rgba) for number, rgba in tiles.items()}, drawn.overlap)
+
+
+def _in_world(light: ArrayLike, instance: MeshInstance) -> NDArray[np.float64]:
+    """Return the direction to a lamp in world space.
+
+    Raises
+    ------
+    RosyError
+        If it is not three finite numbers, or all of them are 0.
+    """
+    direction = np.asarray(light, dtype=np.float64)
+    if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
+        raise RosyError(
+            "the light must be three numbers, the direction to a lamp: not all of them 0"
+        )
+    world: NDArray[np.float64] = np.asarray(instance.matrix)[:3, :3] @ direction
+    return world
 
 
 def texture_look(preset: str | os.PathLike[str] | None, settings: dict[str, Any]) -> Look:

@@ -12,7 +12,7 @@ from ..surface_texture.draw import DEFAULT_MARGIN, DEFAULT_SIZE, MAX_MARGIN, MAX
 from .extras import Extras
 from .look import add_look_options, requested_preset, requested_settings
 from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings
-from .options import add_subcommand, check_output, int_between
+from .options import add_subcommand, check_output, float_tuple, int_between
 
 
 def add_texture_command(subparsers: Any, extras: Extras) -> None:
@@ -41,6 +41,13 @@ def add_texture_command(subparsers: Any, extras: Extras) -> None:
         metavar="N",
         help="width of the margin around charts, in texels (%(default)d)",
     )
+    parser.add_argument(
+        "--light",
+        type=float_tuple(3, "X,Y,Z"),
+        metavar="X,Y,Z",
+        help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
+        "for a shader",
+    )
     add_look_options(parser)
 
 
@@ -57,6 +64,7 @@ def run_texture(options: argparse.Namespace) -> None:
             field,
             size=options.size,
             margin=options.margin,
+            light=options.light,
             udim=UDIM_TOKEN in options.output.name,
             preset=preset,
             **settings,

@@ -22,6 +22,7 @@ import numpy as np
 
 from .even_lines import uneven_width
 from .hatching import ONSET_LEAD, ONSET_RANGE, LineModulation, standard_streak
+from .inks import inks_of
 from .lic_images import LicImages
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH
@@ -30,10 +31,27 @@ from .streak_statistics import (
     break_amount,
     look_streak_statistics,
     smoothstep,
+    softness,
 )
 
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3
+
+#: The density of normally distributed streaks is about this times c (1 - c) at the threshold of the
+#: coverage c.
+DENSITY_FACTOR = 1.6
+
+#: Spread of thresholds that is due to their storage with 8 bits.
+ROUNDING_SPREAD = 0.001
+
+#: Half the width of the sharpest edges, in thresholds.
+MIN_EDGE = 0.002
+
+#: Coverages that differ from 0 or 1 by less than this fade to it.
+EXACT_ENDS = 0.02
+
+#: Smallest transmittance, and smallest difference to it.
+MIN_TRANSMITTANCE = 1e-3
 
 #: Steps of the bisection that finds the thresholds of uneven lines: to 1 / 1024.
 BISECTION_STEPS = 10
@@ -231,3 +249,54 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
         1 - np.square(resolved)
     ) / 3  # what is not drawn has the spread of all thresholds
     return rgba
+
+
+def ink_of_thresholds(
+    pixels: np.ndarray, tone: np.ndarray, look: Look, line_count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw the ink of a tone, as the node group *RoSy Hatching* does.
+
+    Parameters
+    ----------
+    pixels : (P, 4) float32 ndarray
+        From `threshold_pixels`, or means of them.
+    tone : (P,) ndarray
+        Linear, 0 to 1.
+    look : Look
+        Its settings of the ink are used.
+    line_count : int
+        Number of lines through a point.
+
+    Returns
+    -------
+    color : (P, 3) float32 ndarray
+        Linear color of ink on paper, or of the ink alone if `look.clear_paper`.
+    coverage : (P,) float32 ndarray
+        0 to 1.
+    """
+    layers = min(look.layers, line_count, MAX_LAYERS)
+    inks = inks_of(look, layers if look.hue != "one" else 1)
+    required = inks.target_transmittance(inks.complement_if_light(tone))
+    colors = [
+        inks.ink_at_tone(np.full(len(tone), min(layer, len(inks.dark) - 1)), tone)
+        for layer in range(layers)
+    ]
+    left = [1 - inks.required_coverage(required, ink) for ink in colors]
+    shares = layer_shares(1 - left[0], layers, look.layering)
+    centered = 2 * pixels[:, :3] - 1
+    variance = pixels[:, 3] - (centered * centered).mean(axis=1) - np.float32(ROUNDING_SPREAD)
+    filtered_edge = np.sqrt(0.75 * np.maximum(variance, 0))
+    color = None if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
+    bare = np.ones(len(tone), dtype=np.float32)
+    for layer in range(layers):
+        coverage = 1 - np.maximum(left[layer], MIN_TRANSMITTANCE) ** shares[layer]
+        room = np.minimum(coverage, 1 - coverage)
+        edge = DENSITY_FACTOR * softness(look.crispness) * coverage * (1 - coverage)
+        edge = np.maximum(np.maximum(np.minimum(edge, room), filtered_edge), MIN_EDGE)
+        covered = np.clip((coverage - pixels[:, layer]) / (2 * edge) + 0.5, 0, 1)
+        is_dark = coverage > 0.5
+        covered = is_dark + np.minimum(room / EXACT_ENDS, 1) * (covered - is_dark)
+        ink = colors[layer]
+        color = ink if color is None else color + covered[:, None] * (ink - color)
+        bare *= 1 - covered
+    return color.astype(np.float32), 1 - bare

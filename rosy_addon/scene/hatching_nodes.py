@@ -13,7 +13,14 @@ import bpy
 
 from ..color import from_hex, to_linear
 from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
-from ..compositor.ink_thresholds import MAX_LAYERS
+from ..compositor.ink_thresholds import (
+    DENSITY_FACTOR,
+    EXACT_ENDS,
+    MAX_LAYERS,
+    MIN_EDGE,
+    MIN_TRANSMITTANCE,
+    ROUNDING_SPREAD,
+)
 from ..compositor.inks import inks_of
 from ..compositor.look import Look
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
@@ -23,22 +30,6 @@ from .owned_data import OWNED_TAG
 
 #: Name of the node group.
 GROUP_NAME = "RoSy Hatching"
-
-#: The density of normally distributed streaks is about this times c (1 - c) at the threshold of the
-#: coverage c.
-DENSITY_FACTOR = 1.6
-
-#: Spread of thresholds that is due to their storage with 8 bits.
-ROUNDING_SPREAD = 0.001
-
-#: Half the width of the sharpest edges, in thresholds.
-MIN_EDGE = 0.002
-
-#: Coverages that differ from 0 or 1 by less than this fade to it.
-EXACT_ENDS = 0.02
-
-#: Smallest transmittance, and smallest difference to it.
-MIN_TRANSMITTANCE = 1e-3
 
 #: Names of the inks of the lines, in their order.
 INK_NAMES = ("Ink", "Second Ink", "Third Ink")

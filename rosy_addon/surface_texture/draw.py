@@ -20,7 +20,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import UvCharts, uv_charts_task
-from .hatching import thresholds_task
+from .hatching import lit_ink_task, thresholds_task
 from .margin import margin_task
 from .texel_field import texel_field_task
 from .texel_noise import texel_noise_task
@@ -118,6 +118,7 @@ def draw_texture_task(
     *,
     margin: int = DEFAULT_MARGIN,
     is_udim: bool = False,
+    light: np.ndarray | None = None,
     cache: Cache | None = None,
 ) -> Task[Texture]:
     """Draw the field of a mesh as a texture.
@@ -131,7 +132,7 @@ def draw_texture_task(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        The light, the tone and the settings of a camera have no effect. With the unit "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
+        The light and the settings of a camera have no effect. With the unit "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
         each side.
     size : int
         Texels on each side of the texture, or of a tile of it.
@@ -139,6 +140,9 @@ def draw_texture_task(
         Width of the margin around charts, in texels.
     is_udim : bool
         Whether the tiles of the UV map are pictures of their own.
+    light : (3,) ndarray, optional
+        Direction to a light, in world space, whose hatching is drawn as ink. By default, a texture of
+        hatching has thresholds, and its ink is drawn by the material.
     cache : Cache, optional
         Stores what does not depend on the look.
 
@@ -180,14 +184,18 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    if is_hatched(look):
+    has_thresholds = is_hatched(look)
+    if has_thresholds:
         pixels_task = thresholds_task(on, field, surface_look, look.guiding_angle, cache)
     else:
         pixels_task = _colors_task(on, field, surface_look)
     pixels = yield from subtask(pixels_task, 0.3, 0.95)
+    if has_thresholds and light is not None:
+        pixels = yield from subtask(lit_ink_task(on, pixels, light, look), 0.95, 0.95)
+        has_thresholds = False
     image = yield from subtask(margin_task(frame, field, pixels, margin), 0.95, 1.0)
-    if is_hatched(look):
-        return Texture(frame, image, texels.overlap, has_thresholds=True)
+    if image.shape[2] == 4:
+        return Texture(frame, image, texels.overlap, has_thresholds)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = image
     return Texture(frame, rgba, texels.overlap)

@@ -17,6 +17,7 @@ from ..compositor.even_lines import (
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_thresholds import (
+    ink_of_thresholds,
     line_thresholds,
     ordered_thresholds,
     sharp_look,
@@ -32,6 +33,7 @@ from ..compositor.streak_statistics import (
     look_streak_statistics,
     look_streak_statistics_task,
 )
+from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture_task
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field_task, solid_wobble_angle
 from ..progress import Progress, Task, subtask
@@ -45,6 +47,9 @@ from .texel_surface import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
 SWAP_GRAINS = 8.0
+
+#: Least number of spots along the side of a texture where a field has no direction.
+MIN_SPOTS = 8
 
 #: Label of all steps.
 STEP_LABEL = "drawing hatching"
@@ -111,6 +116,43 @@ def thresholds_task(
     return pixels
 
 
+def lit_ink_task(
+    on: TexelSurface, pixels: np.ndarray, light: np.ndarray, look: Look
+) -> Task[np.ndarray]:
+    """Draw the ink of the diffuse light of a lamp.
+
+    Parameters
+    ----------
+    on : TexelSurface
+    pixels : (P, 4) float32 ndarray
+        From `thresholds_task`.
+    light : (3,) ndarray
+        Direction to the lamp, in world space.
+    look : Look
+        The settings of the ink, the strength of the shading, and the tone curve.
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        Linear color and opacity. All is opaque unless `look.clear_paper`.
+    """
+    direction = np.asarray(light, dtype=np.float64)
+    direction = direction / np.linalg.norm(direction)
+    colors = np.ones_like(pixels)
+    for block in pixel_blocks(len(pixels)):
+        yield Progress(block.start / len(pixels), STEP_LABEL)
+        triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
+        lambert = np.maximum(on.mesh.shading_normals_at(triangle, weights) @ direction, 0)
+        tone = apply_tone_curve(1 - look.shading + look.shading * lambert, look)
+        color, coverage = ink_of_thresholds(
+            pixels[block], np.minimum(tone, 1), look, on.mesh.family_count
+        )
+        colors[block, :3] = color
+        if look.clear_paper:
+            colors[block, 3] = coverage
+    return colors
+
+
 def _lines_task(
     on: TexelSurface,
     field: PixelField,
@@ -140,9 +182,11 @@ def _lines_task(
         (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.3, 0.8)
     yield from look_streak_statistics_task(look)
     if undefined:
-        area = np.abs(on.charts.density[on.texels.triangle]).mean()
-        texels_per_step = float(np.sqrt(area)) * on.texels.frame.size * on.step
-        grain = look.grain * texels_per_step
+        texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
+        size = on.texels.frame.size
+        # Spots of one size in texels, as wide as lines where the map is as usual.
+        grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
+        grain = min(grain, size / MIN_SPOTS)
         undirected = yield from undirected_texture_task(field, noise, grain)
     if has_paper_grain(look):
         paper_grain = yield from subtask(_paper_grain_task(on, field, look), 0.8, 1.0)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from rosy_addon.color import to_linear
+from rosy_addon.compositor.ink_thresholds import ink_of_thresholds
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
@@ -22,6 +24,9 @@ from .sheet import Panel, display, save, sheet
 
 #: Side of a picture, samples per pixel in each direction, and side of the texture.
 SIDE, SAMPLES, TEXTURE_SIDE = 402, 3, 2048
+
+#: Lamps: labels, azimuths from the camera and elevations in degrees.
+LAMPS = (("a lamp at the left", -50.0, 35.0), ("a lamp at the right", 55.0, 25.0))
 
 #: Views from the front and from behind, azimuth and elevation in degrees.
 FRONT, BACK = (-26.0, 8.0), (150.0, 14.0)
@@ -38,7 +43,7 @@ def write() -> None:
     chart_color = to_linear(hue)[charts.chart]
 
     def textured(gbuffer: GBuffer) -> np.ndarray:
-        return texture_at(texture, uv[surface.triangles], gbuffer)
+        return texture_at(texture, uv[surface.triangles], gbuffer)[:, :3]
 
     panels = [
         Panel(view(instance, FRONT, lambda g: chart_color[g.triangle]), "the charts of the UV map"),
@@ -55,6 +60,38 @@ def write() -> None:
     save(
         sheet([[Panel(crop, label) for crop, label in zip(crops, labels, strict=True)]]),
         IMAGES / "textures-seams.png",
+    )
+    _write_hatching(instance, uv)
+
+
+def _write_hatching(instance: MeshInstance, uv: np.ndarray) -> None:
+    """Draw and save the picture of one texture of hatching in the light of several lamps."""
+    panels = []
+    for key, lamps in (("cross-hatch", LAMPS), ("engraving", LAMPS)):
+        look = load_preset(key).look
+        thresholds = draw_texture(instance, uv, look, TEXTURE_SIDE).rgba
+        for label, azimuth, elevation in lamps:
+            lamp = from_angles(FRONT[0] + azimuth, elevation)
+
+            def inked(gbuffer: GBuffer, lamp=lamp, look=look, thresholds=thresholds) -> np.ndarray:
+                pixels = texture_at(thresholds, uv[instance.surface.triangles], gbuffer)
+                lambert = np.maximum(gbuffer.normal @ (gbuffer.camera.view[:3, :3] @ lamp), 0)
+                tone = 1 - look.shading + look.shading * lambert
+                return ink_of_thresholds(pixels, tone.astype(np.float32), look, 2)[0]
+
+            panels.append(Panel(view(instance, FRONT, inked, is_lit=False), label))
+    save(sheet([panels[:2], panels[2:]]), IMAGES / "textures-hatching.png")
+
+
+def from_angles(azimuth: float, elevation: float) -> np.ndarray:
+    """Return the (3,) unit vector from the origin to a camera or a lamp, given angles in degrees."""
+    azimuth, elevation = np.radians(azimuth), np.radians(elevation)
+    return np.array(
+        [
+            np.sin(azimuth) * np.cos(elevation),
+            -np.cos(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+        ]
     )
 
 
@@ -83,16 +120,19 @@ def unwrapped_suzanne() -> tuple[Surface, np.ndarray]:
     return build_surface(vertices, corners, np.append(start, len(corners)), name="Suzanne"), uv
 
 
-def view(instance: MeshInstance, angles: tuple[float, float], color_of) -> np.ndarray:
-    """Return a picture, lit by a lamp; `color_of` returns the colors of the pixels of a G-buffer."""
+def view(
+    instance: MeshInstance, angles: tuple[float, float], color_of, *, is_lit: bool = True
+) -> np.ndarray:
+    """Return a picture; `color_of` returns the colors of the pixels of a G-buffer, to be lit by a lamp."""
     side = SIDE * SAMPLES
     camera = orbit_camera(instance.surface.vertices, *angles, side, side, margin=0.03)
     gbuffer = project([instance], camera)
-    return _picture(gbuffer, _lit(color_of(gbuffer), gbuffer))
+    color = color_of(gbuffer)
+    return _picture(gbuffer, _lit(color, gbuffer) if is_lit else color)
 
 
 def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
-    """(P, 3) linear colors of a texture, interpolated as a renderer does."""
+    """(P, 4) values of a texture, interpolated as a renderer does."""
     place = np.einsum("nk,nki->ni", gbuffer.barycentric, corner_uv[gbuffer.triangle])
     height, width = texture.shape[:2]
     x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
@@ -100,7 +140,7 @@ def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> 
     x, y = (x - column)[:, None], (y - row)[:, None]
 
     def at(dx: int, dy: int) -> np.ndarray:
-        return texture[(row + dy) % height, (column + dx) % width, :3]
+        return texture[(row + dy) % height, (column + dx) % width]
 
     return (at(0, 0) * (1 - x) + at(1, 0) * x) * (1 - y) + (at(0, 1) * (1 - x) + at(1, 1) * x) * y
 

@@ -67,3 +67,23 @@ def test_textures_that_are_refused(error_of):
     ):
         assert expected in error_of(rf.texture, square, field, **keywords)
     assert "has no UV map" in error_of(rf.texture, rf.Surface(*SQUARE, name="square"))
+
+
+def test_hatching_for_one_light():
+    """The ink of a texture has the tone of the light; without a light it has thresholds of all tones."""
+    square = rf.Surface(*SQUARE, name="square", uv=np.array(SQUARE[0])[:, :2])
+    field = rf.along_axis(square, (1, 0.4, 0), 4)
+    settings = {"ink": "hatch", "grain": 3, "shading": 1, "ink_colour": "#000000"}
+    thresholds = rf.texture(square, field, size=512, margin=0, **settings).tiles[1001]
+    red, green = (np.asarray(thresholds)[..., channel].ravel() / 255 for channel in (0, 1))
+    np.testing.assert_allclose(np.quantile(red, [0.2, 0.5, 0.8]), [0.2, 0.5, 0.8], atol=0.03)
+    assert abs(np.corrcoef(red, green)[0, 1]) < 0.1
+    for cosine in (0.2, 0.5, 0.9):
+        light = (0, np.sqrt(1 - cosine**2), cosine)
+        ink = rf.texture(square, field, size=512, margin=0, light=light, **settings).tiles[1001]
+        assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
+        clear = rf.texture(
+            square, field, size=512, margin=0, light=light, clear_paper=True, **settings
+        ).tiles[1001]
+        assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
+        assert clear.rgba[..., :3].max() < 0.01

@@ -16,6 +16,7 @@ from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
 from ..compositor.ink_thresholds import (
     DENSITY_FACTOR,
     EXACT_ENDS,
+    FILTER_CORRECTION,
     MAX_LAYERS,
     MIN_EDGE,
     MIN_TRANSMITTANCE,
@@ -190,7 +191,11 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
     thresholds = build("ShaderNodeSeparateColor")
     build.connect(source["Thresholds"], thresholds.inputs["Color"])
     channels = [Number(build, socket) for socket in thresholds.outputs]
-    filtered_edge = _filtered_edge(number("Spread"), channels)
+    spread = _filtered_spread(number("Spread"), channels)
+    # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
+    filtered_edge = (spread * 0.75).square_root()
+    evenness = (spread * 3).at_most(1.0)
+    correction = evenness * (1 - evenness) * (4 * FILTER_CORRECTION)
     softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
     edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
     bare, color, ink_color = None, source["Paper"], inks[0]
@@ -199,9 +204,11 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
         coverage = 1 - left[layer].at_least(MIN_TRANSMITTANCE) ** share
         # Edges as wide as this leave the mean coverage of all thresholds unchanged.
         room = coverage.at_most(1 - coverage)
-        edge = (edge_factor * (coverage * (1 - coverage))).at_most(room)
+        inner = coverage * (1 - coverage)
+        edge = (edge_factor * inner).at_most(room)
         edge = edge.at_least(filtered_edge).at_least(MIN_EDGE)
-        covered = (coverage - threshold) / (edge * 2) + 0.5
+        corrected = coverage + correction * (inner * (1 - coverage * 2))
+        covered = (corrected - threshold) / (edge * 2) + 0.5
         # No ink at all, and nothing but ink, are exact.
         end = (room * (1 / EXACT_ENDS)).at_most(1.0)
         is_dark = coverage > 0.5
@@ -228,16 +235,11 @@ def _tone(number: Any) -> Number:
     return (stretched ** (1.0 / number("Gamma"))).at_most(1.0)
 
 
-def _filtered_edge(spread: Number, channels: list[Number]) -> Number:
-    """Half the width of the range of thresholds that a filter of the texture has averaged.
-
-    The variance of thresholds t is a quarter of that of 2 t - 1, and a uniform distribution of the half
-    width h has the variance h^2 / 3.
-    """
+def _filtered_spread(spread: Number, channels: list[Number]) -> Number:
+    """Return the variance of the thresholds that a filter of the texture has averaged, as 2 t - 1."""
     mean_square = None
     for threshold in channels:
         centered = threshold * 2 - 1.0
         square = centered * centered
         mean_square = square if mean_square is None else mean_square + square
-    variance = (spread - mean_square * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)
-    return (variance * 0.75).square_root()
+    return (spread - mean_square * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)

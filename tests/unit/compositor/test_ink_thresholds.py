@@ -9,6 +9,7 @@ import pytest
 
 from rosy_addon.compositor.hatching import LineModulation, line_coverage
 from rosy_addon.compositor.ink_thresholds import (
+    ink_of_thresholds,
     layer_shares,
     line_thresholds,
     ordered_thresholds,
@@ -139,3 +140,16 @@ def test_the_spread_of_averaged_pixels():
     np.testing.assert_allclose(unresolved[:, :3], 0.5, atol=0.003)
     np.testing.assert_allclose(unresolved[:, 3], 1 / 3, atol=0.003)
     np.testing.assert_array_equal(threshold_pixels(thresholds[:2])[:, 2], pixels[:, 0])
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 16, 256])
+def test_smaller_versions_of_a_texture_keep_the_tone(count):
+    """The ink of means of thresholds has the mean tone, however many thresholds are averaged."""
+    thresholds, _ = random_lines(2, 200_000)
+    look = replace(INK, ink_colour="#000000", crispness=1.0)
+    pixels = threshold_pixels(thresholds).reshape(-1, count, 4).mean(axis=1)
+    for tone in (0.0, 0.1, 0.3, 0.5, 0.8, 1.0):
+        color, coverage = ink_of_thresholds(pixels, np.full(len(pixels), tone), look, 2)
+        atol = 0.02 if 0 < tone < 1 else 0.005
+        assert color[:, 0].mean() == pytest.approx(tone, abs=atol)
+        np.testing.assert_allclose(color[:, 0], 1 - coverage, atol=1e-5)

@@ -145,7 +145,7 @@ def test_the_spread_of_averaged_pixels():
 @pytest.mark.parametrize("count", [1, 2, 4, 16, 256])
 def test_smaller_versions_of_a_texture_keep_the_tone(count):
     """The ink of means of thresholds has the mean tone, however many thresholds are averaged."""
-    thresholds, _ = random_lines(2, 200_000)
+    thresholds, _ = random_lines(2, 204_800)
     look = replace(INK, ink_colour="#000000", crispness=1.0)
     pixels = threshold_pixels(thresholds).reshape(-1, count, 4).mean(axis=1)
     for tone in (0.0, 0.1, 0.3, 0.5, 0.8, 1.0):

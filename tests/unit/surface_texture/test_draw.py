@@ -56,6 +56,24 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
         assert np.corrcoef(colors)[0, 1] > 0.93, changes
 
 
+@pytest.mark.parametrize(
+    "settings", [{"lines": "even"}, {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}], ids=str
+)
+def test_hatching_does_not_depend_on_the_charts(settings):
+    """Evenly spaced lines and uneven ones, their order, and the ink for a lamp."""
+    surface = torus()
+    instance = instance_of(surface, 4)
+    points = surface_points(surface, 20_000)
+    look = WIDER.with_settings({"ink": "hatch", **settings})
+    for light in (None, (0.5, -0.6, 0.6)):
+        colors = []
+        for uv in (torus_uv(), patches_uv(1)):
+            texture = draw_texture(instance, uv, look, 512, light=light)
+            assert texture.has_thresholds == (light is None)
+            colors.append(colors_at(texture.rgba, surface, uv, points))
+        assert np.corrcoef(colors)[0, 1] > 0.9
+
+
 def test_stretched_charts_show_the_same_lines():
     """A map that is four times as fine along u shows the texture of an even one."""
     surface = plane(16, 16)

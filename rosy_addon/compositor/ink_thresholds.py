@@ -70,7 +70,7 @@ def sharp_look(look: Look) -> Look:
 
 
 def line_thresholds(
-    line: int, images: LicImages, look: Look, modulation: LineModulation
+    line: int, images: LicImages | None, look: Look, modulation: LineModulation
 ) -> np.ndarray:
     """Compute the coverage from which each pixel is covered by one line.
 
@@ -78,7 +78,8 @@ def line_thresholds(
     ----------
     line : int
         Index into `images.members`.
-    images : LicImages
+    images : LicImages or None
+        None if the modulation has even lines.
     look : Look
         A `sharp_look`, in pixels of the frame.
     modulation : LineModulation
@@ -90,45 +91,69 @@ def line_thresholds(
         0 to 1, evenly distributed.
     """
     statistics = look_streak_statistics(look)
-    coverages = np.linspace(0, 1, COVERAGE_STEPS)
     relief = break_streak = None
     if modulation.paper_grain is not None:
         relief = np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
     if modulation.break_images is not None:
         break_streak, _ = standard_streak(modulation.break_images, line, statistics.break_std)
     if modulation.even_lines is not None:
+        grain = None if relief is None else modulation.paper_grain[line]
         position = 1 - modulation.even_lines.streaks[line]
-        if break_streak is None and relief is None:
-            result = position
-        else:
-            grain = None if relief is None else modulation.paper_grain[line]
-            result = _bisect(
-                lambda coverage: uneven_width(coverage, look, break_streak, grain) - position,
-                len(position),
-            )
+        result = _even_line_thresholds(position, break_streak, grain, look)
     else:
         streak, _ = standard_streak(images, line, statistics.std)
-        if relief is not None:
-            streak = streak + relief
-        if break_streak is None:
-            result = np.interp(streak, statistics.threshold[::-1], coverages[::-1])
-        else:
-            difference = break_streak - streak if relief is None else break_streak + relief - streak
-
-            def excess(coverage: np.ndarray) -> np.ndarray:
-                amount = break_amount(coverage, look.breaks, look.wobble)
-                threshold = np.interp(coverage, coverages, statistics.threshold)
-                return streak + amount * difference - threshold
-
-            result = _bisect(excess, len(streak))
-    result = result.astype(np.float32, copy=False)
+        result = _streak_thresholds(streak, break_streak, relief, look, statistics.threshold)
     if modulation.undirected is not None:
         undefined = np.flatnonzero(~np.isnan(modulation.undirected))
         spots = modulation.undirected[undefined] / np.float32(statistics.disc_std)
         if relief is not None:
             spots += relief[undefined]
-        result[undefined] = np.interp(spots, statistics.disc_threshold[::-1], coverages[::-1])
+        result[undefined] = _coverage_from(spots, statistics.disc_threshold)
     return result
+
+
+def _streak_thresholds(
+    streak: np.ndarray,
+    break_streak: np.ndarray | None,
+    relief: np.ndarray | None,
+    look: Look,
+    table: np.ndarray,
+) -> np.ndarray:
+    """`line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
+    if relief is not None:
+        streak = streak + relief
+        break_streak = None if break_streak is None else break_streak + relief
+    if break_streak is None:
+        return _coverage_from(streak, table)
+    difference = break_streak - streak
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+
+    def excess(coverage: np.ndarray) -> np.ndarray:
+        amount = break_amount(coverage, look.breaks, look.wobble)
+        return streak + amount * difference - np.interp(coverage, coverages, table)
+
+    return _bisect(excess, len(streak))
+
+
+def _even_line_thresholds(
+    position: np.ndarray,
+    break_streak: np.ndarray | None,
+    paper_grain: np.ndarray | None,
+    look: Look,
+) -> np.ndarray:
+    """`line_thresholds` of even lines; `position` is 0 in the middle of a line, 1 between two lines."""
+    if break_streak is None and paper_grain is None:
+        return position
+    return _bisect(
+        lambda coverage: uneven_width(coverage, look, break_streak, paper_grain) - position,
+        len(position),
+    )
+
+
+def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """Coverages whose thresholds, in a table by coverage, are the given streaks; float32."""
+    coverages = np.linspace(0, 1, COVERAGE_STEPS)
+    return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
 
 
 def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:

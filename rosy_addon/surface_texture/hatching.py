@@ -24,7 +24,7 @@ from ..compositor.ink_thresholds import (
     threshold_pixels,
 )
 from ..compositor.lic import lic_lengths_task
-from ..compositor.lic_images import LicImages, lic_images_task
+from ..compositor.lic_images import LicImages
 from ..compositor.look import Look
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
@@ -91,7 +91,8 @@ def thresholds_task(
     wobble_angle = None
     if has_wobble(look):
         wobble_angle = yield from subtask(_wobble_angle_task(on, look), 0.1, 0.15)
-        field = yield from rotate_pixel_field_task(field, np.float32(look.wobble) * wobble_angle)
+        rotation_task = rotate_pixel_field_task(field, np.float32(look.wobble) * wobble_angle)
+        field = yield from subtask(rotation_task, 0.15, 0.15)
     images, modulation = yield from subtask(
         _lines_task(on, field, look, wobble_angle, cache), 0.15, 0.85
     )
@@ -99,7 +100,8 @@ def thresholds_task(
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(pixels)):
         yield Progress(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
-        part_images, part = images.part(block), modulation.part(block)
+        part_images = None if images is None else images.part(block)
+        part = modulation.part(block)
         thresholds = np.stack(
             [line_thresholds(line, part_images, look, part) for line in range(field.line_count)]
         )
@@ -159,19 +161,17 @@ def _lines_task(
     look: Look,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
-) -> Task[tuple[LicImages, LineModulation]]:
+) -> Task[tuple[LicImages | None, LineModulation]]:
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
     is_even, is_broken = has_even_lines(look), has_breaks(look)
     undefined = not field.representation.all()
-    even_lines = break_images = noise = undirected = paper_grain = None
+    images = even_lines = break_images = noise = undirected = paper_grain = None
     if not is_even or is_broken or undefined:
         noise = yield from subtask(texel_noise_task(on, look), 0.0, 0.3)
     break_look = replace(look, length=break_steps(look))
     if is_even:
         even_task = _even_lines_task(on, field, look, wobble_angle, cache)
         even_lines = yield from subtask(even_task, 0.3, 0.6)
-        nothing = np.zeros((field.line_count, len(field.pixel), 1), dtype=np.float32)
-        images = yield from lic_images_task(nothing, np.ones(len(field.pixel), dtype=np.float32))
         if is_broken:
             task = lic_lengths_task(field, [break_look], noise)
             (break_images,) = yield from subtask(task, 0.6, 0.8)

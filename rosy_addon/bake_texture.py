@@ -97,12 +97,12 @@ def bake_texture_task(
         png = None
         if not settings.as_float:
             png = yield from subtask(
-                png_task(texture.rgba, is_color=not texture.has_thresholds), stop, stop
+                png_task(texture.rgba, is_color=not texture.is_data), stop, stop
             )
         note = texture.overlap_note(f"object '{obj.name}'")
         warnings = (note,) if note else ()
         hatching = None
-        if texture.has_thresholds:
+        if texture.is_data:
             hatching = Hatching(look, field_symmetry(texture_input.instance.field).line_count)
         image_data = ImageData(texture.rgba, png)
         drawn.append((texture_input.source, image_data, state, hatching, warnings))

@@ -16,6 +16,7 @@ from ..presets.store import default_user_folder, load_preset
 from ..progress import run_to_completion
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
+    CONTENTS,
     DEFAULT_MARGIN,
     DEFAULT_SIZE,
     check_texture_size,
@@ -106,6 +107,7 @@ def texture(
     margin: int = DEFAULT_MARGIN,
     udim: bool = False,
     light: ArrayLike | None = None,
+    content: str = "look",
     preset: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> Texture:
@@ -131,6 +133,10 @@ def texture(
     light : (3,) array_like, optional
         Direction to a lamp, in the space of the surface. Hatching is then drawn as ink for this lamp, for
         renderers that have no shader for thresholds.
+    content : {"look", "anisotropy"}
+        What the texture shows: the picture of the look, or the direction of the field as an anisotropy map
+        of glTF. That has the line nearest to the `guiding_angle`: red and green are its components along
+        tangent and bitangent, from -1 to 1, blue is the strength, 0 where the field is undefined.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     **settings
@@ -166,6 +172,8 @@ def texture(
     """
     look = texture_look(preset, settings)
     check_texture_size(size, margin)
+    if content not in CONTENTS:
+        raise RosyError(f"content must be one of {', '.join(CONTENTS)}, not '{content}'")
     uv = uv_map(surface)
     instance = upright_instance(surface, field, None)
     task = draw_texture_task(
@@ -175,12 +183,13 @@ def texture(
         size,
         margin=margin,
         is_udim=udim,
+        content=content,
         light=None if light is None else _in_world(light, instance),
     )
     drawn = run_to_completion(task)
     warn(drawn.overlap_note(surface.name))
     tiles = drawn.tiles()
-    if drawn.has_thresholds:  # display values, as pictures are saved
+    if drawn.is_data:  # display values, as pictures are saved
         tiles = {
             number: np.concatenate([to_linear(rgba[..., :3]), rgba[..., 3:]], axis=-1)
             for number, rgba in tiles.items()

@@ -8,7 +8,14 @@ from typing import Any
 
 from .. import api
 from ..api.textures import UDIM_TOKEN, texture_look
-from ..surface_texture.draw import DEFAULT_MARGIN, DEFAULT_SIZE, MAX_MARGIN, MAX_SIZE, MIN_SIZE
+from ..surface_texture.draw import (
+    CONTENTS,
+    DEFAULT_MARGIN,
+    DEFAULT_SIZE,
+    MAX_MARGIN,
+    MAX_SIZE,
+    MIN_SIZE,
+)
 from .extras import Extras
 from .look import add_look_options, requested_preset, requested_settings
 from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings
@@ -48,6 +55,12 @@ def add_texture_command(subparsers: Any, extras: Extras) -> None:
         help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
         "for a shader",
     )
+    parser.add_argument(
+        "--content",
+        choices=list(CONTENTS),
+        default="look",
+        help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
+    )
     add_look_options(parser)
 
 
@@ -65,6 +78,7 @@ def run_texture(options: argparse.Namespace) -> None:
             size=options.size,
             margin=options.margin,
             light=options.light,
+            content=options.content,
             udim=UDIM_TOKEN in options.output.name,
             preset=preset,
             **settings,

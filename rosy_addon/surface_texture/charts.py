@@ -163,6 +163,22 @@ def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> tuple[np.ndarray, 
     return triangle[same], neighbor[same], edge[same], neighbor_edge[same]
 
 
+def uv_tangents_task(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> Task[np.ndarray]:
+    """Compute unit tangents in the direction of u, averaged at the corners over each smooth fan.
+
+    As renderers do for normal maps.
+
+    Returns
+    -------
+    (T, 3) complex128 ndarray
+        In the frame of the triangle.
+    """
+    triangle = np.arange(len(charts.linear))
+    direction = _unit(charts.to_surface(triangle, np.ones(len(triangle))))
+    edges = _chart_edges(mesh, charts.uv)
+    return (yield from _averaged_at_corners_task(surface, mesh, direction, edges))
+
+
 def _frames_task(
     surface: Surface,
     mesh: TangentMesh,
@@ -173,7 +189,30 @@ def _frames_task(
     """(T, 3) complex128 `UvCharts.frame`; `edges` are those of `_chart_edges`."""
     # The rotation of the polar decomposition turns this tangent to the u axis.
     mirrored = np.abs(conjugate) > np.abs(linear)
-    flat_frame = _unit(np.where(mirrored, conjugate, linear.conj()))
+    direction = _unit(np.where(mirrored, conjugate, linear.conj()))
+    return _averaged_at_corners_task(surface, mesh, direction, edges)
+
+
+def _averaged_at_corners_task(
+    surface: Surface,
+    mesh: TangentMesh,
+    direction: np.ndarray,
+    edges: tuple[np.ndarray, ...],
+) -> Task[np.ndarray]:
+    """Average directions at the corners of triangles over each smooth fan of a chart.
+
+    Parameters
+    ----------
+    direction : (T,) complex128 ndarray
+        Unit tangents.
+    edges : tuple of ndarray
+        From `_chart_edges`.
+
+    Returns
+    -------
+    (T, 3) complex128 ndarray
+        Unit tangents.
+    """
     triangle, neighbor, edge, neighbor_edge = edges
     fan = surface.corner_fan[surface.triangles].ravel()
     pairs = []
@@ -185,11 +224,11 @@ def _frames_task(
     task = connected_components_task(len(fan), np.concatenate(pairs))
     group = yield from subtask(task, 0.0, 0.6, STEP_LABEL)
     yield Progress(0.6, STEP_LABEL)
-    vector = mesh.to_world(np.arange(len(flat_frame)), flat_frame) * mesh.area[:, None]
+    vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
     total = np.stack(
         [np.bincount(group, np.repeat(component, 3)) for component in vector.T], axis=1
     )
-    frame = np.empty((len(flat_frame), 3), dtype=np.complex128)
+    frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
         yield Progress(0.7 + 0.1 * corner, STEP_LABEL)
         tangent, normal = total[group[corner::3]], mesh.corner_normal[:, corner]
@@ -197,7 +236,7 @@ def _frames_task(
         tangent = transport(tangent, normal, mesh.normal)
         frame[:, corner] = _unit(dot(tangent, mesh.x) + 1j * dot(tangent, mesh.y))
     missing = frame == 0
-    frame[missing] = np.repeat(flat_frame, 3)[missing.ravel()]
+    frame[missing] = np.repeat(direction, 3)[missing.ravel()]
     return frame
 
 

@@ -19,6 +19,7 @@ from ..memory import check_memory, raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
+from .anisotropy import anisotropy_task
 from .charts import UvCharts, uv_charts_task
 from .hatching import lit_ink_task, thresholds_task
 from .margin import margin_task
@@ -51,6 +52,12 @@ DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = 2048, 16, 16384
 #: Margin in texels: default and maximum.
 DEFAULT_MARGIN, MAX_MARGIN = 16, 512
 
+#: What a texture can show, with descriptions.
+CONTENTS = {
+    "look": "The picture of the look",
+    "anisotropy": "The direction of the field, as an anisotropy map of glTF",
+}
+
 #: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
 
@@ -70,18 +77,18 @@ class Texture:
     ----------
     frame : TextureFrame
     rgba : (H, W, 4) float32 ndarray
-        Rows from the bottom. The tiles of a UDIM texture are stacked. Linear and opaque, or thresholds
-        of ink.
+        Rows from the bottom. The tiles of a UDIM texture are stacked.
     overlap : float
         Fraction of the area of the UV map that lies under other parts of it. They show the same texels.
-    has_thresholds : bool
-        Whether the pixels are thresholds of ink; see `compositor.ink_thresholds`.
+    is_data : bool
+        Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions, and not
+        linear colors.
     """
 
     frame: TextureFrame
     rgba: np.ndarray
     overlap: float
-    has_thresholds: bool = False
+    is_data: bool = False
 
     def overlap_note(self, name: str) -> str:
         """Return what to tell the user of overlapping charts of the mesh `name`; empty if nothing."""
@@ -119,6 +126,7 @@ def draw_texture_task(
     margin: int = DEFAULT_MARGIN,
     is_udim: bool = False,
     light: np.ndarray | None = None,
+    content: str = "look",
     cache: Cache | None = None,
 ) -> Task[Texture]:
     """Draw the field of a mesh as a texture.
@@ -143,6 +151,8 @@ def draw_texture_task(
     light : (3,) ndarray, optional
         Direction to a light, in world space, whose hatching is drawn as ink. By default, a texture of
         hatching has thresholds, and its ink is drawn by the material.
+    content : str
+        One of `CONTENTS`.
     cache : Cache, optional
         Stores what does not depend on the look.
 
@@ -184,21 +194,25 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    has_thresholds = is_hatched(look)
-    if has_thresholds:
+    is_data = content == "anisotropy" or (is_hatched(look) and light is None)
+    if content == "anisotropy":
+        pixels_task = anisotropy_task(on, look.guiding_angle)
+    elif is_hatched(look):
         pixels_task = thresholds_task(on, field, surface_look, look.guiding_angle, cache)
     else:
         pixels_task = _colors_task(on, field, surface_look)
     pixels = yield from subtask(pixels_task, 0.3, 0.95)
-    if has_thresholds and light is not None:
+    if pixels.shape[1] == 4 and light is not None:
         pixels = yield from subtask(lit_ink_task(on, pixels, light, look), 0.95, 0.95)
-        has_thresholds = False
-    image = yield from subtask(margin_task(frame, field, pixels, margin), 0.95, 1.0)
+    # Directions are relative to their chart.
+    crosses_seams = content != "anisotropy"
+    filling_task = margin_task(frame, field, pixels, margin, crosses_seams=crosses_seams)
+    image = yield from subtask(filling_task, 0.95, 1.0)
     if image.shape[2] == 4:
-        return Texture(frame, image, texels.overlap, has_thresholds)
+        return Texture(frame, image, texels.overlap, is_data)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = image
-    return Texture(frame, rgba, texels.overlap)
+    return Texture(frame, rgba, texels.overlap, is_data)
 
 
 def check_texture_size(size: int, margin: int) -> None:

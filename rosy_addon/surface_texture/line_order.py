@@ -12,7 +12,9 @@ last average is over a few widths of lines, and blends the lines where they swap
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -125,44 +127,124 @@ def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Ta
     On fields of directions: Viertel and Osting, "An Approach to Quad Meshing Based on Harmonic
     Cross-Valued Maps and the Ginzburg-Landau Theory", SIAM J. Sci. Comput. 41(1), 2019.
     """
+    refined = yield from subtask(_refined_task(mesh), 0.0, 0.4)
+    task = _first_lines_task(mesh, refined, guiding_angle, blend)
+    return (yield from subtask(task, 0.4, 1.0, STEP_LABEL))
+
+
+def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[LineOrder]:
+    """Choose one direction of a field at each point: a direction of the first line.
+
+    Opposite directions of that line meet only where they must.
+
+    Parameters
+    ----------
+    mesh, guiding_angle
+        As for `line_order_task`.
+
+    Returns
+    -------
+    LineOrder
+        Of degree 1.
+    """
+    refined = yield from subtask(_refined_task(mesh), 0.0, 0.3)
+    task = _first_lines_task(mesh, refined, guiding_angle, 0.0)
+    lines = yield from subtask(task, 0.3, 0.6, STEP_LABEL)
+    if lines.degree == 1:
+        return lines
+    root = refined.tree.leaf_root
+    line = power(_unit_root(lines.first.sum(axis=1), 2), 2)
+    guide = _guide(mesh, guiding_angle, 1)[root]
+    task = _aligned_task(refined, line, 2, guide, 1, AVERAGE_LENGTHS)
+    return (yield from subtask(task, 0.6, 1.0, STEP_LABEL))
+
+
+class _RefinedMesh(NamedTuple):
+    """A mesh of small triangles, on which representations are averaged.
+
+    Lengths are fractions of the side of a square as large as the surface.
+    """
+
+    tree: BisectionTree
+    averages: SurfaceAverages
+    side: float
+
+
+def _refined_task(mesh: TangentMesh) -> Task[_RefinedMesh]:
+    """Refine a mesh."""
     yield Progress(0.0, STEP_LABEL)
-    degree = mesh.degree // mesh.family_count
     side = float(np.sqrt(mesh.area.sum()))
-    points, triangle_vertex = yield from subtask(_welded_task(mesh), 0.0, 0.1)
-    # Lengths are fractions of the side from here on, so that no number is very large or small.
+    points, triangle_vertex = yield from subtask(_welded_task(mesh), 0.0, 0.2)
+    # No number is very large or small.
     points = (points - points.mean(axis=0)) / side
     max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
     tree_task = bisection_task(points, triangle_vertex, MAX_EDGE, max_triangles)
-    tree = yield from subtask(tree_task, 0.1, 0.15)
+    tree = yield from subtask(tree_task, 0.2, 0.3)
     root = tree.leaf_root
     start = np.arange(0, 3 * len(root) + 1, 3, dtype=np.int32)
-    leaves = yield from subtask(
-        surface_task(tree.vertices, tree.leaf_vertex.ravel(), start), 0.15, 0.3
+    leaves_task = surface_task(tree.vertices, tree.leaf_vertex.ravel(), start)
+    leaves = yield from subtask(leaves_task, 0.3, 0.6)
+    connection = yield from subtask(connection_task(leaves), 0.6, 0.9)
+    yield Progress(0.9, STEP_LABEL)
+    return _RefinedMesh(tree, SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root]), side)
+
+
+def _first_lines_task(
+    mesh: TangentMesh, refined: _RefinedMesh, guiding_angle: float, blend: float
+) -> Task[LineOrder]:
+    """Find the first line; see `line_order_task`."""
+    degree = mesh.degree // mesh.family_count
+    tree = refined.tree
+    z = np.einsum(
+        "lck,lk->l", tree.leaf_weights / np.float32(3), mesh.z.take(tree.leaf_root, axis=0)
     )
-    z = np.einsum("lck,lk->l", tree.leaf_weights / np.float32(3), mesh.z.take(root, axis=0))
-    connection = yield from subtask(connection_task(leaves), 0.3, 0.45)
-    averages = SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root])
-    laplacian = yield from subtask(laplacian_task(connection, degree), 0.45, 0.5)
-    laplacian = laplacian.with_values(laplacian.data.astype(np.complex64))
     if mesh.family_z is None:
-        first, lengths = _guide(mesh, guiding_angle, degree)[root], AVERAGE_LENGTHS
+        first, lengths = _guide(mesh, guiding_angle, degree)[tree.leaf_root], AVERAGE_LENGTHS
     else:  # the field distinguishes its lines
-        first, lengths = mesh.family_z[root], ()
+        first, lengths = mesh.family_z[tree.leaf_root], ()
+    lengths = (*lengths, blend / refined.side)
+    return (yield from _aligned_task(refined, z, mesh.degree, first, degree, lengths))
+
+
+def _aligned_task(
+    refined: _RefinedMesh,
+    z: np.ndarray,
+    z_degree: int,
+    first: np.ndarray,
+    degree: int,
+    lengths: Sequence[float],
+) -> Task[LineOrder]:
+    """Align a guide with a field by threshold dynamics.
+
+    Parameters
+    ----------
+    refined : _RefinedMesh
+    z : (L,) complex ndarray
+        Representation of the field, of the degree `z_degree`.
+    first : (L,) complex ndarray
+        Representation of the guide, of the degree `degree`.
+    lengths : sequence of float
+        Lengths of the averages.
+    """
+    averages = refined.averages
+    connection = averages.connection
+    laplacian = yield from subtask(laplacian_task(connection, degree), 0.0, 0.1)
+    laplacian = laplacian.with_values(laplacian.data.astype(np.complex64))
     nodes = None
-    for number, length in enumerate([*lengths, blend / side]):
-        done = 0.5 + 0.5 * number / (len(lengths) + 1)
+    for number, length in enumerate(lengths):
+        done = 0.1 + 0.9 * number / len(lengths)
         yield Progress(done, STEP_LABEL)
-        snapped = power(nearest_member(_root(first, degree), z, mesh.degree), degree)
+        snapped = power(nearest_member(_unit_root(first, degree), z, z_degree), degree)
         sums = averages.node_sums(snapped, degree)
         task = averages.smooth_task(laplacian, length**2, sums, nodes)
         nodes = yield from subtask(task, done, done, STEP_LABEL)
         first = averages.face_means(nodes, degree)
     angle = averages.frame_angle.reshape(-1, 3)
     corners = nodes[connection.corner_node].reshape(-1, 3) * np.exp(1j * degree * angle)
-    return LineOrder(degree, tree, corners.astype(np.complex64))
+    return LineOrder(degree, refined.tree, corners.astype(np.complex64))
 
 
-def _root(values: np.ndarray, degree: int) -> np.ndarray:
+def _unit_root(values: np.ndarray, degree: int) -> np.ndarray:
     """Return (n,) unit directions of representations."""
     return np.exp(1j * np.angle(values) / degree)
 

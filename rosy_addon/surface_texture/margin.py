@@ -18,7 +18,12 @@ STEP_LABEL = "filling the margin"
 
 
 def margin_task(
-    frame: TextureFrame, field: PixelField, color: np.ndarray, margin: int
+    frame: TextureFrame,
+    field: PixelField,
+    color: np.ndarray,
+    margin: int,
+    *,
+    crosses_seams: bool = True,
 ) -> Task[np.ndarray]:
     """Draw the texels of charts and their margin into the frame.
 
@@ -30,6 +35,8 @@ def margin_task(
     color : (P, K) float32 ndarray
     margin : int
         Width of the margin, in texels.
+    crosses_seams : bool
+        Whether the colors mean the same in all charts, so that those beyond a seam continue a chart.
 
     Returns
     -------
@@ -46,11 +53,12 @@ def margin_task(
     filled[field.pixel] = True
     if not margin:
         return image
-    outer, values = _beyond_seams(frame, field, color, filled)
-    flat[outer] = values
-    filled[outer] = True
-    is_border = field.neighbor_mask != ALL_NEIGHBORS
-    ring = np.union1d(field.pixel[is_border], outer)
+    ring = field.pixel[field.neighbor_mask != ALL_NEIGHBORS]
+    if crosses_seams:
+        outer, values = _beyond_seams(frame, field, color, filled)
+        flat[outer] = values
+        filled[outer] = True
+        ring = np.union1d(ring, outer)
     for number in range(margin):
         yield Progress((number + 1) / (margin + 1), STEP_LABEL)
         ring = _dilate(frame, flat, filled, ring)

@@ -72,7 +72,7 @@ def test_hatching_does_not_depend_on_the_charts(settings):
         colors = []
         for uv in (torus_uv(), patches_uv(1)):
             texture = draw_texture(instance, uv, look, 512, light=light)
-            assert texture.has_thresholds == (light is None)
+            assert texture.is_data == (light is None)
             colors.append(colors_at(texture.rgba, surface, uv, points))
         assert np.corrcoef(colors)[0, 1] > 0.85
 

@@ -274,9 +274,8 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
         rgba[:, channel] = np.rint(255 * value) / np.float32(255)
     centered = 2 * rgba[:, :3] - 1
     rgba[:, 3] = (centered * centered).mean(axis=1)
-    rgba[:, 3] += (
-        1 - np.square(resolved)
-    ) / 3  # what is not drawn has the spread of all thresholds
+    # What is not drawn has the spread of all thresholds.
+    rgba[:, 3] += (1 - np.square(resolved)) / 3
     return rgba
 
 

@@ -9,7 +9,6 @@ import bpy
 
 from .cache import BAKE_CACHE
 from .compositor.look import Look
-from .field.directional_field import field_symmetry
 from .image_io.png import png_task
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.blender_images import ImageData
@@ -103,7 +102,7 @@ def bake_texture_task(
         warnings = (note,) if note else ()
         hatching = None
         if texture.is_data:
-            hatching = Hatching(look, field_symmetry(texture_input.instance.field).line_count)
+            hatching = Hatching(look, texture.line_count)
         image_data = ImageData(texture.rgba, png)
         drawn.append((texture_input.source, image_data, state, hatching, warnings))
     BAKE_CACHE.evict_over_limit()

@@ -83,12 +83,15 @@ class Texture:
     is_data : bool
         Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions, and not
         linear colors.
+    line_count : int
+        Number of lines of the field through a point.
     """
 
     frame: TextureFrame
     rgba: np.ndarray
     overlap: float
-    is_data: bool = False
+    is_data: bool
+    line_count: int
 
     def overlap_note(self, name: str) -> str:
         """Return what to tell the user of overlapping charts of the mesh `name`; empty if nothing."""
@@ -209,10 +212,10 @@ def draw_texture_task(
     filling_task = margin_task(frame, field, pixels, margin, crosses_seams=crosses_seams)
     image = yield from subtask(filling_task, 0.95, 1.0)
     if image.shape[2] == 4:
-        return Texture(frame, image, texels.overlap, is_data)
+        return Texture(frame, image, texels.overlap, is_data, mesh.family_count)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = image
-    return Texture(frame, rgba, texels.overlap, is_data)
+    return Texture(frame, rgba, texels.overlap, is_data, mesh.family_count)
 
 
 def check_texture_size(size: int, margin: int) -> None:

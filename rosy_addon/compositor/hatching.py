@@ -15,6 +15,7 @@ they do not change the tone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -421,20 +422,24 @@ def line_shares(
     delays = [onset - first_onset for onset in onsets]
     shares = []
     for darkness in 1 - transmittance:
-        onset_weights = [
-            smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
-            for delay in delays
-        ]
-        total = np.add.reduce(onset_weights)
+        weights = onset_weights(darkness, delays)
+        total = np.add.reduce(weights)
         if len(transmittance) == 1:
-            shares = [weight / total for weight in onset_weights]
+            shares = [weight / total for weight in weights]
             break
-        shares.append(onset_weights[len(shares)] / total)
+        shares.append(weights[len(shares)] / total)
     undefined = field.representation == 0
     if undefined.any():
         for line, share in enumerate(shares):
             share[undefined] = line == 0
     return shares
+
+
+def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) -> list[np.ndarray]:
+    """Compute how much each line has joined, 0 to 1, at a darkness, given the ones at which they do."""
+    return [
+        smoothstep((darkness - delay + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD)) for delay in delays
+    ]
 
 
 def _onset_darkness(

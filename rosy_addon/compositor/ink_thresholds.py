@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from .even_lines import uneven_width
-from .hatching import ONSET_LEAD, ONSET_RANGE, LineModulation, standard_streak
-from .inks import inks_of
+from .hatching import LineModulation, onset_weights, standard_streak
+from .inks import Inks, inks_of
 from .lic_images import LicImages
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH
@@ -30,7 +30,6 @@ from .streak_statistics import (
     COVERAGE_STEPS,
     break_amount,
     look_streak_statistics,
-    smoothstep,
     softness,
 )
 
@@ -232,12 +231,9 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layering : float
         Of the look.
     """
-    begun = [
-        smoothstep((darkness - layer * layering + ONSET_LEAD) / (ONSET_RANGE + ONSET_LEAD))
-        for layer in range(layers)
-    ]
-    total = np.add.reduce(begun)
-    return [weight / total for weight in begun]
+    weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
+    total = np.add.reduce(weights)
+    return [weight / total for weight in weights]
 
 
 def _first_of_all(threshold: np.ndarray, layers: int, layering: float) -> np.ndarray:
@@ -279,6 +275,12 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
     return rgba
 
 
+def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
+    """Return the number of lines that cross at most, and their inks: one each, or one for all."""
+    layers = min(look.layers, line_count, MAX_LAYERS)
+    return layers, inks_of(look, layers if look.hue != "one" else 1)
+
+
 def ink_of_thresholds(
     pixels: np.ndarray, tone: np.ndarray, look: Look, line_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -302,8 +304,7 @@ def ink_of_thresholds(
     coverage : (P,) float32 ndarray
         0 to 1.
     """
-    layers = min(look.layers, line_count, MAX_LAYERS)
-    inks = inks_of(look, layers if look.hue != "one" else 1)
+    layers, inks = layer_inks(look, line_count)
     required = inks.target_transmittance(inks.complement_if_light(tone))
     colors = [
         inks.ink_at_tone(np.full(len(tone), min(layer, len(inks.dark) - 1)), tone)

@@ -9,6 +9,7 @@ transported by unfolding the two triangles.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -194,6 +195,44 @@ class TangentMesh:
         direction = member * evaluate_harmonics(harmonics, member)
         norm = np.abs(direction)
         return np.divide(direction, norm, out=member.copy(), where=norm > 0)
+
+
+class SharedEdges(NamedTuple):
+    """Edges that two triangles share, each once.
+
+    Attributes
+    ----------
+    triangle, neighbor : (n,) intp ndarray
+        The two triangles.
+    edge, neighbor_edge : (n,) intp ndarray
+        The numbers of the edge in them.
+    """
+
+    triangle: np.ndarray
+    neighbor: np.ndarray
+    edge: np.ndarray
+    neighbor_edge: np.ndarray
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return, for each end of the edges, the (n, 2) corners 3 t + k of both triangles there."""
+        first, second = (
+            np.stack(
+                [
+                    3 * self.triangle + (self.edge + own) % 3,
+                    3 * self.neighbor + (self.neighbor_edge + other) % 3,
+                ],
+                axis=1,
+            )
+            for own, other in ((1, 2), (2, 1))
+        )
+        return first, second
+
+
+def shared_edges(mesh: TangentMesh) -> SharedEdges:
+    """Return the edges that streamlines can cross."""
+    triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
+    neighbor = mesh.neighbor[triangle, edge].astype(np.intp)
+    return SharedEdges(triangle, neighbor, edge, mesh.neighbor_edge[triangle, edge].astype(np.intp))
 
 
 def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndarray:

@@ -21,8 +21,8 @@ from ..compositor.ink_thresholds import (
     MIN_EDGE,
     MIN_TRANSMITTANCE,
     ROUNDING_SPREAD,
+    layer_inks,
 )
-from ..compositor.inks import inks_of
 from ..compositor.look import Look
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
@@ -93,9 +93,8 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
     line_count : int
         Number of lines through a point.
     """
-    layers = min(look.layers, line_count, MAX_LAYERS)
+    layers, inks = layer_inks(look, line_count)
     ramp = look.ink_colour_light if look.ink_ramp else look.ink_colour
-    inks = inks_of(look, layers if look.hue != "one" else 1).dark
     values = {
         "Shading": look.shading,
         "Black": look.tone_black,
@@ -109,7 +108,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         "Paper": (*to_linear(from_hex(look.paper_colour)).tolist(), 1.0),
     }
     for layer, name in enumerate(INK_NAMES):
-        values[name] = (*inks[min(layer, len(inks) - 1)].tolist(), 1.0)
+        values[name] = (*inks.dark[min(layer, len(inks.dark) - 1)].tolist(), 1.0)
     for name, value in values.items():
         node.inputs[name].default_value = value
 

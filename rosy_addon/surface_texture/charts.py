@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import dot, transport
 from ..field.surface import Surface, connected_components_task
-from ..line_drawing.tangent_mesh import TangentMesh
+from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
 from ..progress import Progress, Task, subtask
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.
@@ -143,24 +143,14 @@ def _gradients(corner_uv: np.ndarray) -> np.ndarray:
     return np.divide(1j * edge, double_area, out=np.zeros_like(edge), where=double_area != 0)
 
 
-def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Find the edges that two triangles share on the surface and in the UV map.
-
-    Returns
-    -------
-    triangle, neighbor, edge, neighbor_edge : (n,) ndarray of int
-        The triangles, and the numbers of the edge in them.
-    """
-    triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
-    neighbor = mesh.neighbor[triangle, edge]
-    neighbor_edge = mesh.neighbor_edge[triangle, edge].astype(np.intp)
-    same = np.ones(len(triangle), dtype=bool)
-    for own, other in ((1, 2), (2, 1)):
-        difference = (
-            corner_uv[triangle, (edge + own) % 3] - corner_uv[neighbor, (neighbor_edge + other) % 3]
-        )
-        same &= np.abs(difference) <= SAME_UV
-    return triangle[same], neighbor[same], edge[same], neighbor_edge[same]
+def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> SharedEdges:
+    """Find the edges that two triangles share on the surface and in the UV map."""
+    edges = shared_edges(mesh)
+    same = np.ones(len(edges.triangle), dtype=bool)
+    for corners in edges.ends():
+        own, other = corner_uv.ravel()[corners.T]
+        same &= np.abs(own - other) <= SAME_UV
+    return SharedEdges(*(column[same] for column in edges))
 
 
 def uv_tangents_task(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> Task[np.ndarray]:
@@ -184,7 +174,7 @@ def _frames_task(
     mesh: TangentMesh,
     linear: np.ndarray,
     conjugate: np.ndarray,
-    edges: tuple[np.ndarray, ...],
+    edges: SharedEdges,
 ) -> Task[np.ndarray]:
     """(T, 3) complex128 `UvCharts.frame`; `edges` are those of `_chart_edges`."""
     # The rotation of the polar decomposition turns this tangent to the u axis.
@@ -197,7 +187,7 @@ def _averaged_at_corners_task(
     surface: Surface,
     mesh: TangentMesh,
     direction: np.ndarray,
-    edges: tuple[np.ndarray, ...],
+    edges: SharedEdges,
 ) -> Task[np.ndarray]:
     """Average directions at the corners of triangles over each smooth fan of a chart.
 
@@ -205,7 +195,7 @@ def _averaged_at_corners_task(
     ----------
     direction : (T,) complex128 ndarray
         Unit tangents.
-    edges : tuple of ndarray
+    edges : SharedEdges
         From `_chart_edges`.
 
     Returns
@@ -213,15 +203,10 @@ def _averaged_at_corners_task(
     (T, 3) complex128 ndarray
         Unit tangents.
     """
-    triangle, neighbor, edge, neighbor_edge = edges
     fan = surface.corner_fan[surface.triangles].ravel()
-    pairs = []
-    for own, other in ((1, 2), (2, 1)):
-        corner = 3 * triangle + (edge + own) % 3
-        neighbor_corner = 3 * neighbor.astype(np.intp) + (neighbor_edge + other) % 3
-        shared = fan[corner] == fan[neighbor_corner]
-        pairs.append(np.stack([corner[shared], neighbor_corner[shared]], axis=1))
-    task = connected_components_task(len(fan), np.concatenate(pairs))
+    pairs = np.concatenate(edges.ends())
+    pairs = pairs[fan[pairs[:, 0]] == fan[pairs[:, 1]]]
+    task = connected_components_task(len(fan), pairs)
     group = yield from subtask(task, 0.0, 0.6, STEP_LABEL)
     yield Progress(0.6, STEP_LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]

@@ -21,7 +21,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from .anisotropy import anisotropy_task
 from .charts import UvCharts, uv_charts_task
-from .hatching import lit_ink_task, thresholds_task
+from .hatching import hatching_task
 from .margin import margin_task
 from .texel_field import texel_field_task
 from .texel_noise import texel_noise_task
@@ -197,18 +197,16 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    is_data = content == "anisotropy" or (is_hatched(look) and light is None)
-    if content == "anisotropy":
-        pixels_task = anisotropy_task(on, look.guiding_angle)
-    elif is_hatched(look):
-        pixels_task = thresholds_task(on, field, surface_look, look.guiding_angle, cache)
-    else:
-        pixels_task = _colors_task(on, field, surface_look)
-    pixels = yield from subtask(pixels_task, 0.3, 0.95)
-    if pixels.shape[1] == 4 and light is not None:
-        pixels = yield from subtask(lit_ink_task(on, pixels, light, look), 0.95, 0.95)
     # Directions are relative to their chart.
     crosses_seams = content != "anisotropy"
+    if content == "anisotropy":
+        pixels_task, is_data = anisotropy_task(on, look.guiding_angle), True
+    elif is_hatched(look):
+        pixels_task = hatching_task(on, field, surface_look, look.guiding_angle, light, cache)
+        is_data = light is None
+    else:
+        pixels_task, is_data = _colors_task(on, field, surface_look), False
+    pixels = yield from subtask(pixels_task, 0.3, 0.95)
     filling_task = margin_task(frame, field, pixels, margin, crosses_seams=crosses_seams)
     image = yield from subtask(filling_task, 0.95, 1.0)
     if image.shape[2] == 4:

@@ -118,6 +118,34 @@ def thresholds_task(
     return pixels
 
 
+def hatching_task(
+    on: TexelSurface,
+    field: PixelField,
+    look: Look,
+    guiding_angle: float,
+    light: np.ndarray | None = None,
+    cache: Cache | None = None,
+) -> Task[np.ndarray]:
+    """Draw hatching at texels: its thresholds, or its ink for a light.
+
+    Parameters
+    ----------
+    on, field, look, guiding_angle, cache
+        As for `thresholds_task`.
+    light : (3,) ndarray, optional
+        Direction to a lamp, in world space.
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        From `thresholds_task` or `lit_ink_task`.
+    """
+    pixels = yield from subtask(thresholds_task(on, field, look, guiding_angle, cache), 0.0, 0.95)
+    if light is not None:
+        pixels = yield from subtask(lit_ink_task(on, pixels, light, look), 0.95, 1.0)
+    return pixels
+
+
 def lit_ink_task(
     on: TexelSurface, pixels: np.ndarray, light: np.ndarray, look: Look
 ) -> Task[np.ndarray]:
@@ -210,18 +238,13 @@ def _paper_grain_task(on: TexelSurface, field: PixelField, look: Look) -> Task[n
 
 def _wobble_angle_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
     """(P,) float32 angles between lines and field at `Look.wobble` 1."""
-    surface, texels = on.instance.surface, on.texels
-    rest = rest_positions(surface).astype(np.float32)
+    rest = rest_positions(on.instance.surface).astype(np.float32)
     grain = look.grain * on.step / matrix_scale(on.instance.matrix)
-    angle = np.empty(len(texels), dtype=np.float32)
+    angle = np.empty(len(on.texels), dtype=np.float32)
     for block in pixel_blocks(len(angle)):
         yield Progress(block.start / len(angle), "bending lines")
-        corners = surface.triangle_vertex.take(texels.triangle[block], axis=0).T
-        position = sum(
-            weight * rest.take(corner, axis=0).T
-            for weight, corner in zip(texels.barycentric[block].T, corners, strict=True)
-        )
-        angle[block] = solid_wobble_angle(position, np.float32(grain))
+        position = on.interpolated(rest, block)
+        angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(grain))
     return angle
 
 

@@ -23,7 +23,7 @@ from ..field.connection import connection_task, laplacian_task
 from ..field.representation import power
 from ..field.surface import connected_components_task, surface_task
 from ..field.surface_averages import SurfaceAverages
-from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
+from ..line_drawing.tangent_mesh import TangentMesh, nearest_member, shared_edges
 from ..progress import Progress, Task, subtask
 
 #: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
@@ -269,21 +269,7 @@ def _welded_task(mesh: TangentMesh) -> Task[tuple[np.ndarray, np.ndarray]]:
     triangle_vertex : (T, 3) int32 ndarray
         Indices of the corners into the points.
     """
-    triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
-    neighbor = mesh.neighbor[triangle, edge].astype(np.intp)
-    neighbor_edge = mesh.neighbor_edge[triangle, edge].astype(np.intp)
-    pairs = np.concatenate(
-        [
-            np.stack(
-                [
-                    3 * triangle + (edge + own) % 3,
-                    3 * neighbor + (neighbor_edge + other) % 3,
-                ],
-                axis=1,
-            )
-            for own, other in ((1, 2), (2, 1))
-        ]
-    )
+    pairs = np.concatenate(shared_edges(mesh).ends())
     task = connected_components_task(3 * len(mesh.neighbor), pairs)
     group = yield from subtask(task, 0.0, 1.0)
     points = np.empty((int(group.max()) + 1, 3))

@@ -7,13 +7,10 @@ import numpy as np
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
 from ..compositor.look import Look
 from ..compositor.surface_noise import instance_hashes, solid_noise
-from ..field.surface import Surface
 from ..progress import Progress, Task
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
-from .charts import UvCharts
 from .texel_surface import TexelSurface
-from .texels import Texels
 
 #: Smallest side of a cell of the noise, in texels of the coarser direction.
 MIN_CELL_TEXELS = 1.0
@@ -78,7 +75,7 @@ def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
         solid_noise(coordinates, size, block_hash, look.seed, look.density, out=total[:, block])
     if look.high_pass:
         sigma = BLUR_FACTOR * look.high_pass * step / scale
-        yield from _subtract_local_means_task(surface, charts, texels, rest, total, sigma)
+        yield from _subtract_local_means_task(on, rest, total, sigma)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
     for block in pixel_blocks(len(noise)):
         yield Progress(1.0, STEP_LABEL)
@@ -87,9 +84,7 @@ def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
 
 
 def _subtract_local_means_task(
-    surface: Surface,
-    charts: UvCharts,
-    texels: Texels,
+    on: TexelSurface,
     rest: np.ndarray,
     channels: np.ndarray,
     sigma: float,
@@ -106,27 +101,20 @@ def _subtract_local_means_task(
     sigma : float
         Of the blur, in Blender units of rest space.
     """
-    used = rest[surface.used_vertices]
+    texels = on.texels
+    used = rest[on.instance.surface.used_vertices]
     low, extent = used.min(axis=0), float(np.ptp(used, axis=0).max())
     side = max(GRID_CELL_SIGMAS * sigma, extent / (MAX_GRID_SIDE - 2))
     shape = (np.ptp(used, axis=0) / side).astype(np.intp) + 2
     stride = np.array([shape[1] * shape[2], shape[2], 1])
-    area = np.abs(charts.density)
+    area = np.abs(on.charts.density)
     area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
     count = len(texels)
     blocks = [slice(start, start + GRID_BLOCK) for start in range(0, count, GRID_BLOCK)]
 
     def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
         """Return the (n,) lowest points of the cells of texels, and (n, 3) places in the cells."""
-        triangle = texels.triangle[block]
-        position = np.zeros((len(triangle), 3), dtype=np.float32)
-        for corner, weight in zip(
-            surface.triangle_vertex.take(triangle, axis=0).T,
-            texels.barycentric[block].T,
-            strict=True,
-        ):
-            position += weight[:, None] * rest.take(corner, axis=0)
-        position = (position - low) / np.float32(side)
+        position = (on.interpolated(rest, block) - low) / np.float32(side)
         cell = np.clip(position.astype(np.intp), 0, shape - 2)
         return cell @ stride, np.clip(position - cell, 0, 1).astype(np.float32)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from ..line_drawing.tangent_mesh import TangentMesh
 from ..projection.gbuffer import MeshInstance
 from .charts import UvCharts
@@ -28,3 +30,11 @@ class TexelSurface(NamedTuple):
     charts: UvCharts
     texels: Texels
     step: float
+
+    def interpolated(self, vertex_values: np.ndarray, block: slice) -> np.ndarray:
+        """Interpolate (V, K) values of vertices at some of the texels: (n, K) float32."""
+        corners = self.instance.surface.triangle_vertex.take(self.texels.triangle[block], axis=0).T
+        total = np.zeros((corners.shape[1], vertex_values.shape[1]), dtype=np.float32)
+        for corner, weight in zip(corners, self.texels.barycentric[block].T, strict=True):
+            total += weight[:, None] * vertex_values.take(corner, axis=0)
+        return total

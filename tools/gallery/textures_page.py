@@ -13,7 +13,7 @@ from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.camera import orbit_basis, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.surface_texture.charts import uv_charts_task
@@ -71,7 +71,7 @@ def _write_hatching(instance: MeshInstance, uv: np.ndarray) -> None:
         look = load_preset(key).look
         thresholds = draw_texture(instance, uv, look, TEXTURE_SIDE).rgba
         for label, azimuth, elevation in lamps:
-            lamp = from_angles(FRONT[0] + azimuth, elevation)
+            lamp = orbit_basis(FRONT[0] + azimuth, elevation)[2]
 
             def inked(gbuffer: GBuffer, lamp=lamp, look=look, thresholds=thresholds) -> np.ndarray:
                 pixels = texture_at(thresholds, uv[instance.surface.triangles], gbuffer)
@@ -81,18 +81,6 @@ def _write_hatching(instance: MeshInstance, uv: np.ndarray) -> None:
 
             panels.append(Panel(view(instance, FRONT, inked, is_lit=False), label))
     save(sheet([panels[:2], panels[2:]]), IMAGES / "textures-hatching.png")
-
-
-def from_angles(azimuth: float, elevation: float) -> np.ndarray:
-    """Return the (3,) unit vector from the origin to a camera or a lamp, given angles in degrees."""
-    azimuth, elevation = np.radians(azimuth), np.radians(elevation)
-    return np.array(
-        [
-            np.sin(azimuth) * np.cos(elevation),
-            -np.cos(azimuth) * np.cos(elevation),
-            np.sin(elevation),
-        ]
-    )
 
 
 def unwrapped_suzanne() -> tuple[Surface, np.ndarray]:

@@ -15,19 +15,27 @@ SQUARE = ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
 UV = np.array(SQUARE[0])[:, :2] * 0.9 + 0.05
 
 
-def test_the_command_draws_the_same_texture(tmp_path):
-    """Also that of the preset and the settings."""
+@pytest.mark.parametrize(
+    "words, options",
+    [
+        (["--preset", "plaid"], {"preset": "plaid"}),
+        (
+            ["--preset", "engraving", "--light", "-1,0.5,2"],
+            {"preset": "engraving", "light": (-1, 0.5, 2)},
+        ),
+    ],
+)
+def test_the_command_draws_the_same_texture(tmp_path, words, options):
+    """Also that of the preset, the light and the settings."""
     lines = [f"v {x} {y} {z}" for x, y, z in SQUARE[0]] + [f"vt {u} {v}" for u, v in UV]
     path = tmp_path / "square.obj"
     path.write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4"]))
     out = tmp_path / "square.png"
-    words = ["--generate", "uv", "--degree", "2", "--size", "64", "--margin", "3"]
-    look = ["--preset", "plaid", "--set", "seed=3"]
-    assert main(["texture", str(path), "-o", str(out), *words, *look]) == 0
+    common = ["--generate", "uv", "--degree", "2", "--size", "64", "--margin", "3"]
+    arguments = ["texture", str(path), "-o", str(out), *common, *words, "--set", "seed=3"]
+    assert main(arguments) == 0
     surface = rf.Surface(path)
-    texture = rf.texture(
-        surface, rf.along_uv(surface, 2), size=64, margin=3, preset="plaid", seed=3
-    )
+    texture = rf.texture(surface, rf.along_uv(surface, 2), size=64, margin=3, seed=3, **options)
     assert list(texture.tiles) == [1001] and texture.overlap == 0
     (picture,) = texture.tiles.values()
     picture.save(tmp_path / "same.png")

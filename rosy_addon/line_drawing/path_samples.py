@@ -67,7 +67,7 @@ class SampledPath:
         self._end = np.cumsum(length)
         first = np.searchsorted(particle, np.arange(len(sign) + 1))
         before = np.concatenate([[0.0], self._end])
-        self._start = before[first[:-1]]
+        self._first_segment, self._start = first[:-1], before[first[:-1]]
         #: (n,) float64: lengths of the paths, in world space.
         self.length = before[first[1:]] - self._start
 
@@ -108,7 +108,9 @@ class SampledPath:
             )
             along = self._start[particle] + arc
             segment = np.searchsorted(self._end, along - ARC_EPS * step)
-            fraction = 1 - (self._end[segment] - along) / path.length[segment]
+            segment = np.maximum(segment, self._first_segment[particle])
+            length, rest = path.length[segment], self._end[segment] - along
+            fraction = 1 - np.divide(rest, length, out=np.zeros_like(rest), where=length > 0)
             begin, end = path.begin_weights[segment], path.end_weights[segment]
             position = SurfaceParticles(
                 path.triangle[segment],

@@ -374,7 +374,7 @@ def planes_around(
             facing = dot(normal, eye)
             # Distance of the point behind the plane: along the normal, then along the view ray.
             behind_plane = depth_buffer.offset[triangle] - dot(normal, points)
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 distance = np.where(facing != 0, behind_plane / facing, 0) * length
                 steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
             steepness = np.minimum(

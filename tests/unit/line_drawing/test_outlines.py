@@ -7,6 +7,7 @@ import pytest
 from conftest import long
 from shapes import cylinder, from_quads, grid_of_quads, icosphere, torus
 
+import rosy_addon.api as rf
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
@@ -110,6 +111,14 @@ def test_silhouettes_of_flat_faces_are_edges():
     assert set(lines.family.tolist()) == {lines.names.index("silhouettes")}
     assert pixel_lengths(lines, camera).min() >= MIN_MARK_PX
     assert coverage(lines, flat, camera, tolerance=1.0) >= 0.98
+
+
+def test_walls_seen_almost_edge_on_have_outlines():
+    """Also if the angle to the line of sight is so small that its square is not a number."""
+    corners = [[0, 0, 0], [0, 0, 2.5], [0, 1.3, 2.5], [0, 1.3, 0]]
+    wall = rf.Surface(corners, [[0, 1, 2], [0, 2, 3]], name="wall", up="y")
+    field = rf.along_axis(wall, (0, 1, 0.3), 2)
+    rf.strokes(wall, field, view=(-3.5e-160, 0), size=(15, 28), outline=True)
 
 
 @pytest.mark.slow

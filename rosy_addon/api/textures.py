@@ -106,7 +106,7 @@ def texture(
     size: int = DEFAULT_SIZE,
     margin: int = DEFAULT_MARGIN,
     udim: bool = False,
-    light: ArrayLike | None = None,
+    light_direction: ArrayLike | None = None,
     content: str = "look",
     preset: str | os.PathLike[str] | None = None,
     **settings: Any,
@@ -130,13 +130,13 @@ def texture(
     udim : bool
         Whether each tile of the UV map has a picture of its own. Otherwise, the texture repeats beyond u
         and v from 0 to 1.
-    light : (3,) array_like, optional
+    light_direction : (3,) array_like, optional
         Direction to a lamp, in the space of the surface. Hatching is then drawn as ink for this lamp, for
         renderers that have no shader for thresholds.
-    content : {"look", "anisotropy"}
-        What the texture shows: the picture of the look, or the direction of the field as an anisotropy map
-        of glTF. That has the line nearest to the `guiding_angle`: red and green are its components along
-        tangent and bitangent, from -1 to 1, blue is the strength, 0 where the field is undefined.
+    content : {"look", "anisotropy", "flow"}
+        What the texture shows: the picture of the look, or the direction of the field, near to the
+        `guiding_angle`. Red and green are its components, from -1 to 1: along tangent and bitangent in an
+        anisotropy map of glTF, along u and v in a flow map. Blue is 1, and 0 where the field is undefined.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     **settings
@@ -184,7 +184,7 @@ def texture(
         margin=margin,
         is_udim=udim,
         content=content,
-        light=None if light is None else _in_world(light, instance),
+        light=None if light_direction is None else _in_world(light_direction, instance),
     )
     drawn = run_to_completion(task)
     warn(drawn.overlap_note(surface.name))
@@ -197,7 +197,7 @@ def texture(
     return Texture({number: Picture(rgba) for number, rgba in tiles.items()}, drawn.overlap)
 
 
-def _in_world(light: ArrayLike, instance: MeshInstance) -> NDArray[np.float64]:
+def _in_world(light_direction: ArrayLike, instance: MeshInstance) -> NDArray[np.float64]:
     """Return the direction to a lamp in world space.
 
     Raises
@@ -205,10 +205,10 @@ def _in_world(light: ArrayLike, instance: MeshInstance) -> NDArray[np.float64]:
     RosyError
         If it is not three finite numbers, or all of them are 0.
     """
-    direction = np.asarray(light, dtype=np.float64)
+    direction = np.asarray(light_direction, dtype=np.float64)
     if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
         raise RosyError(
-            "the light must be three numbers, the direction to a lamp: not all of them 0"
+            "light_direction must be three numbers, the direction to a lamp: not all of them 0"
         )
     world: NDArray[np.float64] = np.asarray(instance.matrix)[:3, :3] @ direction
     return world

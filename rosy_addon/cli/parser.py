@@ -19,7 +19,7 @@ from .strokes import add_strokes_command
 from .texture import add_texture_command
 
 #: Options whose values may begin with a minus sign.
-NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--light", "--frames")
+NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--light-direction", "--frames")
 
 #: Commands that may need Blender.
 BLENDER_VERBS = {"bake", "strokes", "turntable", "film"}

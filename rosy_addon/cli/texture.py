@@ -49,7 +49,7 @@ def add_texture_command(subparsers: Any, extras: Extras) -> None:
         help="width of the margin around charts, in texels (%(default)d)",
     )
     parser.add_argument(
-        "--light",
+        "--light-direction",
         type=float_tuple(3, "X,Y,Z"),
         metavar="X,Y,Z",
         help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
@@ -77,7 +77,7 @@ def run_texture(options: argparse.Namespace) -> None:
             field,
             size=options.size,
             margin=options.margin,
-            light=options.light,
+            light_direction=options.light_direction,
             content=options.content,
             udim=UDIM_TOKEN in options.output.name,
             preset=preset,

@@ -302,7 +302,7 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
     if rng.random() < 0.5:
         words += ["--set", "ink=hatch"]
     output = "out.<UDIM>.png" if rng.random() < 0.2 else "out.png"
-    outputs = {output, *(f"out.{number}.png" for number in range(1001, 1101))}
+    outputs = {output, *(f"out.{number}.png" for number in range(1001, 2001))}
     return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)
 
 

@@ -131,7 +131,7 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "reach": _number(0, 10, (0.0, 0.05, 0.3)),
     "sharp_angle": _number(0, 180, (30.0, 80.0)),
     "view": _numbers(2, 60.0),
-    "light": _numbers(3, 1.0),
+    "light_direction": _numbers(3, 1.0),
     "size": _size,
     "margin": lambda rng: str(rng.choice([0, 1, 4, 16, 512, -1])),
     "workers": lambda rng: str(rng.integers(-1, 5)),

@@ -20,8 +20,8 @@ UV = np.array(SQUARE[0])[:, :2] * 0.9 + 0.05
     [
         (["--preset", "plaid"], {"preset": "plaid"}),
         (
-            ["--preset", "engraving", "--light", "-1,0.5,2"],
-            {"preset": "engraving", "light": (-1, 0.5, 2)},
+            ["--preset", "engraving", "--light-direction", "-1,0.5,2"],
+            {"preset": "engraving", "light_direction": (-1, 0.5, 2)},
         ),
     ],
 )
@@ -88,10 +88,12 @@ def test_hatching_for_one_light():
     assert abs(np.corrcoef(red, green)[0, 1]) < 0.1
     for cosine in (0.2, 0.5, 0.9):
         light = (0, np.sqrt(1 - cosine**2), cosine)
-        ink = rf.texture(square, field, size=512, margin=0, light=light, **settings).tiles[1001]
+        ink = rf.texture(
+            square, field, size=512, margin=0, light_direction=light, **settings
+        ).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
         clear = rf.texture(
-            square, field, size=512, margin=0, light=light, clear_paper=True, **settings
+            square, field, size=512, margin=0, light_direction=light, clear_paper=True, **settings
         ).tiles[1001]
         assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
         assert clear.rgba[..., :3].max() < 0.01

@@ -18,6 +18,7 @@ from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.meshes import mesh_surface_task
 from ..rosy_addon.scene.read_field import read_mesh_field
+from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents_task
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
@@ -31,6 +32,12 @@ DEGREE_ITEMS = [
         for degree in range(1, MAX_DEGREE + 1)
     ),
 ]
+
+#: Forms in which a field can be stored, and what shaders need of it.
+FORMS = {
+    **STORAGE_FORMS,
+    "TANGENT": ("Tangents", "One direction on each corner, for the Tangent input of shaders"),
+}
 
 
 def _get_degree(operator: bpy.types.OperatorProperties) -> int:
@@ -167,16 +174,19 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     form: bpy.props.EnumProperty(
         name="Store As",
         description="Form in which the field is stored",
-        items=[(form, name, text) for form, (name, text) in STORAGE_FORMS.items()],
+        items=[(form, name, text) for form, (name, text) in FORMS.items()],
     )
     attribute: bpy.props.StringProperty(
         name="Attribute",
-        description="Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles",
+        description="Name of the attribute. Empty: the name of the field for vectors, 'rosy_angle' for angles, "
+        "'rosy_tangent' for tangents",
     )
 
     def make_task(self, context: bpy.types.Context) -> Task[int]:
         """Read all fields, then store them. Return the number of meshes."""
         meshes = list(self.required_data(context))
+        if self.form == "TANGENT":
+            return (yield from self._store_tangents(context, meshes))
         fields = {}
         for index, mesh in enumerate(meshes):
             start, stop = index / len(meshes), (index + 1) / len(meshes)
@@ -187,8 +197,22 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         assign_fields(fields, self.attribute, self.form)
         return len(fields)
 
+    def _store_tangents(
+        self, context: bpy.types.Context, meshes: list[bpy.types.Mesh]
+    ) -> Task[int]:
+        """Store the tangents of all fields."""
+        guiding_angle = context.scene.rosy.look.guiding_angle
+        tangents = {}
+        for index, mesh in enumerate(meshes):
+            start, stop = index / len(meshes), (index + 1) / len(meshes)
+            task = mesh_tangents_task(mesh, guiding_angle)
+            tangents[mesh] = yield from subtask(task, start, stop)
+        yield Progress(1.0, "storing the tangents")
+        assign_tangents(tangents, self.attribute)
+        return len(tangents)
+
     def finish(self, context: bpy.types.Context, result: int) -> None:
-        self.report({"INFO"}, f"Stored {counted(result, 'field')} as {STORAGE_FORMS[self.form][0]}")
+        self.report({"INFO"}, f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

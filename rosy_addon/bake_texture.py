@@ -43,6 +43,7 @@ def bake_texture_task(
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     look: Look | None = None,
+    content: str | None = None,
     settings: OutputSettings | None = None,
 ) -> Task[list[TextureResult]]:
     """Draw the fields of objects as textures for their UV maps, and show them on the objects.
@@ -59,6 +60,8 @@ def bake_texture_task(
         By default `scene_depsgraph`.
     look : Look, optional
         By default the scene's.
+    content : str, optional
+        What the textures show, one of `surface_texture.draw.CONTENTS`; by default the scene's.
     settings : OutputSettings, optional
         How the textures are stored; by default as the pictures of the scene.
 
@@ -76,6 +79,7 @@ def bake_texture_task(
         If an object has no field or no UV map, or the texture cannot be drawn or stored.
     """
     look = read_look(scene.rosy) if look is None else look
+    content = scene.rosy.texture_content.lower() if content is None else content
     settings = read_output_settings(scene) if settings is None else settings
     for obj in objects:
         uv_map_name(obj)
@@ -90,7 +94,13 @@ def bake_texture_task(
         texture_input = yield from subtask(reading, start, start)
         state = read_texture_state(scene, depsgraph, obj)
         task = draw_texture_task(
-            texture_input.instance, texture_input.uv, look, size, margin=margin, cache=BAKE_CACHE
+            texture_input.instance,
+            texture_input.uv,
+            look,
+            size,
+            margin=margin,
+            content=content,
+            cache=BAKE_CACHE,
         )
         texture = yield from subtask(task, start, stop)
         png = None
@@ -101,7 +111,7 @@ def bake_texture_task(
         note = texture.overlap_note(f"object '{obj.name}'")
         warnings = (note,) if note else ()
         hatching = None
-        if texture.is_data:
+        if content == "look" and texture.is_data:
             hatching = Hatching(look, texture.line_count)
         image_data = ImageData(texture.rgba, png)
         drawn.append((texture_input.source, image_data, state, hatching, warnings))
@@ -110,7 +120,7 @@ def bake_texture_task(
     return [
         TextureResult(
             source.obj,
-            apply_texture(scene, source, image_data, settings, state, hatching),
+            apply_texture(scene, source, image_data, settings, state, content, hatching),
             warnings,
         )
         for source, image_data, state, hatching, warnings in drawn
@@ -123,9 +133,10 @@ def bake_texture(
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     look: Look | None = None,
+    content: str | None = None,
     settings: OutputSettings | None = None,
 ) -> list[TextureResult]:
     """Run `bake_texture_task` to its end."""
     return run_to_completion(
-        bake_texture_task(scene, objects, depsgraph, look=look, settings=settings)
+        bake_texture_task(scene, objects, depsgraph, look=look, content=content, settings=settings)
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import unicodedata
 import zlib
-from typing import Literal
 
 import bpy
 
@@ -13,10 +12,10 @@ import bpy
 MAX_STEM_BYTES = 180
 
 
-def picture_stem(name: str, kind: Literal["camera", "scene", "texture"] = "camera") -> str:
+def picture_stem(name: str, kind: str = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
 
-    Those of the texture of an object are such as ``RoSy_Cube_texture``.
+    Those of an object are such as ``RoSy_Cube_texture``, with the kind of texture.
 
     Characters that file systems do not allow become underscores, and long names are cut. If cameras
     or scenes would then have the same file, also where file systems ignore case, one of them has
@@ -25,8 +24,8 @@ def picture_stem(name: str, kind: Literal["camera", "scene", "texture"] = "camer
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
-    if kind == "texture":
-        siblings |= {("texture", obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
+    if kind not in ("camera", "scene"):
+        siblings |= {(kind, obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
     siblings.add((kind, name))
     stem = _clean_stem(*_label(kind, name))
     rivals = [key for key in siblings if _file_key(_clean_stem(*_label(*key))) == _file_key(stem)]
@@ -38,7 +37,7 @@ def picture_stem(name: str, kind: Literal["camera", "scene", "texture"] = "camer
 
 def _label(kind: str, name: str) -> tuple[str, str]:
     """Return what the stem consists of: a name, and what follows it."""
-    return name, " texture" if kind == "texture" else ""
+    return name, "" if kind in ("camera", "scene") else f" {kind}"
 
 
 def _clean_stem(name: str, ending: str) -> str:

@@ -20,7 +20,7 @@ from ..field.rosy_field import MAX_DEGREE
 from ..file_io import read_bytes
 from ..projection.camera import Camera
 from ..settings import settings_of
-from ..surface_texture.draw import TEXTURE_SETTINGS
+from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .lights import rendered_lights
@@ -46,8 +46,8 @@ from .tone_inputs import (
 #: drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
-#: Those that decide how a texture is stored.
-TEXTURE_OUTPUT = ("store", "directory", "image_format")
+#: Those that decide what a texture shows, and how it is stored.
+TEXTURE_OUTPUT = ("texture_content", "store", "directory", "image_format")
 
 
 @dataclass(frozen=True)
@@ -313,12 +313,12 @@ def read_texture_state(
     output = {name: getattr(settings, name) for name in TEXTURE_OUTPUT}
     if output["store"] == "PACKED":
         del output["directory"]
+    if settings.texture_content == "LOOK":
+        names = [name for name in TEXTURE_SETTINGS if settings_of(Look)[name].applies(look)]
+    else:
+        names = DIRECTION_SETTINGS
     return PictureState(
-        look={
-            name: getattr(look, name)
-            for name in TEXTURE_SETTINGS
-            if settings_of(Look)[name].applies(look)
-        },
+        look={name: getattr(look, name) for name in names},
         size=[settings.texture_size, settings.texture_size],
         camera=_digest(*uv_parts),
         output=output,

@@ -26,7 +26,12 @@ TTL_READINGS = 10.0
 _WATCHED_EVENTS = ("depsgraph_update_post", "frame_change_post", "undo_post", "redo_post")
 
 #: How reasons call the properties of the output.
-_OUTPUT_LABELS = {"store": "storage", "directory": "folder", "image_format": "format"}
+_OUTPUT_LABELS = {
+    "texture_content": "content",
+    "store": "storage",
+    "directory": "folder",
+    "image_format": "format",
+}
 
 
 class SceneStateCache:
@@ -124,6 +129,9 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
     source : str
         The camera, or the UV map of a texture, for the reason.
     """
+    content = present.output.get("texture_content")
+    if recorded.output.get("texture_content") != content:
+        return "the content was changed"
     if recorded.look != present.look:
         return "the look was changed"
     if recorded.size != present.size and present.size:

@@ -27,7 +27,7 @@ from .picture_state import PictureState
 from .pictures import OutputSettings
 from .read_view import nonfinite_policy
 from .scene_reader import read_scene_task
-from .texture_nodes import new_hatching_material, new_texture_material
+from .texture_nodes import new_anisotropy_material, new_hatching_material, new_texture_material
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +105,7 @@ def apply_texture(
     image_data: ImageData,
     settings: OutputSettings,
     state: PictureState,
+    content: str = "look",
     hatching: Hatching | None = None,
 ) -> bpy.types.Image:
     """Show a texture on its object, and return its image. An older one is replaced.
@@ -118,6 +119,8 @@ def apply_texture(
     image_data : ImageData
     settings : OutputSettings
     state : PictureState
+    content : str
+        What the image shows; see `surface_texture.draw.CONTENTS`.
     hatching : Hatching, optional
         How hatching is drawn, if the image has thresholds of ink and not colors.
 
@@ -130,13 +133,17 @@ def apply_texture(
     name = f"RoSy {obj.name}"
     stem = None
     if settings.folder is not None:
-        stem = settings.folder / picture_stem(obj.name, "texture")
+        kind = "texture" if content == "look" else content
+        stem = settings.folder / picture_stem(obj.name, kind)
     with rollback_on_error() as created:
+        is_color = content == "look" and hatching is None
         image = new_image(
-            name, image_data, as_float=settings.as_float, is_color=hatching is None, stem=stem
+            name, image_data, as_float=settings.as_float, is_color=is_color, stem=stem
         )
         created.append(image)
-        if hatching is None:
+        if content == "anisotropy":
+            material = new_anisotropy_material(name, image, source.uv_map)
+        elif hatching is None:
             material = new_texture_material(name, image, source.uv_map)
         else:
             group, is_new = hatching_group()

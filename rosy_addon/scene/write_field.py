@@ -134,7 +134,7 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
 
 def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> None:
     """Raise an error if `write_mesh_field` cannot store a field. Nothing is changed."""
-    _check_writable(mesh)
+    check_writable(mesh)
     face_count = len(mesh.polygons)
     if len(field.vectors) != face_count:
         raise RosyError(
@@ -181,7 +181,7 @@ def _write_directions(mesh: bpy.types.Mesh, field: RosyField, name: str) -> bpy.
     return mesh.attributes["dir0"]
 
 
-def _check_writable(mesh: bpy.types.Mesh) -> None:
+def check_writable(mesh: bpy.types.Mesh) -> None:
     """Raise an error if a mesh is linked from a library or in edit mode."""
     if not is_editable(mesh):
         library = mesh.library.filepath if mesh.library else "its library"

@@ -19,8 +19,8 @@ from ..memory import check_memory, raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
-from .anisotropy import anisotropy_task
 from .charts import UvCharts, uv_charts_task
+from .direction_maps import direction_map_task
 from .hatching import hatching_task
 from .margin import margin_task
 from .texel_field import texel_field_task
@@ -55,8 +55,12 @@ DEFAULT_MARGIN, MAX_MARGIN = 16, 512
 #: What a texture can show, with descriptions.
 CONTENTS = {
     "look": "The picture of the look",
-    "anisotropy": "The direction of the field, as an anisotropy map of glTF",
+    "anisotropy": "The direction of the field as an anisotropy map of glTF, for brushed metal",
+    "flow": "The direction of the field as a flow map, for moving textures",
 }
+
+#: The settings of a look that a map of directions is drawn with.
+DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle")
 
 #: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
@@ -197,17 +201,17 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    # Directions are relative to their chart.
-    crosses_seams = content != "anisotropy"
-    if content == "anisotropy":
-        pixels_task, is_data = anisotropy_task(on, look.guiding_angle), True
+    is_direction = content != "look"
+    if is_direction:
+        pixels_task, is_data = direction_map_task(on, content, look.guiding_angle), True
     elif is_hatched(look):
         pixels_task = hatching_task(on, field, surface_look, look.guiding_angle, light, cache)
         is_data = light is None
     else:
         pixels_task, is_data = _colors_task(on, field, surface_look), False
     pixels = yield from subtask(pixels_task, 0.3, 0.95)
-    filling_task = margin_task(frame, field, pixels, margin, crosses_seams=crosses_seams)
+    # Directions are relative to their chart.
+    filling_task = margin_task(frame, field, pixels, margin, crosses_seams=not is_direction)
     image = yield from subtask(filling_task, 0.95, 1.0)
     if image.shape[2] == 4:
         return Texture(frame, image, texels.overlap, is_data, mesh.family_count)

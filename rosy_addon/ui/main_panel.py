@@ -169,9 +169,15 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     column = body.column()
     if obj is not None and obj.type == "MESH" and obj.data.uv_layers:
         column.prop_search(obj.rosy, "texture_uv_map", obj.data, "uv_layers")
-    column.prop(context.scene.rosy, "texture_size")
-    column.prop(context.scene.rosy, "texture_margin")
+    settings = context.scene.rosy
+    column.prop(settings, "texture_content")
+    if settings.texture_content != "LOOK":
+        column.prop(settings.look, "guiding_angle")
+    column.prop(settings, "texture_size")
+    column.prop(settings, "texture_margin")
     column.operator("rosy.bake_texture", icon="TEXTURE")
+    if settings.texture_content == "ANISOTROPY" and context.scene.render.engine != "CYCLES":
+        column.label(text="Only Cycles draws anisotropy", icon="INFO")
 
 
 def _draw_live_toggle(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

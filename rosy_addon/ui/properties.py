@@ -17,7 +17,14 @@ from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
-from ..surface_texture.draw import DEFAULT_MARGIN, DEFAULT_SIZE, MAX_MARGIN, MAX_SIZE, MIN_SIZE
+from ..surface_texture.draw import (
+    CONTENTS,
+    DEFAULT_MARGIN,
+    DEFAULT_SIZE,
+    MAX_MARGIN,
+    MAX_SIZE,
+    MIN_SIZE,
+)
 from . import preset_library
 
 CAMERA_ITEMS = [
@@ -58,6 +65,7 @@ COLOR_ARGUMENTS = {
     "max": 1,
     "default": (0.0, 0.0, 0.0),
 }
+TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
 IMAGE_FORMAT_ITEMS = [
     ("BYTE", "8-Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
     ("FLOAT", "Float", "Linear values in an .exr file"),
@@ -278,6 +286,9 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Format",
         description="Bit depth and file format of the picture",
         items=IMAGE_FORMAT_ITEMS,
+    )
+    texture_content: bpy.props.EnumProperty(
+        name="Content", description="What a texture shows", items=TEXTURE_CONTENT_ITEMS
     )
     texture_size: bpy.props.IntProperty(
         name="Size",

@@ -90,7 +90,7 @@ def convert_field(monkey):
 @action(3, uses_rosy=True)
 def store_field(monkey):
     select_mesh(monkey)
-    form = monkey.pick(["VECTOR", "DIRECTIONS", "ANGLE"])
+    form = monkey.pick(["VECTOR", "DIRECTIONS", "ANGLE", "TANGENT"])
     monkey.rosy("field_store", form=form, **attribute_argument(monkey))
 
 
@@ -275,6 +275,7 @@ def bake_texture(monkey):
     obj, settings = select_mesh(monkey), bpy.context.scene.rosy
     settings.texture_size = monkey.pick([16, 64, 128])
     settings.texture_margin = monkey.pick([0, 2, 16])
+    settings.texture_content = monkey.pick(["LOOK", "LOOK", "ANISOTROPY", "FLOW"])
     if monkey.chance(0.7):
         settings.look.ink = "soft"
     if obj is not None and obj.library is None:

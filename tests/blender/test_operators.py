@@ -377,6 +377,13 @@ def test_store(suzanne, form):
     assert "energy" not in names_of_readable_field(suzanne)
 
 
+def test_store_refuses_a_name_of_another_type(suzanne):
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    before = contents()
+    message = error_of(bpy.ops.rosy.field_store, form="TANGENT", attribute="rosy")
+    assert "'rosy'" in message and contents() == before
+
+
 def names_of_readable_field(obj):
     """Check that the stored field can be read, and return the names of the attributes."""
     assert bpy.ops.rosy.field_convert(angle=0.0) == {"FINISHED"}

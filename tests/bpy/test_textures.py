@@ -130,6 +130,23 @@ def test_folder_gets_a_file(scene, camera, monkey, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == [f"RoSy_{monkey.name}_texture.png"]
 
 
+def test_maps_of_directions(scene, textured, tmp_path):
+    """Each has a file of its own. They depend on the guiding angle, and not on colors."""
+    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path)
+    for content in ("ANISOTROPY", "FLOW"):
+        scene.rosy.texture_content = content
+        assert stale_reason(scene) == "the content was changed"
+        (result,) = bake_texture(scene, [textured])
+        assert result.image.colorspace_settings.name == "Non-Color"
+        scene.rosy.look.grain += 1
+        assert stale_reason(scene) == ""
+        scene.rosy.look.guiding_angle += 1
+        assert stale_reason(scene) == "the look was changed"
+        scene.rosy.look.guiding_angle = 0
+    names = sorted(file.name.removeprefix(f"RoSy_{textured.name}_") for file in tmp_path.iterdir())
+    assert names == ["anisotropy.png", "flow.png"]
+
+
 def test_what_is_refused_changes_nothing(scene, camera, monkey):
     scene.rosy.texture_size = 64
     monkey.rosy.texture_uv_map = "None"

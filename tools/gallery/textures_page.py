@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+
 import numpy as np
 
 from rosy_addon.color import to_linear
@@ -10,6 +12,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.image_io.png import png_task
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
@@ -62,6 +65,79 @@ def write() -> None:
         IMAGES / "textures-seams.png",
     )
     _write_hatching(instance, uv)
+    _write_highlights(instance, uv)
+
+
+def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
+    """Render and save the pictures of brushed metal: one field, two guiding angles, and without a map."""
+    import bpy
+
+    from rosy_addon.scene.blender_images import ImageData, new_image
+    from rosy_addon.scene.texture_nodes import new_anisotropy_material
+
+    scene, obj = bpy.context.scene, bpy.context.object
+    obj.data.shade_smooth()
+    _light_metal(scene)
+    panels = []
+    for label, angle in (("horizontal strokes", 0.0), ("vertical strokes", np.pi / 2)):
+        look = Look(guiding_angle=angle)
+        pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
+        png = run_to_completion(png_task(pixels, is_color=False))
+        image = new_image("map", ImageData(pixels, png), is_color=False)
+        material = new_anisotropy_material("metal", image, obj.data.uv_layers.active.name)
+        obj.data.materials.clear()
+        obj.data.materials.append(material)
+        panels.append(Panel(_rendered(scene), label))
+    save(sheet([panels]), IMAGES / "textures-highlights.png")
+
+
+def _light_metal(scene) -> None:
+    """Add a camera, a dim world and bright panels that a metal reflects."""
+    import bpy
+
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.data.lens = 85.0
+    axes = orbit_basis(*FRONT)
+    camera.matrix_world = _placed(axes, 7.0)
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.15, 0.15, 0.15)
+    for azimuth, elevation, power in ((-50, 30, 250), (30, 60, 300), (75, 5, 250)):
+        lamp = bpy.data.objects.new("Panel", bpy.data.lights.new("Panel", "AREA"))
+        scene.collection.objects.link(lamp)
+        lamp.data.energy, lamp.data.size = power, 1.0
+        axes = orbit_basis(FRONT[0] + azimuth, elevation)
+        lamp.matrix_world = _placed(axes, 4.0)
+
+
+def _placed(axes: np.ndarray, distance: float):
+    """Return the matrix of an object that looks at the origin along the last axis."""
+    from mathutils import Matrix
+
+    return Matrix([*np.c_[axes.T, distance * axes[2]].tolist(), [0, 0, 0, 1]])
+
+
+def _rendered(scene) -> np.ndarray:
+    """Return (SIDE, SIDE, 3) uint8 from the top, rendered with Cycles."""
+    import bpy
+
+    scene.render.engine, scene.cycles.samples = "CYCLES", 256
+    scene.cycles.use_denoising, scene.cycles.max_bounces = False, 2
+    scene.cycles.sample_clamp_indirect = 1.0
+    scene.render.film_transparent = True
+    scene.render.resolution_x = scene.render.resolution_y = SIDE
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.view_settings.view_transform = "Standard"
+    with tempfile.TemporaryDirectory() as folder:
+        scene.render.filepath = f"{folder}/picture.exr"
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(scene.render.filepath)
+        rgba = np.empty((SIDE, SIDE, 4), dtype=np.float32)
+        image.pixels.foreach_get(rgba.ravel())
+        bpy.data.images.remove(image)
+    rgba[..., :3] /= np.maximum(rgba[..., 3:], 1e-6)
+    return display(rgba)
 
 
 def _write_hatching(instance: MeshInstance, uv: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""The anisotropy map of glTF decodes to the direction of the field."""
+"""Anisotropy maps and flow maps decode to the direction of the field."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from uv_maps import patches_uv, torus_uv
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.draw import draw_texture
 
@@ -80,3 +81,17 @@ def test_directions_do_not_turn_over_within_a_chart():
     inside = rgba[40:200, 40:470, :2]
     for axis in (0, 1):
         assert np.abs(np.diff(inside, axis=axis)).max() < 0.1
+
+
+def test_flow_maps_have_directions_in_the_map():
+    """On a map that is sheared and stretched, a field along a line goes along the image of that line."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=np.float64)
+    to_uv = np.array([[0.7, 0.2], [-0.1, 0.3]])
+    square = build_surface(points, [0, 1, 2, 3], [0, 4])
+    along = np.array([np.cos(0.4), np.sin(0.4)])
+    instance = MeshInstance(square, np.eye(4), RosyField(1, np.append(along, 0)[None]))
+    uv = points[:, :2] @ to_uv.T + [0.15, 0.2]
+    texture = draw_texture(instance, uv, Look(), 64, margin=0, content="flow")
+    expected = to_uv @ along / np.linalg.norm(to_uv @ along)
+    decoded = 2 * texture.rgba[..., :2] - 1
+    np.testing.assert_allclose(decoded, np.broadcast_to(expected, decoded.shape), atol=1e-5)

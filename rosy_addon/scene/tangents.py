@@ -1,0 +1,78 @@
+"""One direction of a field on each corner of a mesh, as an attribute for the Tangent input of shaders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import bpy
+import numpy as np
+
+from ..line_drawing.tangent_mesh import tangent_mesh_task
+from ..progress import Task, subtask
+from ..projection.gbuffer import MeshInstance
+from ..surface_texture.direction_maps import corner_directions_task
+from .field_attributes import VECTOR_TYPE, check_attribute_type, get_or_create_attribute
+from .meshes import mesh_surface_task
+from .read_field import read_mesh_field_task
+from .write_field import check_writable
+
+#: Name of the attribute.
+DEFAULT_TANGENT_NAME = "rosy_tangent"
+
+
+def mesh_tangents_task(mesh: bpy.types.Mesh, guiding_angle: float) -> Task[np.ndarray]:
+    """Compute one direction of a mesh's field on each corner.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    guiding_angle : float
+        Angle from the horizontal direction, in radians, of the line that the direction is near to.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (C, 3) float32 ndarray
+        Unit vectors in object space; 0 where the field is undefined.
+
+    Raises
+    ------
+    RosyError
+        If there is no field.
+    """
+    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.1)
+    field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.1, 0.2)
+    instance = MeshInstance(surface, np.eye(4), field)
+    tangent_mesh = yield from subtask(tangent_mesh_task(instance), 0.2, 0.4)
+    vectors = yield from subtask(corner_directions_task(tangent_mesh, guiding_angle), 0.4, 1.0)
+    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
+    tangents[surface.triangles] = vectors
+    return tangents
+
+
+def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:
+    """Store tangents on the corners of meshes, all or none of them.
+
+    Parameters
+    ----------
+    tangents : mapping of bpy.types.Mesh to (C, 3) float32 ndarray
+    name : str
+        Name of the attribute; `DEFAULT_TANGENT_NAME` if it is empty.
+
+    Raises
+    ------
+    RosyError
+        If a mesh is linked from a library or in edit mode, or has an attribute of the name with
+        another type or domain. Nothing is changed in this case.
+    """
+    name = name or DEFAULT_TANGENT_NAME
+    for mesh in tangents:
+        check_writable(mesh)
+        check_attribute_type(mesh, name, VECTOR_TYPE, "CORNER")
+    for mesh, vectors in tangents.items():
+        attribute = get_or_create_attribute(mesh, name, VECTOR_TYPE, "CORNER")
+        attribute.data.foreach_set("vector", vectors.ravel())
+        mesh.update()

@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from .cache import BAKE_CACHE
 from .compositor.look import Look
+from .compositor.shading import Light
+from .errors import RosyError
 from .image_io.png import png_task
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.blender_images import ImageData
+from .scene.lights import read_lights
 from .scene.look_properties import read_look
-from .scene.picture_state import read_texture_state
+from .scene.picture_state import bakes_light, read_texture_state
 from .scene.pictures import OutputSettings, check_targets, read_output_settings
 from .scene.read_view import scene_depsgraph
 from .scene.textures import Hatching, apply_texture, read_texture_input_task, uv_map_name
@@ -43,13 +47,12 @@ def bake_texture_task(
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     look: Look | None = None,
-    content: str | None = None,
     settings: OutputSettings | None = None,
 ) -> Task[list[TextureResult]]:
     """Draw the fields of objects as textures for their UV maps, and show them on the objects.
 
-    The size and the margin are those of the scene, and the UV map is chosen on the object. The scene is
-    changed in the last step. Closing the generator earlier leaves it unchanged.
+    What the textures show, their size and their margin are set in the scene, and the UV map on the object.
+    The scene is changed in the last step. Closing the generator earlier leaves it unchanged.
 
     Parameters
     ----------
@@ -60,8 +63,6 @@ def bake_texture_task(
         By default `scene_depsgraph`.
     look : Look, optional
         By default the scene's.
-    content : str, optional
-        What the textures show, one of `surface_texture.draw.CONTENTS`; by default the scene's.
     settings : OutputSettings, optional
         How the textures are stored; by default as the pictures of the scene.
 
@@ -79,13 +80,14 @@ def bake_texture_task(
         If an object has no field or no UV map, or the texture cannot be drawn or stored.
     """
     look = read_look(scene.rosy) if look is None else look
-    content = scene.rosy.texture_content.lower() if content is None else content
+    content = scene.rosy.texture_content.lower()
     settings = read_output_settings(scene) if settings is None else settings
     for obj in objects:
         uv_map_name(obj)
     check_targets(objects, settings)
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
+    lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     size, margin = scene.rosy.texture_size, scene.rosy.texture_margin
     drawn = []
     for index, obj in enumerate(objects):
@@ -100,6 +102,7 @@ def bake_texture_task(
             size,
             margin=margin,
             content=content,
+            lights=lights,
             cache=BAKE_CACHE,
         )
         texture = yield from subtask(task, start, stop)
@@ -127,16 +130,29 @@ def bake_texture_task(
     ]
 
 
+def _lights_to_bake(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Light]:
+    """Return the lights of a scene, in world space.
+
+    Raises
+    ------
+    RosyError
+        If there are none.
+    """
+    lights = read_lights(depsgraph, np.eye(4))
+    if not lights:
+        raise RosyError(f"scene '{scene.name}' has no lights: add one, or turn Bake Light off")
+    return lights
+
+
 def bake_texture(
     scene: bpy.types.Scene,
     objects: Sequence[bpy.types.Object],
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
     look: Look | None = None,
-    content: str | None = None,
     settings: OutputSettings | None = None,
 ) -> list[TextureResult]:
     """Run `bake_texture_task` to its end."""
     return run_to_completion(
-        bake_texture_task(scene, objects, depsgraph, look=look, content=content, settings=settings)
+        bake_texture_task(scene, objects, depsgraph, look=look, settings=settings)
     )

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..color import to_linear
 from ..compositor.look import Look
+from ..compositor.shading import Light
 from ..errors import RosyError
 from ..presets.store import default_user_folder, load_preset
 from ..progress import run_to_completion
@@ -184,7 +185,7 @@ def texture(
         margin=margin,
         is_udim=udim,
         content=content,
-        light=None if light_direction is None else _in_world(light_direction, instance),
+        lights=None if light_direction is None else [_lamp(light_direction, instance)],
     )
     drawn = run_to_completion(task)
     warn(drawn.overlap_note(surface.name))
@@ -197,8 +198,8 @@ def texture(
     return Texture({number: Picture(rgba) for number, rgba in tiles.items()}, drawn.overlap)
 
 
-def _in_world(light_direction: ArrayLike, instance: MeshInstance) -> NDArray[np.float64]:
-    """Return the direction to a lamp in world space.
+def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
+    """Return a lamp in a direction, in world space.
 
     Raises
     ------
@@ -210,8 +211,8 @@ def _in_world(light_direction: ArrayLike, instance: MeshInstance) -> NDArray[np.
         raise RosyError(
             "light_direction must be three numbers, the direction to a lamp: not all of them 0"
         )
-    world: NDArray[np.float64] = np.asarray(instance.matrix)[:3, :3] @ direction
-    return world
+    world = np.asarray(instance.matrix)[:3, :3] @ direction
+    return Light("sun", world / np.linalg.norm(world), np.ones(3), 1.0)
 
 
 def texture_look(preset: str | os.PathLike[str] | None, settings: dict[str, Any]) -> Look:

@@ -19,7 +19,7 @@ from .look import Look
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A light, in the space of the camera.
+    """A light, in the space of the camera or the world.
 
     Attributes
     ----------
@@ -44,6 +44,21 @@ class Light:
         if self.kind == "point":
             vector = vector + matrix[:3, 3]
         return replace(self, vector=vector)
+
+    def irradiance(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """Return (n,) the irradiance at points, without the color of the light and shadows.
+
+        Parameters
+        ----------
+        position, normal : (n, 3) float32 ndarray
+            In the space of the light; the normals are unit vectors.
+        """
+        vector = np.asarray(self.vector, dtype=np.float32)
+        if self.kind == "sun":
+            return self.strength * np.maximum(dot(normal, vector), 0)
+        to_light = vector - position
+        distance_squared = np.maximum(dot(to_light, to_light), 1e-12)
+        return self.strength * np.maximum(dot(normal, normalize(to_light)), 0) / distance_squared
 
 
 #: The light "lamp", over the left shoulder of the viewer.
@@ -99,23 +114,11 @@ def diffuse(
             visibility = run_to_completion(light_visibility_task(gbuffer, look, lights))
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
         for index, source in enumerate(lights_of(look, lights)):
-            irradiance = _lambert(gbuffer, source)
+            irradiance = source.irradiance(gbuffer.position, gbuffer.normal)
             if visibility:
                 irradiance = irradiance * visibility[index]
             light += irradiance[:, None] * source.colour
     return (1 - look.shading + look.shading * light).astype(np.float32)
-
-
-def _lambert(gbuffer: GBuffer, light: Light) -> np.ndarray:
-    """(P,) irradiance from one light, without its color and shadows."""
-    vector = np.asarray(light.vector, dtype=np.float32)
-    if light.kind == "sun":
-        return light.strength * np.maximum(dot(gbuffer.normal, vector), 0)
-    to_light = vector - gbuffer.position
-    distance_squared = np.maximum(dot(to_light, to_light), 1e-12)
-    return (
-        light.strength * np.maximum(dot(gbuffer.normal, normalize(to_light)), 0) / distance_squared
-    )
 
 
 def light_visibility_task(

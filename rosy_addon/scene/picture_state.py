@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ..cache import content_hash
-from ..compositor.look import Look
+from ..compositor.look import Look, is_hatched
 from ..errors import RosyError
 from ..field.rosy_field import MAX_DEGREE
 from ..file_io import read_bytes
@@ -47,7 +47,7 @@ from .tone_inputs import (
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
 #: Those that decide what a texture shows, and how it is stored.
-TEXTURE_OUTPUT = ("texture_content", "store", "directory", "image_format")
+TEXTURE_OUTPUT = ("texture_content", "texture_bake_light", "store", "directory", "image_format")
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class SceneState:
         sources = _read_sources(scene)
         self._read_meshes(depsgraph, sources, {} if mesh_states is None else mesh_states)
         if sources.uses_lights:
-            self._read_lights(depsgraph)
+            self._lights = _light_digests(depsgraph)
 
     def _read_meshes(
         self, depsgraph: bpy.types.Depsgraph, sources: _Sources, mesh_states: MeshStates
@@ -213,12 +213,6 @@ class SceneState:
             instances = group.setdefault(owner.name_full, _Instances())
             instances.digests.append((_digest(matrix + 0.0), mesh_state.digest))
             instances.corners.append(_box_corners(mesh_state.bounds, matrix))
-
-    def _read_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
-        for light, owner in rendered_lights(depsgraph, np.eye(4)):
-            self._lights.setdefault(owner.name_full, []).append(_digest(*vars(light).values()))
-        for digests in self._lights.values():
-            digests.sort()
 
     def picture_state(
         self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
@@ -282,6 +276,14 @@ class SceneState:
         return [box for box in boxes if box is not None]
 
 
+def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
+    """Return the digests of the lights of a scene, by the names of their objects."""
+    lights: dict[str, list[str]] = {}
+    for light, owner in rendered_lights(depsgraph, np.eye(4)):
+        lights.setdefault(owner.name_full, []).append(_digest(*vars(light).values()))
+    return {name: sorted(digests) for name, digests in lights.items()}
+
+
 def read_picture_states(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, sources: Iterable[CameraSource]
 ) -> list[PictureState]:
@@ -290,12 +292,17 @@ def read_picture_states(
     return [scene_state.picture_state(scene, depsgraph, source) for source in sources]
 
 
+def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:
+    """Return whether textures have ink in the light of the scene, by the settings of the scene."""
+    return settings.texture_bake_light and settings.texture_content == "LOOK" and is_hatched(look)
+
+
 def read_texture_state(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object
 ) -> PictureState:
     """Return the state of the texture of an object, with the settings of the scene.
 
-    A texture stays up to date when its object moves or deforms.
+    A texture stays up to date when its object moves or deforms, unless the light is baked.
     """
     settings, mesh = scene.rosy, obj.data
     look = read_look(settings)
@@ -317,15 +324,18 @@ def read_texture_state(
         names = [name for name in TEXTURE_SETTINGS if settings_of(Look)[name].applies(look)]
     else:
         names = DIRECTION_SETTINGS
+    lights, place = {}, ""
+    if bakes_light(settings, look):
+        lights, place = _light_digests(depsgraph), _digest(np.array(obj.matrix_world) + 0.0)
     return PictureState(
         look={name: getattr(look, name) for name in names},
         size=[settings.texture_size, settings.texture_size],
         camera=_digest(*uv_parts),
         output=output,
         device="cpu",
-        objects={obj.name_full: ["", _digest(*shape)]},
+        objects={obj.name_full: [place, _digest(*shape)]},
         occluders={},
-        lights={},
+        lights=lights,
         reference="",
     )
 

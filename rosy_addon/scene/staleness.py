@@ -28,6 +28,7 @@ _WATCHED_EVENTS = ("depsgraph_update_post", "frame_change_post", "undo_post", "r
 #: How reasons call the properties of the output.
 _OUTPUT_LABELS = {
     "texture_content": "content",
+    "texture_bake_light": "baked light",
     "store": "storage",
     "directory": "folder",
     "image_format": "format",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, is_hatched
 from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
+from ..compositor.shading import Light
 from ..errors import RosyError
 from ..line_drawing.tangent_mesh import TangentMesh, tangent_mesh_task
 from ..memory import check_memory, raise_mmap_threshold
@@ -132,7 +134,7 @@ def draw_texture_task(
     *,
     margin: int = DEFAULT_MARGIN,
     is_udim: bool = False,
-    light: np.ndarray | None = None,
+    lights: Sequence[Light] | None = None,
     content: str = "look",
     cache: Cache | None = None,
 ) -> Task[Texture]:
@@ -155,9 +157,9 @@ def draw_texture_task(
         Width of the margin around charts, in texels.
     is_udim : bool
         Whether the tiles of the UV map are pictures of their own.
-    light : (3,) ndarray, optional
-        Direction to a light, in world space, whose hatching is drawn as ink. By default, a texture of
-        hatching has thresholds, and its ink is drawn by the material.
+    lights : sequence of Light, optional
+        Lights in world space, whose hatching is drawn as ink. By default, a texture of hatching has
+        thresholds, and its ink is drawn by the material.
     content : str
         One of `CONTENTS`.
     cache : Cache, optional
@@ -205,8 +207,8 @@ def draw_texture_task(
     if is_direction:
         pixels_task, is_data = direction_map_task(on, content, look.guiding_angle), True
     elif is_hatched(look):
-        pixels_task = hatching_task(on, field, surface_look, look.guiding_angle, light, cache)
-        is_data = light is None
+        pixels_task = hatching_task(on, field, surface_look, look.guiding_angle, lights, cache)
+        is_data = lights is None
     else:
         pixels_task, is_data = _colors_task(on, field, surface_look), False
     pixels = yield from subtask(pixels_task, 0.3, 0.95)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..cache import Cache
+from ..color import LUMINANCE_WEIGHTS
 from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
@@ -28,6 +30,7 @@ from ..compositor.lic_images import LicImages
 from ..compositor.look import Look
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
+from ..compositor.shading import Light
 from ..compositor.streak_statistics import (
     break_steps,
     look_streak_statistics,
@@ -123,17 +126,17 @@ def hatching_task(
     field: PixelField,
     look: Look,
     guiding_angle: float,
-    light: np.ndarray | None = None,
+    lights: Sequence[Light] | None = None,
     cache: Cache | None = None,
 ) -> Task[np.ndarray]:
-    """Draw hatching at texels: its thresholds, or its ink for a light.
+    """Draw hatching at texels: its thresholds, or its ink for some lights.
 
     Parameters
     ----------
     on, field, look, guiding_angle, cache
         As for `thresholds_task`.
-    light : (3,) ndarray, optional
-        Direction to a lamp, in world space.
+    lights : sequence of Light, optional
+        In world space.
 
     Returns
     -------
@@ -141,23 +144,23 @@ def hatching_task(
         From `thresholds_task` or `lit_ink_task`.
     """
     pixels = yield from subtask(thresholds_task(on, field, look, guiding_angle, cache), 0.0, 0.95)
-    if light is not None:
-        pixels = yield from subtask(lit_ink_task(on, pixels, light, look), 0.95, 1.0)
+    if lights is not None:
+        pixels = yield from subtask(lit_ink_task(on, pixels, lights, look), 0.95, 1.0)
     return pixels
 
 
 def lit_ink_task(
-    on: TexelSurface, pixels: np.ndarray, light: np.ndarray, look: Look
+    on: TexelSurface, pixels: np.ndarray, lights: Sequence[Light], look: Look
 ) -> Task[np.ndarray]:
-    """Draw the ink of the diffuse light of a lamp.
+    """Draw the ink of the diffuse light of lamps, without shadows.
 
     Parameters
     ----------
     on : TexelSurface
     pixels : (P, 4) float32 ndarray
         From `thresholds_task`.
-    light : (3,) ndarray
-        Direction to the lamp, in world space.
+    lights : sequence of Light
+        In world space.
     look : Look
         The settings of the ink, the strength of the shading, and the tone curve.
 
@@ -166,14 +169,17 @@ def lit_ink_task(
     (P, 4) float32 ndarray
         Linear color and opacity. All is opaque unless `look.clear_paper`.
     """
-    direction = np.asarray(light, dtype=np.float64)
-    direction = direction / np.linalg.norm(direction)
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
         yield Progress(block.start / len(pixels), STEP_LABEL)
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
-        lambert = np.maximum(on.mesh.shading_normals_at(triangle, weights) @ direction, 0)
-        tone = apply_tone_curve(1 - look.shading + look.shading * lambert, look)
+        position = on.mesh.points_at(triangle, weights)
+        normal = on.mesh.shading_normals_at(triangle, weights)
+        irradiance = sum(
+            light.irradiance(position, normal) * float(light.colour @ LUMINANCE_WEIGHTS)
+            for light in lights
+        )
+        tone = apply_tone_curve(1 - look.shading + look.shading * irradiance, look)
         color, coverage = ink_of_thresholds(
             pixels[block], np.minimum(tone, 1), look, on.mesh.family_count
         )

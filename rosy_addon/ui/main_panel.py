@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..compositor.look import is_hatched
 from ..errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
@@ -173,6 +174,8 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     column.prop(settings, "texture_content")
     if settings.texture_content != "LOOK":
         column.prop(settings.look, "guiding_angle")
+    elif is_hatched(settings.look):
+        column.prop(settings, "texture_bake_light")
     column.prop(settings, "texture_size")
     column.prop(settings, "texture_margin")
     column.operator("rosy.bake_texture", icon="TEXTURE")

@@ -290,6 +290,11 @@ class RosyScene(bpy.types.PropertyGroup):
     texture_content: bpy.props.EnumProperty(
         name="Content", description="What a texture shows", items=TEXTURE_CONTENT_ITEMS
     )
+    texture_bake_light: bpy.props.BoolProperty(
+        name="Bake Light",
+        description="Draw the hatching in the present light of the scene as ink, for exports and other "
+        "programs, instead of hatching that follows the light",
+    )
     texture_size: bpy.props.IntProperty(
         name="Size",
         description="Width and height of textures in texels",

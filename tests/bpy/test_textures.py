@@ -147,6 +147,31 @@ def test_maps_of_directions(scene, textured, tmp_path):
     assert names == ["anisotropy.png", "flow.png"]
 
 
+def test_light_can_be_baked(scene, textured):
+    """The hatching is then ink, and depends on the lights and on where the object is."""
+    scene.rosy.look.ink, scene.rosy.look.shading = "hatch", 1.0
+    scene.rosy.texture_bake_light = True
+    with pytest.raises(RosyError, match="'Scene' has no lights"):
+        bake_texture(scene, [textured])
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+    scene.collection.objects.link(lamp)
+    means = []
+    for strength in (0.3, 1.0):
+        lamp.data.energy = strength * np.pi
+        bpy.context.view_layer.update()
+        (result,) = bake_texture(scene, [textured])
+        assert result.image.colorspace_settings.name == "sRGB"
+        means.append(np.array(result.image.pixels).reshape(-1, 4)[:, 0].mean())
+        assert stale_reason(scene) == ""
+    assert means[0] < 0.6 * means[1]
+    lamp.rotation_euler.x = 0.5
+    bpy.context.view_layer.update()
+    assert stale_reason(scene) == "light 'Lamp' was changed"
+    lamp.rotation_euler.x, textured.location.x = 0.0, 1.0
+    bpy.context.view_layer.update()
+    assert stale_reason(scene) == f"'{textured.name}' was moved"
+
+
 def test_what_is_refused_changes_nothing(scene, camera, monkey):
     scene.rosy.texture_size = 64
     monkey.rosy.texture_uv_map = "None"

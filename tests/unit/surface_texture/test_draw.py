@@ -9,6 +9,7 @@ from shapes import cube, from_quads, plane, torus
 from uv_maps import colors_at, patches_uv, surface_points, torus_uv
 
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -68,11 +69,12 @@ def test_hatching_does_not_depend_on_the_charts(settings):
     instance = instance_of(surface, 4)
     points = surface_points(surface, 20_000)
     look = WIDER.with_settings({"ink": "hatch", **settings})
-    for light in (None, (0.5, -0.6, 0.6)):
+    lamp = Light("sun", np.array([0.5, -0.6, 0.6]) / np.sqrt(0.97), np.ones(3), 1.0)
+    for lights in (None, [lamp]):
         colors = []
         for uv in (torus_uv(), patches_uv(1)):
-            texture = draw_texture(instance, uv, look, 512, light=light)
-            assert texture.is_data == (light is None)
+            texture = draw_texture(instance, uv, look, 512, lights=lights)
+            assert texture.is_data == (lights is None)
             colors.append(colors_at(texture.rgba, surface, uv, points))
         assert np.corrcoef(colors)[0, 1] > 0.85
 

@@ -64,6 +64,10 @@ def new_hatching_material(
     material, build = new_empty_material(name)
     tree = build.tree
     image_node = _image_on_map(build, image, uv_map)
+    # Has no effect, but Blender's exporter of glTF takes the color of the first emission, and follows all
+    # links before it, which takes long in the group.
+    exported = build("ShaderNodeEmission", label="For Exporters")
+    tree.links.new(image_node.outputs["Color"], exported.inputs["Color"])
     light = build("ShaderNodeShaderToRGB")
     white = build("ShaderNodeBsdfDiffuse")
     white.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
@@ -89,7 +93,11 @@ def new_hatching_material(
         tree.links.new(transparent.outputs["BSDF"], mix.inputs[1])
         tree.links.new(surface, mix.inputs[2])
         surface = mix.outputs["Shader"]
-    tree.links.new(surface, output.inputs["Surface"])
+    unmixed = build("ShaderNodeMixShader")
+    unmixed.inputs[0].default_value = 0.0
+    tree.links.new(surface, unmixed.inputs[1])
+    tree.links.new(exported.outputs["Emission"], unmixed.inputs[2])
+    tree.links.new(unmixed.outputs["Shader"], output.inputs["Surface"])
     return material
 
 

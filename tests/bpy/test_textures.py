@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import bpy
 import numpy as np
 import pytest
@@ -170,6 +172,45 @@ def test_light_can_be_baked(scene, textured):
     lamp.rotation_euler.x, textured.location.x = 0.0, 1.0
     bpy.context.view_layer.update()
     assert stale_reason(scene) == f"'{textured.name}' was moved"
+
+
+def exported_material(path):
+    """The only material of a .glb file."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    (material,) = json.loads(data[20 : 20 + length])["materials"]
+    return material
+
+
+def test_exporters_take_textures_along(scene, textured, tmp_path):
+    """That of a look as a color, directions as the map of glTF, and thresholds for a shader."""
+    for content, ink in (("LOOK", "soft"), ("LOOK", "hatch"), ("ANISOTROPY", "soft")):
+        scene.rosy.texture_content, scene.rosy.look.ink = content, ink
+        bake_texture(scene, [textured])
+        path = tmp_path / f"{content}-{ink}.glb"
+        bpy.ops.export_scene.gltf(filepath=str(path), export_apply=True)
+    assert (
+        "baseColorTexture" in exported_material(tmp_path / "LOOK-soft.glb")["pbrMetallicRoughness"]
+    )
+    assert "emissiveTexture" in exported_material(tmp_path / "LOOK-hatch.glb")
+    material = exported_material(tmp_path / "ANISOTROPY-soft.glb")
+    anisotropy = material["extensions"]["KHR_materials_anisotropy"]
+    assert anisotropy["anisotropyRotation"] == pytest.approx(np.pi / 2)
+    assert anisotropy["anisotropyStrength"] == pytest.approx(0.8)
+    assert "anisotropyTexture" in anisotropy
+    scene.rosy.texture_content = "LOOK"
+    bake_texture(scene, [textured])
+    bpy.ops.export_scene.fbx(
+        filepath=str(tmp_path / "look.fbx"), path_mode="COPY", embed_textures=True
+    )
+    assert b"\x89PNG" in (tmp_path / "look.fbx").read_bytes()
+    # The exporter of USD takes materials from slots.
+    with bpy.context.temp_override(object=textured):
+        for modifier in list(textured.modifiers):
+            bpy.ops.object.modifier_apply(modifier=modifier.name)
+    bpy.ops.wm.usd_export(filepath=str(tmp_path / "look.usda"))
+    assert "UsdUVTexture" in (tmp_path / "look.usda").read_text()
+    assert [file.suffix for file in (tmp_path / "textures").iterdir()] == [".png"]
 
 
 def test_what_is_refused_changes_nothing(scene, camera, monkey):

@@ -24,6 +24,9 @@ LATERAL_WINDOW = 0.36
 #: Separation of strokes that meet head on, in spacings.
 HEAD_ON_DISTANCE = 0.35
 
+#: Pairs of samples that are compared at once. Surfaces that lie on each other have very many.
+PAIR_BLOCK = 1 << 20
+
 
 class LateralNeighbors(NamedTuple):
     """The strokes beside n samples. Side 0 is left, side 1 is right.
@@ -225,6 +228,18 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
         SEARCH_RADIUS * samples.spacing[sample],
         QueryBand(samples.direction[sample]),
     )
+    starts = range(0, max(len(query), 1), PAIR_BLOCK)
+    parts = [slice(start, start + PAIR_BLOCK) for start in starts]
+    blocks = [_comparable_block(samples, sample, query[part], neighbor[part]) for part in parts]
+    if len(blocks) == 1:
+        return blocks[0]
+    return _Pairs(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))
+
+
+def _comparable_block(
+    samples: StrokeSamples, sample: np.ndarray, query: np.ndarray, neighbor: np.ndarray
+) -> _Pairs:
+    """Return those of some pairs near in space that `_comparable_pairs` returns."""
     current = sample[query]
     arc_gap = np.abs(samples.arc.take(current) - samples.arc.take(neighbor))
     keep = samples.stroke.take(current) != samples.stroke.take(neighbor)

@@ -12,7 +12,7 @@ from rosy_addon.compositor.shading import KEY_LIGHT, Light
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
-from rosy_addon.line_drawing import separation, visibility
+from rosy_addon.line_drawing import lateral_neighbors, separation, visibility
 from rosy_addon.line_drawing.pipeline import (
     draw_instances,
     draw_instances_task,
@@ -195,6 +195,15 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
         for _ in range(300):
             next(task)
     assert 30 < done.value.value.length.sum() < 50
+
+
+def test_samples_are_compared_in_blocks(monkeypatch):
+    """Surfaces that lie on each other have very many pairs of samples."""
+    style = StrokeStyle(spacing=20)
+    expected = draw_instances([SPHERE], CAMERA, style).strokes
+    monkeypatch.setattr(lateral_neighbors, "PAIR_BLOCK", 50)
+    strokes = draw_instances([SPHERE], CAMERA, style).strokes
+    np.testing.assert_array_equal(strokes.points, expected.points)
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from .line_drawing.pipeline import StrokeDrawing, draw_instances_task, geometry_
 from .line_drawing.style import StrokeStyle
 from .line_drawing.svg import Pen, svg_task
 from .progress import Progress, Task, run_to_completion, subtask
+from .projection.gbuffer import MeshInstance
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
@@ -113,6 +114,9 @@ def draw_strokes_task(
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
     reading = read_scene_task(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
     scene_data = yield from subtask(reading, 0.0, 0.05)
+    followed = None
+    if kind == "CURVES" and settings.follow:
+        followed = _followed_instance(scene_data)
     lights = lights_of(style, read_lights(depsgraph, view.view))
     clip_to_frame = kind == "SVG"
     work = draw_instances_task(
@@ -130,9 +134,18 @@ def draw_strokes_task(
         text = yield from subtask(svg_task(drawing.strokes, view, pen), 0.95, 1.0, label)
         write_bytes(path, text.encode())
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    geometry = yield from subtask(geometry_task(drawing, view, pen), 0.95, 0.97, label)
+    task = geometry_task(drawing, view, pen, followed)
+    geometry = yield from subtask(task, 0.95, 0.97, label)
     yield Progress(0.97, label)
-    obj = store_strokes(scene, kind, geometry, view.name, _parent_object(scene_data), collection)
+    obj = store_strokes(
+        scene,
+        kind,
+        geometry,
+        view.name,
+        _parent_object(scene_data),
+        collection,
+        0 if followed is None else len(followed.surface.vertices),
+    )
     return StrokeResult(
         view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
     )
@@ -161,6 +174,22 @@ def svg_path(path: Path | str) -> Path:
         raise RosyError(f"{path}: the name of the file must end in .svg")
     check_writable(path)
     return path
+
+
+def _followed_instance(scene_data: SceneData) -> MeshInstance:
+    """Return the instance whose surface the strokes follow.
+
+    Raises
+    ------
+    RosyError
+        If there are several.
+    """
+    instances = [instance for instance in scene_data.instances if instance.field is not None]
+    if len(instances) > 1:
+        raise RosyError(
+            "strokes can follow the surface of one object only: select one, and switch on Selected Only"
+        )
+    return instances[0]
 
 
 def _parent_object(scene_data: SceneData) -> bpy.types.Object | None:

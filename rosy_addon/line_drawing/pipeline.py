@@ -14,6 +14,7 @@ from ..field.frames import dot
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from .attachment import SurfacePoints, surface_points
 from .crossings import crossing_gaps_task
 from .directional_spacing import CornerSpacing, spacing_in_picture
 from .families import label_families_task
@@ -389,6 +390,8 @@ class StrokeGeometry:
         Radii in world space.
     colors : list of str
         The color of each family.
+    places : SurfacePoints or None
+        Where the points are on their surface, if they are to follow it.
     """
 
     strokes: Strokes
@@ -396,6 +399,7 @@ class StrokeGeometry:
     points: np.ndarray
     radius: np.ndarray
     colors: list[str]
+    places: SurfacePoints | None = None
 
 
 def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeGeometry:
@@ -403,20 +407,36 @@ def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeG
     return run_to_completion(geometry_task(drawing, camera, pen))
 
 
-def geometry_task(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> Task[StrokeGeometry]:
-    """Return the curves of a drawing for a pen whose width is in pixels of the camera."""
+def geometry_task(
+    drawing: StrokeDrawing, camera: Camera, pen: Pen, follows: MeshInstance | None = None
+) -> Task[StrokeGeometry]:
+    """Return the curves of a drawing.
+
+    Parameters
+    ----------
+    drawing : StrokeDrawing
+    camera : Camera
+    pen : Pen
+        Its width is in pixels of the camera.
+    follows : MeshInstance, optional
+        The instance that all strokes are on, if they are to follow its surface.
+    """
     label = "simplifying strokes"
     strokes = yield from subtask(simplify_task(drawing.strokes, camera), 0.0, 0.8, label)
     yield Progress(0.8, label)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
     # surface.
-    points = (offset_along_normal if drawing.hidden else offset_toward_camera)(
+    is_along_normal = drawing.hidden or follows is not None
+    points = (offset_along_normal if is_along_normal else offset_toward_camera)(
         strokes, camera, pen.width
     )
     radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
-    return StrokeGeometry(
-        strokes, drawing.instance_index, points, radius, pen.family_colors(strokes.names)
-    )
+    places = None
+    if follows is not None:
+        height = pen.width * pixel_size(strokes.points, camera)
+        places = surface_points(strokes, height, follows)
+    colors = pen.family_colors(strokes.names)
+    return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, places)
 
 
 def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:

@@ -10,6 +10,7 @@ import numpy as np
 from ..color import from_hex, to_linear
 from ..line_drawing.pipeline import StrokeGeometry
 from .compat import has_nodes_by_default
+from .surface_strokes import attribute_values
 
 #: Called with each datablock that is created and the name that it should have.
 RegisterDatablock = Callable[[bpy.types.ID, str], None]
@@ -67,6 +68,9 @@ def new_curves(
     }
     for key, data_type in POINT_ATTRIBUTES.items():
         _set_attribute(data, key, data_type, "POINT", values[key])
+    if geometry.places is not None:
+        for key, (data_type, column) in attribute_values(geometry.places).items():
+            _set_attribute(data, key, data_type, "POINT", column)
     material = _new_material(name)
     register(material, name)
     data.materials.append(material)

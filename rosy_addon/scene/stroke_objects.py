@@ -25,6 +25,7 @@ from .look_properties import read_settings
 from .owned_data import OWNED_TAG, rollback_on_error
 from .scene_reader import field_objects
 from .stroke_digest import stroke_digest
+from .surface_strokes import follow_surface, stop_following
 
 #: The function that creates the data of each kind of object.
 DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
@@ -78,6 +79,7 @@ def store_strokes(
     camera: str,
     owner: bpy.types.Object | None = None,
     collection: bpy.types.Collection | None = None,
+    vertex_count: int = 0,
 ) -> bpy.types.Object:
     """Store strokes in an object. Those of the same kind from the same camera are replaced.
 
@@ -95,6 +97,8 @@ def store_strokes(
         Parent of the object. The strokes move with it.
     collection : bpy.types.Collection, optional
         The collection of a new object, by default that of the scene. Also if it cannot be changed.
+    vertex_count : int
+        Of the evaluated mesh of `owner`, if the geometry has the places of its points on it.
 
     Returns
     -------
@@ -128,6 +132,10 @@ def store_strokes(
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
+    if kind == "CURVES" and geometry.places is not None:
+        follow_surface(obj, owner, vertex_count)
+    else:
+        stop_following(obj)
     _store_record(scene, kind, camera, obj)
     return obj
 
@@ -189,6 +197,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
 def _delete_object(obj: bpy.types.Object) -> None:
     """Delete an object, and its data if RoSy created them and nothing else uses them."""
     data = obj.data
+    stop_following(obj)
     bpy.data.objects.remove(obj)
     _remove_data(data)
 

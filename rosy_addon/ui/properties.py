@@ -177,6 +177,11 @@ class RosyStrokes(bpy.types.PropertyGroup):
             name="Selected Only",
             description="Draw only on selected objects. Others still hide what is behind them",
         ),
+        "follow": bpy.props.BoolProperty(
+            name="Follow Surface",
+            description="Let the strokes follow the object when it deforms, by a modifier. Only curves on one "
+            "object",
+        ),
         "width": bpy.props.FloatProperty(
             name="Width",
             description="Maximum width of a stroke in pixels of the picture",

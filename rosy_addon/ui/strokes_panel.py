@@ -39,6 +39,8 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "kind")
         column.prop(settings, "camera")
         column.prop(settings, "selected")
+        if settings.kind == "CURVES":
+            column.prop(settings, "follow")
         column.separator()
         column.prop(settings, "unit")
         column.prop(settings, "spacing" if settings.unit == "pixels" else "distance")

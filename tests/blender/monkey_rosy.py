@@ -354,6 +354,7 @@ def strokes(monkey):
     ):
         return  # strokes on what is much larger than the frame take minutes
     settings = bpy.context.scene.rosy.strokes
+    settings.follow = monkey.chance(0.3)
     style = rosy("rosy_addon.line_drawing.style").StrokeStyle
     randomize(monkey, settings, style, 0.2)
     if settings.unit == "world" or settings.spacing < 3:  # any number of strokes

@@ -170,3 +170,79 @@ def test_errors(with_stroke_settings, scene, tmp_path):
     assert contents() == before
     with_stroke_settings.rosy.include = False
     assert not bpy.ops.rosy.strokes.poll()
+
+
+def bent_tube(scene):
+    """A tube with a field, along the bones of an armature that can bend it."""
+    bpy.ops.mesh.primitive_cylinder_add(vertices=48, radius=0.5, depth=3.0)
+    tube = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide(number_cuts=4)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.object.shade_smooth()
+    bpy.ops.rosy.field_generate(kind="form", degree=4)
+    bpy.ops.object.armature_add(location=(0.0, 0.0, -1.5))
+    rig = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones[0].tail = (0.0, 0.0, 1.5)
+    bone = rig.data.edit_bones.new("Upper")
+    bone.head, bone.tail, bone.parent = (0.0, 0.0, 1.5), (0.0, 0.0, 3.0), rig.data.edit_bones[0]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    z = np.array([vertex.co.z for vertex in tube.data.vertices])
+    for name, weights in (("Bone", 0.5 - z / 3), ("Upper", 0.5 + z / 3)):
+        group = tube.vertex_groups.new(name=name)
+        for index, weight in enumerate(weights.tolist()):
+            group.add([index], weight, "REPLACE")
+    tube.modifiers.new("Armature", "ARMATURE").object = rig
+    return tube, rig
+
+
+def evaluated_points(obj):
+    """(n, 3) points of curves after their modifiers."""
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array([point.position for point in evaluated.data.points])
+
+
+def test_curves_follow_an_armature(scene):
+    """Their feet stay on the surface, to a hundredth of the spacing, without a new drawing."""
+    from mathutils.bvhtree import BVHTree
+
+    tube, rig = bent_tube(scene)
+    settings = scene.rosy.strokes
+    settings.kind, settings.follow, settings.hidden = "CURVES", True, True
+    assert bpy.ops.rosy.strokes() == {"FINISHED"}
+    strokes = next(obj for obj in scene.objects if obj.type == "CURVES")
+    drawn = np.array([point.position for point in strokes.data.points])
+    points = evaluated_points(strokes)
+    rest = np.linalg.norm(points - drawn, axis=1)
+    spacing = np.array([item.value for item in strokes.data.attributes["spacing"].data])
+    assert np.quantile(rest / spacing, 0.9) < 0.01
+    height = strokes.data.attributes["surface_height"].data
+    height.foreach_set("value", np.zeros(len(height), dtype=np.float32))
+    strokes.data.update_tag()
+    for angle in (0.0, 0.5, 1.2):
+        rig.pose.bones["Upper"].rotation_mode = "XYZ"
+        rig.pose.bones["Upper"].rotation_euler.x = angle
+        tube.location.x = angle
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        points = evaluated_points(strokes)
+        to_tube = np.array(tube.evaluated_get(depsgraph).matrix_world.inverted())
+        to_tube = to_tube @ np.array(strokes.evaluated_get(depsgraph).matrix_world)
+        local = points @ to_tube[:3, :3].T + to_tube[:3, 3]
+        surface = BVHTree.FromObject(tube, depsgraph)
+        distance = np.array([surface.find_nearest(point)[3] for point in local.tolist()])
+        assert np.quantile(distance / spacing, 0.99) < 0.01, angle
+    assert np.linalg.norm(points - drawn, axis=1).max() > 0.3
+    assert bpy.ops.rosy.strokes_remove() == {"FINISHED"}
+    assert not bpy.data.hair_curves and not bpy.data.node_groups
+
+
+def test_curves_follow_one_object_only(scene):
+    for x in (-1.0, 1.0):
+        bpy.ops.mesh.primitive_uv_sphere_add(location=(x, 0.0, 0.0))
+        bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    scene.rosy.strokes.follow = True
+    before = contents()
+    assert "one object only" in error_of(bpy.ops.rosy.strokes, kind="CURVES")
+    assert contents() == before

@@ -10,11 +10,14 @@ import bpy
 #: Custom property on every datablock that RoSy created.
 OWNED_TAG = "rosy_made"
 
+#: Custom property on node groups for strokes. Their modifiers go with the strokes.
+STROKES_TAG = "rosy_surface_strokes"
+
 
 def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Whether RoSy added a modifier."""
+    """Whether RoSy added a modifier that shows a picture."""
     group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
-    return group is not None and bool(group.get(OWNED_TAG))
+    return group is not None and bool(group.get(OWNED_TAG)) and not group.get(STROKES_TAG)
 
 
 def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:

@@ -6,9 +6,10 @@ import bpy
 
 from ..line_drawing.attachment import SurfacePoints
 from .node_builder import NodeBuilder
+from .owned_data import OWNED_TAG, STROKES_TAG
 
-#: Name of the modifier, and the custom property of its node group.
-MODIFIER_NAME, GROUP_TAG = "Follow Surface", "rosy_surface_strokes"
+#: Name of the modifier.
+MODIFIER_NAME = "Follow Surface"
 
 #: Attributes of the points: the vertices of their triangles, the weights of these, and the height.
 VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
@@ -59,7 +60,7 @@ def _modifier_of(obj: bpy.types.Object) -> bpy.types.Modifier | None:
     """Return the modifier of `follow_surface`; None if there is none."""
     for modifier in obj.modifiers:
         group = modifier.node_group if modifier.type == "NODES" else None
-        if group is not None and group.get(GROUP_TAG):
+        if group is not None and group.get(STROKES_TAG):
             return modifier
     return None
 
@@ -72,7 +73,7 @@ def _delete_unused(group: bpy.types.NodeTree | None) -> None:
 def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.types.NodeTree:
     """Create the node group, which moves points to their places on the evaluated surface."""
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    group[GROUP_TAG] = True
+    group[OWNED_TAG] = group[STROKES_TAG] = True
     group.is_modifier = True
     for direction in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")

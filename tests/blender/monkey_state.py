@@ -294,6 +294,8 @@ _STROKES = (
     "owned/grease_pencils*",
     "owned/hair_curves/*",
     "owned/curves/*",
+    "owned/node_groups/*",
+    "picture/*",  # the modifier by which curves follow a surface
     "scenes/*/rosy/made/*",  # a linked copy of the scene shows the same objects
 )
 MAY_CHANGE: dict[str, tuple[str, ...]] = {
@@ -374,7 +376,9 @@ def leftovers() -> list[str]:
         left += [
             f"modifier '{modifier.name}' of '{obj.name}'"
             for modifier in obj.modifiers
-            if getattr(modifier, "node_group", None) is not None and is_owned(modifier.node_group)
+            if getattr(modifier, "node_group", None) is not None
+            and is_owned(modifier.node_group)
+            and obj.type != "CURVES"  # a copy of strokes that follow a surface is the user's
         ]
     for mesh in bpy.data.meshes:
         if mesh.library is not None:

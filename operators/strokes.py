@@ -8,6 +8,7 @@ import bpy
 
 from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes_task
 from ..rosy_addon.errors import counted
+from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
 from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import CameraSource, render_camera
 from ..rosy_addon.scene.scene_reader import field_objects
@@ -43,11 +44,13 @@ class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
     )
     filepath: bpy.props.StringProperty(
         name="File",
-        description="Path of the .svg file. Default: the setting of the scene",
+        description="Path of the .svg, .ply, .obj or .csv file. Default: the setting of the scene",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
-    filter_glob: bpy.props.StringProperty(default="*.svg", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(
+        default=";".join(f"*{suffix}" for suffix in DRAWING_SUFFIXES), options={"HIDDEN"}
+    )
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     replace: bpy.props.BoolProperty(
         name="Replace Edited",
@@ -64,7 +67,7 @@ class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for the path of a file, or before strokes are replaced that the user has edited."""
-        if self._kind(context) == "SVG":
+        if self._kind(context) == "FILE":
             if self.properties.is_property_set("filepath"):
                 return None
             self.filepath = bpy.path.abspath(context.scene.rosy.strokes.filepath)
@@ -84,14 +87,14 @@ class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
         )
 
     def take_answer(self, context: bpy.types.Context) -> None:
-        if self._kind(context) == "SVG":
+        if self._kind(context) == "FILE":
             context.scene.rosy.strokes.filepath = self.filepath
         else:
             self.replace = True
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Set the suffix of the file name in the file browser."""
-        return sync_suffix(self, ".svg")
+        """Set the suffix of the file name in the file browser, unless it is one of a file of strokes."""
+        return not self.filepath.lower().endswith(DRAWING_SUFFIXES) and sync_suffix(self, ".svg")
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show no settings in the file browser: those of the panel apply."""

@@ -1,4 +1,4 @@
-"""Draw strokes along the fields of a scene, and store them as an object or an SVG file."""
+"""Draw strokes along the fields of a scene, and store them as an object or a file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ from .compositor.shading import lights_of
 from .errors import RosyError
 from .file_io import check_writable, write_bytes
 from .line_drawing.pipeline import StrokeDrawing, draw_instances_task, geometry_task
+from .line_drawing.polyline_files import check_drawing_suffix, polyline_file_task
+from .line_drawing.stroke_set import Strokes
 from .line_drawing.style import StrokeStyle
 from .line_drawing.svg import Pen, svg_task
 from .progress import Progress, Task, run_to_completion, subtask
+from .projection.camera import Camera
 from .projection.gbuffer import MeshInstance
+from .projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
@@ -70,11 +74,12 @@ def draw_strokes_task(
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph, optional
         By default `scene_depsgraph`.
-    kind : {"PENCIL", "CURVES", "SVG"}, optional
-        Grease Pencil object, curves object or SVG file. By default ``scene.rosy.strokes.kind``.
+    kind : {"PENCIL", "CURVES", "FILE"}, optional
+        Grease Pencil object, curves object or file. By default ``scene.rosy.strokes.kind``.
     path : Path or str, optional
-        Path of the SVG file. ``//`` is the folder of the .blend file. By default
-        ``scene.rosy.strokes.filepath``.
+        Path of the file: .svg for a picture; .ply, .obj or .csv for polylines in world space, see
+        `polyline_file_task`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
+        the .blend file. By default ``scene.rosy.strokes.filepath``.
     objects : sequence of bpy.types.Object, optional
         Objects whose fields are drawn. By default all that have one. Other objects only occlude.
     camera : bpy.types.Object or Camera, optional
@@ -106,8 +111,10 @@ def draw_strokes_task(
     kind = settings.kind if kind is None else kind
     style = read_stroke_style(settings) if style is None else style
     pen = read_pen(settings) if pen is None else pen
-    if kind == "SVG":
-        path = svg_path(settings.filepath if path is None else path)
+    suffix = ""
+    if kind == "FILE":
+        path = drawing_path(settings.filepath if path is None else path)
+        suffix = check_drawing_suffix(path)
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     source = render_camera(scene) if camera is None else camera
@@ -118,21 +125,20 @@ def draw_strokes_task(
     if kind == "CURVES" and settings.follow:
         followed = _followed_instance(scene_data)
     lights = lights_of(style, read_lights(depsgraph, view.view))
-    clip_to_frame = kind == "SVG"
     work = draw_instances_task(
         scene_data.instances,
         view,
         style,
         lights=lights,
-        clip_to_frame=clip_to_frame,
+        clip_to_frame=suffix == ".svg",
         cache=BAKE_CACHE,
     )
     drawing = yield from subtask(work, 0.05, 0.95)
     BAKE_CACHE.evict_over_limit()
     label = "storing the strokes"
-    if kind == "SVG":
-        text = yield from subtask(svg_task(drawing.strokes, view, pen), 0.95, 1.0, label)
-        write_bytes(path, text.encode())
+    if kind == "FILE":
+        task = _file_task(suffix, drawing.strokes, view, pen)
+        write_bytes(path, (yield from subtask(task, 0.95, 1.0, label)))
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
     task = geometry_task(drawing, view, pen, followed)
     geometry = yield from subtask(task, 0.95, 0.97, label)
@@ -158,20 +164,27 @@ def draw_strokes(
     return run_to_completion(draw_strokes_task(scene, depsgraph, **options))
 
 
-def svg_path(path: Path | str) -> Path:
-    """Return the absolute path of an SVG file. ``//`` is the folder of the .blend file.
+def _file_task(suffix: str, strokes: Strokes, view: Camera, pen: Pen) -> Task[bytes]:
+    """Return the contents of a file of strokes."""
+    if suffix == ".svg":
+        return (yield from svg_task(strokes, view, pen)).encode()
+    up = UP_AXIS_BY_SUFFIX.get(suffix, "z")
+    return (yield from polyline_file_task(suffix, strokes, view, pen, UP_AXIS_MATRIX[up].T))
+
+
+def drawing_path(path: Path | str) -> Path:
+    """Return the absolute path of a file of strokes. ``//`` is the folder of the .blend file.
 
     Raises
     ------
     RosyError
-        If the path starts with ``//`` and the .blend file is not saved, if the extension is not
-        .svg, or if the file cannot be written.
+        If the path starts with ``//`` and the .blend file is not saved, if there is no such kind of
+        file, or if the file cannot be written.
     """
     if str(path).startswith("//") and not bpy.data.filepath:
         raise RosyError(f"{path}: save the .blend file first, or choose an absolute path")
     path = Path(bpy.path.abspath(str(path)))
-    if path.suffix.lower() != ".svg":
-        raise RosyError(f"{path}: the name of the file must end in .svg")
+    check_drawing_suffix(path)
     check_writable(path)
     return path
 

@@ -1,4 +1,4 @@
-"""`strokes`: evenly spaced lines along a field, as a drawing in SVG."""
+"""`strokes`: evenly spaced lines along a field, as a drawing in SVG or as polylines in space."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ from ..compositor.shading import lights_of
 from ..errors import RosyError
 from ..file_io import write_bytes
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
+from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file_task
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
+from ..progress import run_to_completion
 from ..projection.camera import Camera, check_size, orbit_camera
+from ..projection.up_axis import UP_AXIS_MATRIX
 from ..rendering.mesh_view import check_light, mesh_instance
 from ..settings import settings_of
 from .field import Field, check_same_surface
@@ -34,20 +37,24 @@ class Drawing:
     strokes : rosyfields.line_drawing.pipeline.StrokeDrawing
     camera : rosyfields.projection.camera.Camera
     pen : rosyfields.line_drawing.svg.Pen
+    up : {"y", "z"}
+        The upward axis of the mesh.
 
     Examples
     --------
     >>> import rosyfields as rf
     >>> drawing = rf.strokes(rf.Surface("torus.obj"), size=(100, 100), spacing=12)
     >>> drawing.save("torus.svg")
+    >>> drawing.save("torus-lines.ply")
     >>> drawing.polylines[0].shape[1]
     3
     """
 
-    def __init__(self, strokes: StrokeDrawing, camera: Camera, pen: Pen) -> None:
+    def __init__(self, strokes: StrokeDrawing, camera: Camera, pen: Pen, up: str = "z") -> None:
         self._strokes = strokes.strokes
         self._camera = camera
         self._pen = pen
+        self._up = up
 
     def __repr__(self) -> str:
         return f"<Drawing: {len(self):,} strokes>"
@@ -74,16 +81,24 @@ class Drawing:
         return [self._strokes.names[family] for family in self._strokes.family]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an ``.svg`` file.
+        """Write a file: the picture as ``.svg``, or the lines in space.
+
+        Lines have the coordinates of the mesh, with normals, widths in units of the mesh, and families.
+        A ``.csv`` file has a row for each point, an ``.obj`` file a line element for each stroke, and a
+        ``.ply`` file vertices and edges.
 
         Raises
         ------
         RosyError
-            If the name does not end in ``.svg``, or the file cannot be written.
+            If the name has another extension, or the file cannot be written.
         """
-        if not os.fspath(path).lower().endswith(".svg"):
-            raise RosyError(f"{path}: the name of the file must end in .svg")
-        write_bytes(path, self.svg.encode())
+        suffix = check_drawing_suffix(path)
+        if suffix == ".svg":
+            write_bytes(path, self.svg.encode())
+            return
+        to_mesh = UP_AXIS_MATRIX[self._up].T
+        task = polyline_file_task(suffix, self._strokes, self._camera, self._pen, to_mesh)
+        write_bytes(path, run_to_completion(task))
 
 
 def strokes(
@@ -148,7 +163,8 @@ def strokes(
         instance.face_points(), *view, *check_size(*size), perspective=not orthographic
     )
     lights = lights_of(stroke_style, ())
-    return Drawing(draw_instances([instance], camera, stroke_style, lights=lights), camera, pen)
+    drawing = draw_instances([instance], camera, stroke_style, lights=lights)
+    return Drawing(drawing, camera, pen, surface.up)
 
 
 def _style_of(values: dict[str, Any]) -> StrokeStyle:

@@ -22,7 +22,7 @@ from ..field.singularities import euler_characteristic
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import build_surface
 from ..progress import run_to_completion
-from ..rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .mesh_objects import MeshArrays, arrays_of
 
 

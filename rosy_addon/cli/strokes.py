@@ -1,4 +1,4 @@
-"""The command `strokes`: evenly spaced streamlines as an .svg file."""
+"""The command `strokes`: evenly spaced streamlines as an .svg file, or as polylines in space."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from .. import api
 from ..api.pictures import DEFAULT_VIEW
 from ..errors import RosyError
 from ..frame_workers import parse_frames
+from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..rendering.mesh_view import check_light
@@ -37,6 +38,13 @@ MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("uv", "undefined", "ortho"), False),
     "view": DEFAULT_VIEW,
 }
+#: The options that are only for pictures, with the names of their values.
+PAGE_OPTIONS = {
+    "--plotter": "plotter",
+    "--mm": "millimetres",
+    "--colors": "colours",
+    "--paper": "paper",
+}
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
 
@@ -45,7 +53,14 @@ def add_strokes_command(subparsers: Any, extras: Extras) -> None:
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
     add_mesh_options(parser, extras, allow_scene=True)
-    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.svg")
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=Path,
+        metavar="OUT",
+        help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
+    )
     add_view_options(parser, None)
     add_object_option(parser, "objects of a .blend file; by default all with a field")
     parser.add_argument(
@@ -61,8 +76,10 @@ def add_strokes_command(subparsers: Any, extras: Extras) -> None:
 
 
 def run_strokes(options: argparse.Namespace) -> None:
-    """Draw evenly spaced strokes along the fields of meshes, as an .svg file."""
-    check_output(options, ".svg")
+    """Draw evenly spaced strokes along the fields of meshes, as an .svg file or as polylines."""
+    check_output(options)
+    if check_drawing_suffix(options.output) != ".svg":
+        _reject_page_options(options)
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
@@ -141,7 +158,7 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     objects = requested_objects(options) or target_objects(scene, layer)
     result = draw_strokes(
         scene,
-        kind="SVG",
+        kind="FILE",
         path=Path(os.path.realpath(path)),
         objects=objects,
         camera=camera,
@@ -151,6 +168,13 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     )
     print_warnings(result.notes)
     print_line(f"{result.camera}: {result.path}")
+
+
+def _reject_page_options(options: argparse.Namespace) -> None:
+    """Raise an error if an option is set that is for pictures."""
+    for option, name in PAGE_OPTIONS.items():
+        if name in options:
+            raise RosyError(f"{options.output}: {option} applies only to .svg files")
 
 
 def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_kind: str) -> None:

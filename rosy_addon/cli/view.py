@@ -6,7 +6,7 @@ import argparse
 
 from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
 from ..projection.camera import check_size
-from ..rendering.mesh_view import UP_AXIS_MATRIX
+from ..projection.up_axis import UP_AXIS_MATRIX
 from .options import float_tuple, parse_size
 
 

@@ -12,16 +12,8 @@ from ..field.surface import Surface
 from ..projection.camera import orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from ..projection.up_axis import UP_AXIS_MATRIX
 from .view_input import ViewInput
-
-#: Mesh space to world space, where z points up, for each upward axis of a mesh.
-UP_AXIS_MATRIX = {
-    "y": np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]),
-    "z": np.eye(4),
-}
-
-#: The upward axis of mesh files by suffix, as Blender's importers assume it.
-UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}
 
 
 def mesh_instance(

@@ -48,7 +48,11 @@ STORE_ITEMS = [
 STROKE_KIND_ITEMS = [
     ("PENCIL", "Grease Pencil", "Grease Pencil object with a layer for each family of strokes"),
     ("CURVES", "Curves", "Curves object with attributes for Geometry Nodes"),
-    ("SVG", "SVG File", "SVG file with a layer for each family, for other programs and plotters"),
+    (
+        "FILE",
+        "File",
+        "SVG picture with a layer for each family, or polylines in space as .ply, .obj or .csv",
+    ),
 ]
 INK_ITEMS = [
     ("ONE", "Single", "One ink for all strokes"),
@@ -204,7 +208,7 @@ class RosyStrokes(bpy.types.PropertyGroup):
         ),
         "filepath": bpy.props.StringProperty(
             name="File",
-            description="Path of the .svg file",
+            description="Path of the .svg, .ply, .obj or .csv file",
             subtype="FILE_PATH",
             default="//strokes.svg",
             options=path_property_options(),

@@ -52,7 +52,7 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
             header.label(text=title)
             if body is not None:
                 _draw_stroke_settings(body, settings, names)
-        if settings.kind == "SVG":
+        if settings.kind == "FILE":
             _draw_stroke_settings(layout, settings, ("page", "paper", "plotter"))
         if job_status.current is not None:
             draw_progress(layout)
@@ -60,7 +60,7 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
         objects = stroke_objects(context.scene)
         row = layout.row()
         row.scale_y = 1.5
-        text = "Draw Strokes..." if settings.kind == "SVG" else "Draw Strokes"
+        text = "Draw Strokes..." if settings.kind == "FILE" else "Draw Strokes"
         row.operator("rosy.strokes", text=text, icon="GREASEPENCIL")
         if objects:
             layout.operator("rosy.strokes_remove", icon="TRASH")

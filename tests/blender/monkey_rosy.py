@@ -363,7 +363,7 @@ def strokes(monkey):
         settings.gaps = 0.0
     settings.selected = monkey.chance(0.2)
     settings.plotter, settings.paper = monkey.chance(0.3), monkey.chance(0.5)
-    kind = monkey.pick(["PENCIL", "CURVES", "SVG"])
+    kind = monkey.pick(["PENCIL", "CURVES", "FILE"])
     path = monkey.pick([monkey.folder / "a.svg", monkey.folder / "none" / "a.svg", monkey.folder])
     # `replace`, so that no dialog asks.
     arguments = {"kind": kind, "camera": "SCENE", "filepath": str(path), "replace": True}

@@ -62,7 +62,7 @@ def test_bad_input_is_one_line_and_status_2(saved, tmp_path, options, named):
 def test_strokes_of_the_file(saved, tmp_path):
     bpy.context.scene.rosy.strokes.spacing = 9.0
     bpy.ops.wm.save_mainfile()
-    bpy.ops.rosy.strokes(kind="SVG", filepath=str(tmp_path / "button.svg"))
+    bpy.ops.rosy.strokes(kind="FILE", filepath=str(tmp_path / "button.svg"))
     for arguments, scene in (([], saved), ([saved], None)):
         out = tmp_path / "out.svg"
         status, output = command("strokes", *arguments, "-o", out, scene=scene)

@@ -61,7 +61,7 @@ def saved(with_field, tmp_path):
 
 
 def test_strokes_are_those_of_the_button_and_nothing_else_is_printed(saved):
-    bpy.ops.rosy.strokes(kind="SVG", filepath=str(saved.with_name("button.svg")))
+    bpy.ops.rosy.strokes(kind="FILE", filepath=str(saved.with_name("button.svg")))
     out = saved.with_name("out.svg")
     camera = bpy.context.scene.camera.name
     assert run("strokes", saved, "-o", out) == (0, f"{camera}: {out}\n", "")

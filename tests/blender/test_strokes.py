@@ -77,7 +77,7 @@ def test_renders_show_ink_where_the_file_has_it(
     with_stroke_settings, scene, tmp_path, kind, engine
 ):
     path = tmp_path / "strokes.svg"
-    assert bpy.ops.rosy.strokes(kind="SVG", filepath=str(path)) == {"FINISHED"}
+    assert bpy.ops.rosy.strokes(kind="FILE", filepath=str(path)) == {"FINISHED"}
     expected = coverage_of_svg(path, 160, 120)
     assert bpy.ops.rosy.strokes(kind=kind) == {"FINISHED"}
     rendered = render_strokes(scene, tmp_path / "render.png", engine)
@@ -159,7 +159,7 @@ def test_undo_and_remove(with_stroke_settings, scene, kind):
 
 def test_errors(with_stroke_settings, scene, tmp_path):
     before = contents()
-    assert ".svg" in error_of(bpy.ops.rosy.strokes, kind="SVG", filepath=str(tmp_path / "a.png"))
+    assert ".svg" in error_of(bpy.ops.rosy.strokes, kind="FILE", filepath=str(tmp_path / "a.png"))
     assert "view" in error_of(bpy.ops.rosy.strokes, camera="VIEW")
     scene.rosy.strokes.selected = True
     with_stroke_settings.select_set(False)

@@ -535,7 +535,7 @@ def strokes_from_their_file_browser():
     path = SHOTS / "strokes.svg"
     path.unlink(missing_ok=True)
     settings = bpy.context.scene.rosy.strokes
-    settings.kind, settings.spacing = "SVG", 30.0
+    settings.kind, settings.spacing = "FILE", 30.0
     with in_view():
         assert bpy.ops.rosy.strokes("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
     yield 1.0

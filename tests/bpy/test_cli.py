@@ -129,7 +129,7 @@ def test_strokes_of_a_file_are_those_of_the_button(with_stroke_settings, tmp_pat
         (["--camera", "Side", "--size", "120x90"], {"camera": "Side", "size": (120, 90)}),
     ):
         keywords = {**changes, "camera": scene.objects[changes.get("camera", "Camera")]}
-        draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", **keywords)
+        draw_strokes(scene, kind="FILE", path=tmp_path / "button.svg", **keywords)
         process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
         assert process.returncode == 0, process.stderr
         assert f"{changes.get('camera', 'Camera')}: {tmp_path / 'out.svg'}" in process.stdout
@@ -147,7 +147,7 @@ def test_options_override_the_settings_of_the_scene(with_stroke_settings, tmp_pa
     settings.unit, settings.distance, settings.tone = "world", 0.5, False
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
-    draw_strokes(scene, kind="SVG", path=tmp_path / "button.svg", pen=pen)
+    draw_strokes(scene, kind="FILE", path=tmp_path / "button.svg", pen=pen)
     assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
 
 

@@ -20,7 +20,7 @@ def test_field_picture_strokes_and_removal(scene, camera, monkey, tmp_path):
     assert np.linalg.norm(member_vectors(monkey.data), axis=1).min() > 0
     (baked,) = bake(scene)
     assert pixels(baked.image)[..., 3].max() == 1
-    svg = draw_strokes(scene, kind="SVG", path=tmp_path / "strokes.svg")
+    svg = draw_strokes(scene, kind="FILE", path=tmp_path / "strokes.svg")
     assert svg.path.read_text().startswith("<?xml")
     drawing = draw_strokes(scene, kind="PENCIL")
     assert drawing.obj.name in scene.objects

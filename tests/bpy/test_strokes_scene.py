@@ -319,7 +319,7 @@ def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     instances = read_scene(bpy.context.evaluated_depsgraph_get()).instances
     assert len(instances) == 2
     result = draw_strokes(
-        scene, kind="SVG", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=12)
+        scene, kind="FILE", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=12)
     )
     assert np.allclose(result.drawing.strokes.points[:, 1], -2.0)
     monkey_count = len(
@@ -360,16 +360,42 @@ def thicken(obj, radius):
 
 def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, tmp_path):
     settings = scene.rosy.strokes
-    settings.kind, settings.filepath = "SVG", str(tmp_path / "a.svg")
+    settings.kind, settings.filepath = "FILE", str(tmp_path / "a.svg")
     settings.spacing, settings.taper, settings.width = 9.3, 0.4, 0.7
     settings.tone, settings.light, settings.outline = True, "lamp", True
     settings.inks, settings.outline_colour = "FAMILIES", (1.0, 0.0, 0.0)
     assert draw_strokes(scene).path == tmp_path / "a.svg"
     style = StrokeStyle(spacing=9.3, taper=0.4, tone=True, light="lamp", outline=True)
     pen = Pen(width=0.7, colours=["#db8021", "#4594eb"], outline="#ff0000")
-    draw_strokes(scene, kind="SVG", path=tmp_path / "b.svg", style=style, pen=pen)
+    draw_strokes(scene, kind="FILE", path=tmp_path / "b.svg", style=style, pen=pen)
     text = (tmp_path / "a.svg").read_text()
     assert text == (tmp_path / "b.svg").read_text() and 'stroke="#ff0000"' in text
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".obj"])
+def test_polylines_lie_on_the_object_when_they_are_imported(
+    monkey, camera, scene, tmp_path, suffix
+):
+    """Blender's importers read the files that RoSy writes."""
+    path = tmp_path / f"lines{suffix}"
+    style = StrokeStyle(spacing=12, hidden=True, outline=True)
+    strokes = draw_strokes(scene, kind="FILE", path=path, style=style, pen=BLACK).drawing.strokes
+    assert strokes.closed.any()
+    importer = bpy.ops.wm.ply_import if suffix == ".ply" else bpy.ops.wm.obj_import
+    assert importer(filepath=str(path)) == {"FINISHED"}
+    obj = bpy.context.object
+    mesh, matrix = obj.data, np.array(obj.matrix_world)
+    points = np.array([vertex.co for vertex in mesh.vertices]) @ matrix[:3, :3].T + matrix[:3, 3]
+    is_near = [np.linalg.norm(strokes.points - point, axis=1).min() < 1e-5 for point in points]
+    assert all(is_near)
+    # Every line is a chain or a loop.
+    degree = np.bincount(np.array([edge.vertices for edge in mesh.edges]).ravel())
+    open_count = int((~strokes.closed).sum())
+    assert (degree == 1).sum() == 2 * open_count and (degree == 2).sum() == len(
+        degree
+    ) - 2 * open_count
+    ends = strokes.points[strokes.start[1:] - 1][~strokes.closed]
+    assert np.isclose(np.sort(points[degree == 1], axis=0)[-1], np.sort(ends, axis=0)[-1]).any()
 
 
 def test_cancelling_leaves_nothing(monkey, camera, scene):
@@ -390,13 +416,13 @@ def test_cancelling_leaves_nothing(monkey, camera, scene):
         ("camera", {}, "scene 'Scene' has no active camera"),
         ("field", {}, "no visible object has a RoSy field"),
         ("away", {}, "camera 'Camera': no stroke is visible"),
-        ("", {"kind": "SVG", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
+        ("", {"kind": "FILE", "path": "//a.svg"}, "//a.svg: save the .blend file first"),
         (
             "",
-            {"kind": "SVG", "path": "/tmp/a.png"},
+            {"kind": "FILE", "path": "/tmp/a.png"},
             "/tmp/a.png: the name of the file must end in .svg",
         ),
-        ("", {"kind": "SVG", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
+        ("", {"kind": "FILE", "path": "/nowhere/a.svg"}, "the folder /nowhere does not exist"),
         ("", {"style": StrokeStyle(spacing=1e4)}, "no stroke fits"),
         ("", {"style": StrokeStyle(unit="world", distance=1e-6)}, "increase their distance"),
     ],

@@ -124,7 +124,8 @@ def make_case(category: str, seed: int, folder: Path) -> Case:
 
 
 #: Commands for mesh files, with the extension of their output.
-_OUTPUTS = {"render": ".png", "strokes": ".svg", "field": "", "info": "", "turntable": ".gif"}
+_OUTPUTS = {"render": ".png", "strokes": "", "field": "", "info": "", "turntable": ".gif"}
+_STROKE_OUTPUTS = (".svg", ".svg", ".ply", ".obj", ".csv")
 _FIELD_OUTPUTS = (".rosy", ".rawfield", ".txt", ".npy", ".obj", ".sings")
 
 
@@ -159,7 +160,8 @@ def _command(
     if command == "info":
         case.arguments += ["--json"] * int(rng.random() < 0.5)
         return case
-    suffix = _OUTPUTS[command] or str(rng.choice(_FIELD_OUTPUTS))
+    others = _STROKE_OUTPUTS if command == "strokes" else _FIELD_OUTPUTS
+    suffix = _OUTPUTS[command] or str(rng.choice(others))
     output = "out" + suffix
     case.arguments += ["-o", output]
     case.outputs.add(output)

@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 
 from rosy_addon.errors import UNSAFE, RosyError
+from rosy_addon.field.formats.ply import read_vertex_values
 from rosy_addon.field.formats.text_rows import read_rows
 
 from .cases import Case
@@ -205,9 +206,16 @@ def _file_fault(path: Path) -> str:
                 if re.search(rb"nan|inf", data):
                     return "a number is not finite"
                 read_rows(path)
-            case ".obj":
+            case ".obj" | ".csv":
                 if not data.endswith(b"\n"):
                     return "the last line is cut"
+                if re.search(rb"[ ,]-?(nan|inf)\b", data):
+                    return "a number is not finite"
+            case ".ply":
+                if not all(
+                    np.isfinite(column).all() for column in read_vertex_values(path).values()
+                ):
+                    return "a number is not finite"
     except (OSError, ValueError, SyntaxError, RosyError, ElementTree.ParseError) as error:
         return f"{type(error).__name__}: {error}"
     return ""

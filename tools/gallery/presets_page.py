@@ -23,7 +23,7 @@ from rosy_addon.presets.store import Preset, load_preset, preset_keys
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.mesh_view import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .looks_page import IMAGES
 from .page import ROOT

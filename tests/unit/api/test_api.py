@@ -272,6 +272,31 @@ def test_a_drawing_is_svg(sphere, field, tmp_path, error_of):
     assert "unknown setting 'spacng'" in error_of(rf.strokes, sphere, field, spacng=3)
 
 
+def test_lines_in_space_are_in_the_space_of_the_mesh(tmp_path, error_of):
+    """An ellipsoid whose y points up in its file, unlike in pictures of it."""
+    axes = (1.0, 2.0, 0.5)
+    mesh = icosphere(3)
+    faces = mesh.corner_vertex.reshape(-1, 3)
+    surface = rf.Surface(mesh.vertices * axes, faces, up="y")
+    arguments = {"size": (200, 200), "width": 3.0, "hidden": True, "orthographic": True}
+    drawing = rf.strokes(surface, spacing=8, taper=0.0, **arguments)
+    drawing.save(tmp_path / "a.csv")
+    rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, dtype=None, encoding=None)
+    points, normals = (
+        np.stack([rows[name] for name in names], 1)
+        for names in (("x", "y", "z"), ("nx", "ny", "nz"))
+    )
+    assert len(np.unique(rows["stroke"])) == len(drawing)
+    assert set(rows["family"]) == set(drawing.family_names)
+    assert np.abs(np.linalg.norm(points / axes, axis=1) - 1).max() < 0.02
+    expected = points / np.square(axes)
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    assert (normals * expected).sum(axis=1).min() > 0.99
+    # The frame holds the longest axis in 200 pixels with a margin.
+    assert np.ptp(rows["width"]) == 0 and 3 * 4 / 200 < rows["width"][0] < 3 * 5 / 200
+    assert "must end in .svg, .ply, .obj or .csv" in error_of(drawing.save, tmp_path / "a.png")
+
+
 def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
     numbers = []
     path = rf.turntable(

@@ -1,0 +1,182 @@
+"""Write strokes as polylines in space, for robots, printers and programs of geometry."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, subtask
+from ..projection.camera import Camera
+from .pipeline import simplify_task
+from .stroke_set import Strokes
+from .svg import Pen
+from .visibility import pixel_size
+
+#: Extensions of files of strokes: a picture, and polylines in space.
+DRAWING_SUFFIXES = (".svg", ".ply", ".obj", ".csv")
+
+#: Points that are formatted at once.
+POINTS_PER_STEP = 20_000
+
+#: The properties of a vertex of a .ply file. Lengths are 8 bytes, so that no position is rounded.
+_PLY_VERTEX = np.dtype(
+    [
+        *((name, "<f8") for name in ("x", "y", "z")),
+        *((name, "<f4") for name in ("nx", "ny", "nz", "width")),
+        *((name, "<i4") for name in ("stroke", "family")),
+    ]
+)
+_PLY_EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
+_PLY_TYPE_NAMES = {"f8": "double", "f4": "float", "i4": "int"}
+
+
+def polyline_file_task(
+    suffix: str, strokes: Strokes, camera: Camera, pen: Pen, matrix: np.ndarray | None = None
+) -> Task[bytes]:
+    """Return strokes as the contents of a file.
+
+    Points on straight lines are left out; see `simplify_task`.
+
+    Parameters
+    ----------
+    suffix : {".csv", ".obj", ".ply"}
+        Of the file: a table with a row for each point, lines of Wavefront, or binary vertices and
+        edges of Stanford.
+    strokes : Strokes
+    camera : Camera
+        Camera that sets the length of a pixel.
+    pen : Pen
+        Only its width counts.
+    matrix : (4, 4) ndarray, optional
+        Rotation and translation from world space to the space of the file.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    bytes
+    """
+    strokes = yield from subtask(simplify_task(strokes, camera), 0.0, 0.4, "writing strokes")
+    order = np.argsort(strokes.family, kind="stable")
+    strokes = strokes.select(order)
+    width = pen.width * pixel_size(strokes.points, camera) * strokes.width
+    matrix = np.eye(4) if matrix is None else matrix
+    points = strokes.points @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = strokes.normal @ matrix[:3, :3].T
+    columns = (points, normals, width)
+    if suffix == ".ply":
+        yield Progress(0.5, "writing strokes")
+        return _ply(strokes, *columns)
+    blocks = (_csv_blocks if suffix == ".csv" else _obj_blocks)(strokes, *columns)
+    contents = []
+    step_count = 2 + len(points) / POINTS_PER_STEP
+    for block in blocks:
+        contents.append(block.encode())
+        yield Progress(0.4 + 0.6 * min(len(contents) / step_count, 1.0), "writing strokes")
+    return b"".join(contents)
+
+
+def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
+    """Return the extension of a file of strokes, in lower case.
+
+    Raises
+    ------
+    RosyError
+        If the file is neither a picture nor one of polylines.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in DRAWING_SUFFIXES:
+        raise RosyError(f"{path}: the name of the file must end in .svg, .ply, .obj or .csv")
+    return suffix
+
+
+def _csv_blocks(
+    strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray
+) -> Iterator[str]:
+    """Yield a header, then a row for each point. A closed stroke ends at its first point."""
+    yield "stroke,family,x,y,z,nx,ny,nz,width\n"
+    stroke = strokes.stroke
+    for rows in _row_blocks(len(points)):
+        names = [strokes.names[family] for family in strokes.family[stroke[rows]]]
+        values = np.column_stack([points[rows], normals[rows], width[rows]]).tolist()
+        yield "".join(
+            f"{number},{name},{x:.9g},{y:.9g},{z:.9g},{nx:.6g},{ny:.6g},{nz:.6g},{w:.6g}\n"
+            for number, name, (x, y, z, nx, ny, nz, w) in zip(
+                stroke[rows].tolist(), names, values, strict=True
+            )
+        )
+
+
+def _obj_blocks(
+    strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray
+) -> Iterator[str]:
+    """Yield vertices, then a line for each stroke, in a group for each family.
+
+    Lines have no normals of their own in this format, so normal n is that of vertex n. Widths are the
+    texture coordinates, with one number each.
+    """
+    first_of_closed, kept = _without_repeated_points(strokes)
+    rows = np.flatnonzero(kept)
+    yield "# Each normal and each texture coordinate, the width, is that of the vertex of the same number\n"
+    for keyword, values in (("v", points), ("vn", normals), ("vt", width[:, None])):
+        form = keyword + values.shape[1] * (" %.9g" if keyword == "v" else " %.6g") + "\n"
+        for block in _row_blocks(len(rows)):
+            yield "".join(form % tuple(row) for row in values[rows[block]].tolist())
+    number = np.cumsum(kept)
+    number[~kept] = number[first_of_closed]
+    text, family = [], -1
+    for stroke, (first, last) in enumerate(
+        zip(strokes.start[:-1].tolist(), strokes.start[1:].tolist(), strict=True)
+    ):
+        if strokes.family[stroke] != family:
+            family = int(strokes.family[stroke])
+            text.append(f"g {strokes.names[family].replace(' ', '_')}\n")
+        text.append("l " + " ".join(f"{n}/{n}" for n in number[first:last].tolist()) + "\n")
+    yield "".join(text)
+
+
+def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
+    """Return a binary file with the points as vertices and the segments as edges."""
+    first_of_closed, kept = _without_repeated_points(strokes)
+    stroke = strokes.stroke
+    vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)
+    columns = (*points.T, *normals.T, width, stroke, strokes.family[stroke])
+    for name, values in zip(_PLY_VERTEX.names, columns, strict=True):
+        vertex[name] = values[kept]
+    number = np.cumsum(kept) - 1
+    number[~kept] = number[first_of_closed]
+    last = np.flatnonzero(stroke[1:] == stroke[:-1]) + 1
+    edge = np.zeros(len(last), dtype=_PLY_EDGE)
+    edge["vertex1"], edge["vertex2"] = number[last - 1], number[last]
+    header = ["ply", "format binary_little_endian 1.0"]
+    header += [f"comment family {number} {name}" for number, name in enumerate(strokes.names)]
+    for name, rows in (("vertex", vertex), ("edge", edge)):
+        header.append(f"element {name} {len(rows)}")
+        header += [
+            f"property {_PLY_TYPE_NAMES[rows.dtype[column].str[1:]]} {column}"
+            for column in rows.dtype.names
+        ]
+    text = "\n".join([*header, "end_header", ""])
+    return text.encode() + vertex.tobytes() + edge.tobytes()
+
+
+def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of the first points of closed strokes, and which points are not repeated.
+
+    The last point of a closed stroke is its first one again.
+    """
+    kept = np.ones(len(strokes.points), dtype=bool)
+    kept[strokes.start[1:][strokes.closed] - 1] = False
+    return strokes.start[:-1][strokes.closed], kept
+
+
+def _row_blocks(count: int) -> Iterator[slice]:
+    """Yield the rows of each step."""
+    for first in range(0, count, POINTS_PER_STEP):
+        yield slice(first, min(first + POINTS_PER_STEP, count))

@@ -256,7 +256,7 @@ def _frame_task(
         cache=cache,
     )
     scene_views = yield from subtask(reading, 0.0, 0.0)
-    states = read_picture_states(scene, depsgraph, sources)
+    states = read_picture_states(scene, depsgraph, sources, is_frame=True)
     results = []
     for index, view in enumerate(scene_views.views):
         start, stop = index / len(sources), (index + 1) / len(sources)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import bpy
 
 from .cache import BAKE_CACHE
-from .compositor.look import Look
+from .compositor.ink_thresholds import unlit_look
+from .compositor.look import Look, is_hatched
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .rendering.band_workers import BandWorkers
@@ -26,6 +28,7 @@ from .scene.pictures import (
     read_output_settings,
 )
 from .scene.read_view import read_views_task, scene_depsgraph
+from .scene.texture_nodes import Hatching
 
 __all__ = ["BakeResult", "bake", "bake_task"]
 
@@ -82,6 +85,9 @@ def bake_task(
     """
     look = read_look(scene.rosy) if look is None else look
     settings = read_output_settings(scene) if settings is None else settings
+    draws_thresholds = settings.relight and is_hatched(look)
+    if draws_thresholds:
+        look, settings = unlit_look(look), replace(settings, device="cpu")
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
@@ -96,11 +102,15 @@ def bake_task(
         renderer = select_renderer(settings.device, look, BAKE_CACHE, workers=pool)
         for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
             start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
+            view = replace(view, draws_thresholds=draws_thresholds)
             picture = yield from subtask(renderer.render_task(view), start, stop)
             image_task = image_data_task(picture, as_float=settings.as_float)
             image_data = yield from subtask(image_task, stop, stop)
             drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
-            rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from))
+            hatching = Hatching(look, picture.line_count) if draws_thresholds else None
+            rendered_views.append(
+                RenderedView(picture, image_data, view.camera, drawn_from, hatching)
+            )
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.97, "applying the pictures")
     results = [

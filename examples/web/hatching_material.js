@@ -59,7 +59,7 @@ void main() {
   float spread = max(texel.a - dot(centered, centered) / 3.0 - 0.001, 0.0);
   float filteredEdge = sqrt(0.75 * spread);
   float evenness = min(3.0 * spread, 1.0);
-  float correction = 2.0 * evenness * (1.0 - evenness);
+  float correction = 3.0 * evenness * evenness * (1.0 - evenness);
   float edgeFactor = 1.6 * 1.6 * pow(0.125, crispness);
 
   vec3 color = paper;
@@ -69,9 +69,12 @@ void main() {
     float room = min(coverage, 1.0 - coverage), inner = coverage * (1.0 - coverage);
     float edge = max(max(min(edgeFactor * inner, room), filteredEdge), 0.002);
     float corrected = coverage + correction * inner * (1.0 - 2.0 * coverage);
-    float covered = clamp((corrected - texel[line]) / (2.0 * edge) + 0.5, 0.0, 1.0);
+    float covered = (corrected - texel[line]) / (2.0 * edge) + 0.5;
+    // What is narrower than the edge covers no point of it entirely, be it ink or paper.
+    float missed = 1.0 - min(room / edge, 1.0), isDark = step(0.5, coverage);
+    covered = clamp(covered, isDark * missed, 1.0 - (1.0 - isDark) * missed);
     // No ink at all, and nothing but ink, are exact.
-    covered = mix(step(0.5, coverage), covered, min(room / 0.02, 1.0));
+    covered = mix(isDark, covered, min(room / 0.02, 1.0));
     color = mix(color, ink[line], covered);
   }
   gl_FragColor = vec4(color, 1.0);

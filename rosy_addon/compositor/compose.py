@@ -27,6 +27,7 @@ from .hatching import (
     render_hatching,
 )
 from .image_noise import NOISE_MEAN
+from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, is_hatched
@@ -51,6 +52,7 @@ def compose_task(
     cache: Cache | None = None,
     mesh_cache: Cache | None = None,
     band: Band | None = None,
+    draws_thresholds: bool = False,
 ) -> Task[Picture]:
     """Draw the fields of a G-buffer.
 
@@ -72,6 +74,9 @@ def compose_task(
         Stores what does not depend on the camera, by default `cache`.
     band : Band, optional
         The rows that are drawn, if not all. The G-buffer has them and their context.
+    draws_thresholds : bool
+        Whether the picture has the thresholds of its ink (`ink_thresholds`), if the look has ink. They do
+        not depend on the tone.
 
     Returns
     -------
@@ -92,6 +97,10 @@ def compose_task(
         look = replace(look, supersampling=1)
     look = look_in_pixels(look, camera, gbuffer.instances)
     pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
+    draws_thresholds = draws_thresholds and is_hatched(look)
+    if draws_thresholds:
+        pixel_look = sharp_look(pixel_look)
+    spread = np.zeros((len(gbuffer.pixel) if draws_thresholds else 0, 1), dtype=np.float32)
     color = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
@@ -141,6 +150,11 @@ def compose_task(
             entries = part.gbuffer_index
             if modulation is None:
                 color[entries] = colorize(part, part_images, layer.tone[block], part_look)
+            elif draws_thresholds:
+                pixels = picture_thresholds(
+                    part, part_images, part_look, modulation.part(block), look.supersampling
+                )
+                color[entries], spread[entries] = pixels[:, :3], pixels[:, 3:]
             else:
                 color[entries], alpha[entries] = render_hatching(
                     part, part_images, part_look, tone[block], modulation.part(block)
@@ -148,20 +162,15 @@ def compose_task(
         layers.append(layer)
     if not is_hatched(look):
         color *= tone_rgb
-    rgba = yield from subtask(
-        _resolve_pixels_task(
-            gbuffer.pixel,
-            color,
-            alpha,
-            camera.width,
-            (0, camera.height) if band is None else (band.start, band.stop),
-            look.supersampling,
-            gbuffer.coverage,
-        ),
-        1.0,
-        1.0,
-    )
-    return Picture(rgba, tuple(layers))
+    rows = (0, camera.height) if band is None else (band.start, band.stop)
+    frame = camera.width, rows, look.supersampling, gbuffer.coverage
+    resolve = _resolve_pixels_task(gbuffer.pixel, color, alpha, *frame)
+    rgba = yield from subtask(resolve, 1.0, 1.0)
+    if not draws_thresholds:
+        return Picture(rgba, tuple(layers))
+    resolve = _resolve_pixels_task(gbuffer.pixel, spread, alpha, *frame)
+    spread_rgba = yield from subtask(resolve, 1.0, 1.0)
+    return Picture(rgba, tuple(layers), spread_rgba[..., 0])
 
 
 def compose(

@@ -365,10 +365,10 @@ def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
     families = line_families(field, look)
     if families is not None:
         return [np.minimum(family, MAX_INKS - 1) for family in families]
-    return [_soft_rank(rank, field.line_count) for rank in _line_ranks(field, look)]
+    return [soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)]
 
 
-def _line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
+def line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
     """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
 
     A line has a rank from k to k + 1 if k other lines are nearer to the guiding angle. Where two
@@ -382,7 +382,7 @@ def _line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
     return ranks
 
 
-def _soft_rank(rank: np.ndarray, rank_count: int) -> np.ndarray:
+def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
     """Ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
 
     The result is at most `rank_count - 1`.
@@ -447,8 +447,8 @@ def _onset_darkness(
 ) -> list[np.ndarray]:
     """(P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
     onsets = []
-    for line, rank in enumerate(_line_ranks(field, look)):
-        onset = _soft_rank(rank, look.layers) * np.float32(look.layering)
+    for line, rank in enumerate(line_ranks(field, look)):
+        onset = soft_rank_of(rank, look.layers) * np.float32(look.layering)
         if look.layers < field.line_count:
             onset += 2 * smoothstep((rank - look.layers + RANK_BLEND) / (2 * RANK_BLEND))
         if even_lines is not None:

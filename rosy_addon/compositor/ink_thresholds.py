@@ -15,17 +15,24 @@ the smallest, and what is left of the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .even_lines import uneven_width
-from .hatching import LineModulation, onset_weights, standard_streak
+from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
+from .hatching import (
+    LineModulation,
+    line_ranks,
+    onset_weights,
+    soft_rank_of,
+    standard_streak,
+)
 from .inks import Inks, inks_of
 from .lic_images import LicImages
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH
+from .pixel_field import PixelField
 from .streak_statistics import (
     COVERAGE_STEPS,
     break_amount,
@@ -43,6 +50,9 @@ DENSITY_FACTOR = 1.6
 #: Spread of thresholds that is due to their storage with 8 bits.
 ROUNDING_SPREAD = 0.001
 
+#: Square of half the width of an even distribution of thresholds t over the variance of 2 t - 1.
+EDGE_VARIANCE = 0.75
+
 #: Half the width of the sharpest edges, in thresholds.
 MIN_EDGE = 0.002
 
@@ -50,8 +60,18 @@ MIN_EDGE = 0.002
 EXACT_ENDS = 0.02
 
 #: Correction of coverages where a filter averages a few thresholds, which are not evenly distributed about
-#: their mean. Fitted to means of 2 to 64 thresholds, whose mean coverage is then right to 0.02.
-FILTER_CORRECTION = 0.5
+#: their mean. Fitted to means of 2 to 64 thresholds, and to lines at least 4 pixels apart: the mean coverage is
+#: right to 0.02.
+FILTER_CORRECTION = 3.0
+
+#: Nodes across an antialiased pixel, in half widths of it, with their weights: Gauss quadrature.
+PIXEL_NODES = ((-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18))
+
+#: Crowding from which coarser lines replace even ones, at each of these nodes.
+PIXEL_LEVELS = (1 / 6, 1 / 2, 5 / 6)
+
+#: Half the width of a pixel for streaks, in pixels. Its variance is that of the edges of `hatching`.
+STREAK_REACH = 0.6**0.5
 
 #: Smallest transmittance, and smallest difference to it.
 MIN_TRANSMITTANCE = 1e-3
@@ -66,6 +86,11 @@ DENSITY_STEPS, MAX_DENSITY = 1024, 16.0
 def sharp_look(look: Look) -> Look:
     """Return a look whose streak statistics are those of lines with sharp edges."""
     return replace(look, crispness=1.0)
+
+
+def unlit_look(look: Look) -> Look:
+    """Return a look without what thresholds do not depend on: sources of the tone and lights."""
+    return replace(look, tone="light", light="headlight", shadows=False, overshoot=0.0)
 
 
 def line_thresholds(
@@ -166,8 +191,22 @@ def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarra
     return np.float32(0.5) * (low + high)
 
 
+def cyclic_weights(first_weights: np.ndarray) -> list[np.ndarray]:
+    """Return the weights of `ordered_thresholds` for lines that follow each other in the order of M.
+
+    Parameters
+    ----------
+    first_weights : (M, P) float32 ndarray
+        How much each line comes first; the sum is 1.
+    """
+    weights = [first_weights]
+    for layer in range(1, min(len(first_weights), MAX_LAYERS)):
+        weights.append(weights[-1] + np.roll(first_weights, layer, axis=0))
+    return weights
+
+
 def ordered_thresholds(
-    thresholds: np.ndarray, first_weights: np.ndarray, undefined: np.ndarray, look: Look
+    thresholds: np.ndarray, weights: Sequence[np.ndarray], undefined: np.ndarray, look: Look
 ) -> np.ndarray:
     """Sort the thresholds of lines by their order.
 
@@ -175,8 +214,8 @@ def ordered_thresholds(
     ----------
     thresholds : (M, P) float32 ndarray
         From `line_thresholds`.
-    first_weights : (M, P) float32 ndarray
-        How much each line comes first; the sum is 1. The other lines follow in the order of M.
+    weights : sequence of min(M, MAX_LAYERS) (M, P) float32 ndarrays
+        For each place in the order, how much each line has this place or an earlier one.
     undefined : (P,) bool ndarray
         Where there are no lines, and the thresholds of the first hold for all ink together.
     look : Look
@@ -194,13 +233,10 @@ def ordered_thresholds(
     # What is left of the density of each line, and whether it has begun.
     density = -np.log1p(-np.minimum(thresholds, np.float32(1 - np.exp(-MAX_DENSITY))))
     has_begun = np.zeros(density.shape, dtype=bool)
-    weights = np.zeros_like(first_weights)
     ordered = np.empty((layers, density.shape[1]), dtype=np.float32)
     points = np.arange(density.shape[1])
     for layer in range(layers):
-        # A line has the weight of being this one or an earlier one.
-        weights += np.roll(first_weights, layer, axis=0)
-        share = np.where(has_begun, np.float32(0), weights)
+        share = np.where(has_begun, np.float32(0), weights[layer])
         share /= np.maximum(share.sum(axis=0), np.float32(1e-6))
         begin = np.full(density.shape, np.inf, dtype=np.float32)
         np.divide(density, share, out=begin, where=share > 0)
@@ -252,7 +288,7 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
     ----------
     ordered : (L, P) float32 ndarray
         From `ordered_thresholds`.
-    resolved : (P,) ndarray or float
+    resolved : (L, P) or (P,) ndarray, or float
         0 to 1: how much of the contrast of the lines is drawn. They are a mean tone where it is 0.
 
     Returns
@@ -263,16 +299,117 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
         exceeds that of the averages by the spread of the thresholds, so that what is finer than a
         pixel can be drawn as its mean.
     """
+    resolved = np.broadcast_to(resolved, ordered.shape)
     rgba = np.empty((ordered.shape[1], 4), dtype=np.float32)
     for channel in range(3):
         layer = channel if channel < len(ordered) else 0
-        value = 0.5 + resolved * (ordered[layer] - np.float32(0.5))
+        value = 0.5 + resolved[layer] * (ordered[layer] - np.float32(0.5))
         rgba[:, channel] = np.rint(255 * value) / np.float32(255)
     centered = 2 * rgba[:, :3] - 1
     rgba[:, 3] = (centered * centered).mean(axis=1)
     # What is not drawn has the spread of all thresholds.
-    rgba[:, 3] += (1 - np.square(resolved)) / 3
+    rgba[:, 3] += (1 - np.square(resolved).mean(axis=0)) / 3
     return rgba
+
+
+def picture_thresholds(
+    field: PixelField,
+    images: LicImages | None,
+    look: Look,
+    modulation: LineModulation,
+    samples_per_side: int = 1,
+) -> np.ndarray:
+    """Compute the thresholds of the pixels of a picture.
+
+    The lines are in the order in which they are drawn in a picture: that of their ranks. The outline has ink
+    in any tone but the lightest. Antialiased pixels have the mean and the spread of a few thresholds across
+    the lines.
+
+    Parameters
+    ----------
+    field : PixelField
+    images : LicImages
+        Member images in the order of `all_members(field, look.guiding_angle)`.
+    look : Look
+        A `sharp_look`, in pixels of the frame.
+    modulation : LineModulation
+        Without `line_tones`.
+    samples_per_side : int
+        Samples of the frame along each side of a pixel.
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        As of `threshold_pixels`.
+    """
+    lines, even_lines = range(field.line_count), modulation.even_lines
+    places = np.stack([soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)])
+    crowding = None
+    if even_lines is not None:
+        # Crowded lines come last, as in `line_shares`.
+        crowding = np.stack([even_lines.crowding(line, look) for line in lines])
+        places += field.line_count * crowding
+        places -= places.min(axis=0)
+    layers = range(min(field.line_count, MAX_LAYERS))
+    weights = [np.clip(layer + 1 - places, 0, 1) for layer in layers]
+    # How much each line has each place.
+    share = np.diff(np.stack(weights), axis=0, prepend=np.float32(0))
+    share /= np.maximum(share.sum(axis=1, keepdims=True), np.float32(1e-6))
+    pixels = np.zeros((len(field.pixel), 4), dtype=np.float32)
+    is_sampled = even_lines is not None or images.slopes is not None
+    for (node, weight), level in zip(PIXEL_NODES, PIXEL_LEVELS, strict=True):
+        if not is_sampled and node:
+            continue
+        resolved: np.ndarray | float = 1.0
+        if even_lines is not None:
+            sample, period = _even_sample(even_lines, crowding > level, node)
+            part = modulation._replace(even_lines=sample)
+            resolved = np.einsum("klp,lp->kp", share, resolved_share(period, samples_per_side))
+        else:
+            part = modulation
+        if part.break_images is not None:
+            part = part._replace(break_images=_streak_sample(part.break_images, node))
+        part_images = _streak_sample(images, node)
+        thresholds = np.stack([line_thresholds(line, part_images, look, part) for line in lines])
+        ordered = ordered_thresholds(thresholds, weights, field.representation == 0, look)
+        if modulation.outline is not None:
+            ordered *= 1 - modulation.outline
+        pixels += np.float32(weight if is_sampled else 1) * threshold_pixels(ordered, resolved)
+    # The spread is that about the values that are stored.
+    mean = pixels[:, :3]
+    rounded = np.rint(255 * mean) / np.float32(255)
+    pixels[:, 3] += (np.square(2 * rounded - 1) - np.square(2 * mean - 1)).mean(axis=1)
+    pixels[:, :3] = rounded
+    return pixels
+
+
+def _streak_sample(images: LicImages, node: float) -> LicImages:
+    """Return images beside the centers of pixels, at a node of `PIXEL_NODES`."""
+    if images.slopes is None or not node:
+        return images
+    shift = np.float32(STREAK_REACH * node) * images.slopes
+    return replace(images, members=images.members + shift[..., None])
+
+
+def _even_sample(
+    lines: EvenLines, is_coarse: np.ndarray, node: float
+) -> tuple[EvenLines, np.ndarray]:
+    """Return even lines beside the centers of pixels, at a node of `PIXEL_NODES`, and their period.
+
+    `is_coarse`, (M, P) bool, says where they are replaced by those of larger distance.
+    """
+    streaks, period = lines.streaks, lines.period
+    if lines.coarse_streaks is not None:
+        streaks = np.where(is_coarse, lines.coarse_streaks, streaks)
+        period = np.where(is_coarse, np.float32(COARSE_RATIO) * period, period)
+    position = np.abs(1 - streaks + np.float32(node) / np.maximum(period, np.float32(1)))
+    position = np.minimum(position, 2 - position)
+    if lines.growth is not None:
+        # Ink spreads from lines and from those that grow between them.
+        between = 0.5 * lines.growth
+        spread_between = (1 - position) / np.maximum(between, np.float32(1e-6))
+        position = np.minimum(position / (1 - between), spread_between)
+    return EvenLines(1 - position, lines.period, growth=None), period
 
 
 def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
@@ -316,9 +453,9 @@ def ink_of_thresholds(
     spread = pixels[:, 3] - (centered * centered).mean(axis=1) - np.float32(ROUNDING_SPREAD)
     spread = np.maximum(spread, 0)
     # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
-    filtered_edge = np.sqrt(0.75 * spread)
+    filtered_edge = np.sqrt(EDGE_VARIANCE * spread)
     evenness = np.minimum(3 * spread, 1)
-    correction = 4 * FILTER_CORRECTION * evenness * (1 - evenness)
+    correction = FILTER_CORRECTION * evenness * evenness * (1 - evenness)
     color = None if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
     bare = np.ones(len(tone), dtype=np.float32)
     for layer in range(layers):
@@ -329,7 +466,10 @@ def ink_of_thresholds(
         edge = np.maximum(np.maximum(np.minimum(edge, room), filtered_edge), MIN_EDGE)
         corrected = coverage + correction * inner * (1 - 2 * coverage)
         covered = np.clip((corrected - pixels[:, layer]) / (2 * edge) + 0.5, 0, 1)
+        # What is narrower than the edge covers no point of it entirely, be it ink or paper.
+        missed = 1 - np.minimum(room / edge, 1)
         is_dark = coverage > 0.5
+        covered = np.clip(covered, is_dark * missed, 1 - ~is_dark * missed)
         covered = is_dark + np.minimum(room / EXACT_ENDS, 1) * (covered - is_dark)
         ink = colors[layer]
         color = ink if color is None else color + covered[:, None] * (ink - color)

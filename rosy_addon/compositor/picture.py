@@ -41,7 +41,16 @@ class Picture:
         or, with clear paper, the coverage by ink.
     layers : tuple of DegreeLayer
         One per visible degree, in ascending order. Empty if the picture is from a graphics card.
+    spread : (H, W) float32 ndarray or None
+        If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
+        is the fraction of the pixel in which a field is visible.
     """
 
     rgba: np.ndarray
     layers: tuple[DegreeLayer, ...]
+    spread: np.ndarray | None = None
+
+    @property
+    def line_count(self) -> int:
+        """The largest number of lines of its fields through a point; 0 without layers."""
+        return max((len(layer.images.members) for layer in self.layers), default=0)

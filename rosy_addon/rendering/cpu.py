@@ -33,7 +33,7 @@ class CpuRenderer:
         Whether G-buffers and the results computed from them are kept. If not, as for animations,
         only results that do not depend on the camera are kept.
     workers : BandWorkers, optional
-        Processes that draw large pictures together. Their G-buffers are not kept.
+        Processes that draw large pictures together, but for thresholds. Their G-buffers are not kept.
     """
 
     device_name = "cpu"
@@ -59,7 +59,13 @@ class CpuRenderer:
                 return Picture(rgba, ())
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(
-            gbuffer, view.look, view.lights, view.reference, self._gbuffer_cache, self._cache
+            gbuffer,
+            view.look,
+            view.lights,
+            view.reference,
+            self._gbuffer_cache,
+            self._cache,
+            draws_thresholds=view.draws_thresholds,
         )
         return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
 
@@ -69,7 +75,7 @@ class CpuRenderer:
         If need be, the cache gives back its own, or a single process draws the picture.
         """
         check_instances(view.instances, view.sample_camera, view.look.display)
-        if self._workers is not None:
+        if self._workers is not None and not view.draws_thresholds:
             rows = self._workers.divide(view)
             with suppress(RosyError):
                 check_picture_memory(view, rows, self._workers.count)

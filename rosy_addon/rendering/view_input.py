@@ -48,6 +48,9 @@ class ViewInput:
         For the tone "picture".
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
+    draws_thresholds : bool
+        Whether the picture has the thresholds of its ink; see `compose_task`. Only `CpuRenderer` draws
+        them.
     """
 
     instances: tuple[MeshInstance, ...]
@@ -56,6 +59,7 @@ class ViewInput:
     lights: tuple[Light, ...] = ()
     reference: ReferenceRender | None = None
     clip_planes: np.ndarray | None = None
+    draws_thresholds: bool = False
 
     @property
     def sample_camera(self) -> Camera:

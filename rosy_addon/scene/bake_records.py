@@ -366,9 +366,8 @@ class _PresentReasons:
             return {"stale_reason": str(error)}
         if source is None:
             return {"stale_reason": f"camera '{name}' was deleted"}
-        present = self.scene_state.picture_state(self.scene, self.depsgraph, source)
-        if record.frames:
-            del present.output["placement"]  # frames always fill the frame of the camera
+        is_frame = bool(record.frames)
+        present = self.scene_state.picture_state(self.scene, self.depsgraph, source, is_frame)
         recorded = replace(recorded, device=record.device)
         present = replace(present, device=self._device(present, record))
         return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}

@@ -35,7 +35,7 @@ class ImageData(NamedTuple):
     Attributes
     ----------
     pixels : (H, W, 4) float32 ndarray
-        Linear, with bleed; see `with_bleed`.
+        Linear, with bleed; see `with_bleed`. Thresholds of ink with their spread, if the picture has them.
     png : bytes or None
         The file of an 8-bit image, None for an image in single precision.
     """
@@ -57,16 +57,32 @@ def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
     -------
     ImageData
     """
-    height = len(picture.rgba)
-    pixels = np.empty(picture.rgba.shape, dtype=np.float32)
-    for start in range(0, height, BLOCK_ROWS):
-        yield Progress(0.5 * start / height, STEP_LABEL)
-        first = max(start - BLEED_PIXELS, 0)
-        block = with_bleed(picture.rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
-        pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
+    pixels = yield from subtask(_bleed_task(picture.rgba), 0.0, 0.5)
+    if picture.spread is not None:
+        spread = picture.rgba.copy()
+        spread[..., 0] = picture.spread
+        spread = yield from subtask(_bleed_task(spread), 0.5, 0.5)
+        # Where nothing was drawn, the ink is a mean tone.
+        is_blank = spread[..., 3] == 0
+        is_blank &= (pixels[..., :3] == NEUTRAL_GRAY).all(axis=2)
+        pixels[..., 3] = spread[..., 0]
+        pixels[is_blank] = (0.5, 0.5, 0.5, 1 / 3)
     if as_float:
         return ImageData(pixels)
-    return ImageData(pixels, (yield from subtask(png_task(pixels), 0.5, 1.0, STEP_LABEL)))
+    png = png_task(pixels, is_color=picture.spread is None)
+    return ImageData(pixels, (yield from subtask(png, 0.5, 1.0, STEP_LABEL)))
+
+
+def _bleed_task(rgba: np.ndarray) -> Task[np.ndarray]:
+    """Return `with_bleed` of a picture, a few rows at a time."""
+    height = len(rgba)
+    pixels = np.empty(rgba.shape, dtype=np.float32)
+    for start in range(0, height, BLOCK_ROWS):
+        yield Progress(start / height, STEP_LABEL)
+        first = max(start - BLEED_PIXELS, 0)
+        block = with_bleed(rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
+        pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
+    return pixels
 
 
 def new_image(

@@ -15,6 +15,7 @@ from ..color import from_hex, to_linear
 from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
 from ..compositor.ink_thresholds import (
     DENSITY_FACTOR,
+    EDGE_VARIANCE,
     EXACT_ENDS,
     FILTER_CORRECTION,
     MAX_LAYERS,
@@ -192,9 +193,9 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
     channels = [Number(build, socket) for socket in thresholds.outputs]
     spread = _filtered_spread(number("Spread"), channels)
     # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
-    filtered_edge = (spread * 0.75).square_root()
+    filtered_edge = (spread * EDGE_VARIANCE).square_root()
     evenness = (spread * 3).at_most(1.0)
-    correction = evenness * (1 - evenness) * (4 * FILTER_CORRECTION)
+    correction = evenness * evenness * (1 - evenness) * FILTER_CORRECTION
     softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
     edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
     bare, color, ink_color = None, source["Paper"], inks[0]
@@ -208,10 +209,13 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
         edge = edge.at_least(filtered_edge).at_least(MIN_EDGE)
         corrected = coverage + correction * (inner * (1 - coverage * 2))
         covered = (corrected - threshold) / (edge * 2) + 0.5
+        # What is narrower than the edge covers no point of it entirely, be it ink or paper.
+        missed = 1 - (room / edge).at_most(1.0)
+        is_dark = coverage > 0.5
+        covered = covered.at_least(is_dark * missed).at_most(1 - (1 - is_dark) * missed)
         # No ink at all, and nothing but ink, are exact.
         end = (room * (1 / EXACT_ENDS)).at_most(1.0)
-        is_dark = coverage > 0.5
-        covered = is_dark + end * (covered.at_least(0.0).at_most(1.0) - is_dark)
+        covered = is_dark + end * (covered - is_dark)
         color = build.mix("RGBA", covered.socket, color, inks[layer])
         if layer:
             ink_color = build.mix("RGBA", covered.socket, ink_color, inks[layer])

@@ -15,6 +15,7 @@ from .compat import is_editable
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material
 from .owned_data import OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
+from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
 MODIFIER_NAME = "RoSy"
@@ -26,6 +27,8 @@ CLIP_ATTRIBUTE = "rosy_projection"
 #: modifier.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
+_OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
+
 
 def new_material(
     name: str,
@@ -35,8 +38,12 @@ def new_material(
     window_coordinates: bool = False,
     emission: float = 1.0,
     diffuse: float = 0.0,
+    hatching: Hatching | None = None,
+    group: bpy.types.NodeTree | None = None,
 ) -> bpy.types.Material:
     """Create a material that shows a picture, the same in Cycles and EEVEE.
+
+    Hatching is drawn by the light on the surface; see `hatching_shader`.
 
     The attribute `CLIP_ATTRIBUTE` gives the position in the picture. Objects without it, such as
     those with several instances of one mesh, use their current world position. Outside the frame of
@@ -54,15 +61,19 @@ def new_material(
         Strength of the emission.
     diffuse : float
         Factor of the diffuse color.
+    hatching : Hatching, optional
+        How hatching is drawn, if the image has thresholds of ink and not colors.
+    group : bpy.types.NodeTree, optional
+        From `hatching_group`, for hatching.
     """
     material, build = new_empty_material(name)
     tree = build.tree
     image_node = build(
         "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
     )
+    is_inside = None
     if window_coordinates:
         tree.links.new(build("ShaderNodeTexCoord").outputs["Window"], image_node.inputs["Vector"])
-        color = image_node.outputs["Color"]
     else:
         clip = _clip_position(build, view_projection)
         x, y, w = (clip.outputs[axis] for axis in "XYZ")
@@ -73,9 +84,21 @@ def new_material(
             tree.links.new(build.math("MULTIPLY_ADD", ratio, 0.5, 0.5), uv.inputs[axis])
         tree.links.new(uv.outputs[0], image_node.inputs["Vector"])
         is_inside = build.math("LESS_THAN", max_abs_xy, w)
-        color = build.mix(
-            "RGBA", is_inside, (NEUTRAL_GRAY,) * 3 + (1.0,), image_node.outputs["Color"]
-        )
+    output = build("ShaderNodeOutputMaterial")
+    if hatching is not None:
+        shader = hatching_shader(build, image_node, group, hatching)
+        if is_inside is not None:
+            outside, mix = build("ShaderNodeEmission"), build("ShaderNodeMixShader")
+            outside.inputs["Color"].default_value = _OUTSIDE_COLOR
+            tree.links.new(is_inside, mix.inputs[0])
+            tree.links.new(outside.outputs["Emission"], mix.inputs[1])
+            tree.links.new(shader, mix.inputs[2])
+            shader = mix.outputs["Shader"]
+        tree.links.new(shader, output.inputs["Surface"])
+        return material
+    color = image_node.outputs["Color"]
+    if is_inside is not None:
+        color = build.mix("RGBA", is_inside, _OUTSIDE_COLOR, color)
     emission_node, diffuse_node = build("ShaderNodeEmission"), build("ShaderNodeBsdfDiffuse")
     emission_node.inputs["Strength"].default_value = emission
     tree.links.new(color, emission_node.inputs["Color"])
@@ -84,7 +107,7 @@ def new_material(
     scaled_color.inputs["Scale"].default_value = diffuse
     tree.links.new(color, scaled_color.inputs[0])
     tree.links.new(scaled_color.outputs[0], diffuse_node.inputs["Color"])
-    add_shader, output = build("ShaderNodeAddShader"), build("ShaderNodeOutputMaterial")
+    add_shader = build("ShaderNodeAddShader")
     tree.links.new(emission_node.outputs[0], add_shader.inputs[0])
     tree.links.new(diffuse_node.outputs[0], add_shader.inputs[1])
     tree.links.new(add_shader.outputs[0], output.inputs["Surface"])

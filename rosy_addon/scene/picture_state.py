@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ..cache import content_hash
+from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
 from ..errors import RosyError
 from ..field.rosy_field import MAX_DEGREE
@@ -63,7 +64,7 @@ class PictureState:
     camera : str
         Of the view and the projection. Empty if no picture can be drawn from the camera.
     output : dict
-        Values of `OUTPUT_PROPERTIES`.
+        Values of `OUTPUT_PROPERTIES`, and whether the picture is relit.
     device : str
         What draws the picture: "cpu", "gpu" or "auto".
     objects, occluders, lights : dict of str to list of str
@@ -215,12 +216,23 @@ class SceneState:
             instances.corners.append(_box_corners(mesh_state.bounds, matrix))
 
     def picture_state(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, source: CameraSource
+        self,
+        scene: bpy.types.Scene,
+        depsgraph: bpy.types.Depsgraph,
+        source: CameraSource,
+        is_frame: bool = False,
     ) -> PictureState:
-        """Return the state of the picture from a camera."""
+        """Return the state of the picture from a camera, or of a frame of an animation."""
         camera = _resolved_camera(scene, depsgraph, source)
-        settings = applied_settings(read_look(scene.rosy), self._lacks_tone)
+        look = read_look(scene.rosy)
+        is_relit = scene.rosy.relight and is_hatched(look) and not is_frame
+        if is_relit:
+            look = unlit_look(look)
+        settings = applied_settings(look, self._lacks_tone)
         output = {name: getattr(scene.rosy, name) for name in OUTPUT_PROPERTIES}
+        output["relight"] = is_relit
+        if is_frame:
+            del output["placement"]  # frames always fill the frame of the camera
         if output["store"] == "PACKED":
             del output["directory"]
         occluders = self._relevant_occluders(camera, settings["shadows"])
@@ -229,7 +241,7 @@ class SceneState:
             size=[] if camera is None else [camera.width, camera.height],
             camera="" if camera is None else _digest(camera.view + 0.0, camera.projection + 0.0),
             output=output,
-            device=scene.rosy.device.lower(),
+            device="cpu" if is_relit else scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
             occluders={name: instances.digest_pair() for name, instances in occluders},
             lights=self._lights if settings["light"] == "scene" else {},
@@ -285,11 +297,14 @@ def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
 
 
 def read_picture_states(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, sources: Iterable[CameraSource]
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    sources: Iterable[CameraSource],
+    is_frame: bool = False,
 ) -> list[PictureState]:
-    """Return the state of the picture from each camera."""
+    """Return the state of the picture from each camera, or of a frame of an animation."""
     scene_state = SceneState(scene, depsgraph)
-    return [scene_state.picture_state(scene, depsgraph, source) for source in sources]
+    return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
 
 
 def bakes_light(settings: bpy.types.PropertyGroup, look: Look) -> bool:

@@ -34,6 +34,7 @@ from .bake_records import (
 from .blender_images import ImageData, load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
+from .hatching_nodes import hatching_group
 from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
 from .picture_nodes import (
     new_group,
@@ -43,6 +44,7 @@ from .picture_nodes import (
     set_sequence_frames,
 )
 from .scene_reader import SceneData
+from .texture_nodes import Hatching
 
 #: View transforms that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
@@ -64,6 +66,9 @@ class OutputSettings:
         Folder to save images in. None packs them into the .blend file.
     device : {"cpu", "gpu", "auto"}
         Device that draws the pictures.
+    relight : bool
+        Store the thresholds of hatching, so that the material draws it by the light of the scene. The
+        processor draws them.
     """
 
     window_coordinates: bool = False
@@ -72,6 +77,7 @@ class OutputSettings:
     as_float: bool = False
     folder: Path | None = None
     device: str = "cpu"
+    relight: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +91,15 @@ class RenderedView:
         The picture, converted for the output settings.
     camera : Camera
     drawn_from : DrawnFrom
+    hatching : Hatching or None
+        How the picture is drawn, if it has thresholds of ink.
     """
 
     picture: Picture
     image_data: ImageData
     camera: Camera
     drawn_from: DrawnFrom
+    hatching: Hatching | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +175,7 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
         as_float=properties.image_format == "FLOAT",
         folder=folder,
         device=properties.device.lower(),
+        relight=properties.relight,
     )
 
 
@@ -248,9 +258,15 @@ def apply_picture(
             f"RoSy {name}",
             rendered_view.image_data,
             as_float=settings.as_float,
+            is_color=rendered_view.hatching is None,
             stem=None if settings.folder is None else settings.folder / picture_stem(name),
         )
         created.append(image)
+        group = None
+        if rendered_view.hatching is not None:
+            group, is_new = hatching_group()
+            if is_new:
+                created.append(group)
         material = new_material(
             f"RoSy {name}",
             image,
@@ -258,6 +274,8 @@ def apply_picture(
             window_coordinates=settings.window_coordinates,
             emission=settings.emission,
             diffuse=settings.diffuse,
+            hatching=rendered_view.hatching,
+            group=group,
         )
         created.append(material)
         node_groups = []

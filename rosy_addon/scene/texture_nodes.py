@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import bpy
 import numpy as np
 
@@ -34,18 +36,29 @@ def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.
     return material
 
 
+class Hatching(NamedTuple):
+    """How hatching is drawn from thresholds.
+
+    Attributes
+    ----------
+    look : Look
+        The settings of the ink.
+    line_count : int
+        Number of lines through a point.
+    """
+
+    look: Look
+    line_count: int
+
+
 def new_hatching_material(
     name: str,
     image: bpy.types.Image,
     uv_map: str,
     group: bpy.types.NodeTree,
-    look: Look,
-    line_count: int,
+    hatching: Hatching,
 ) -> bpy.types.Material:
-    """Create a material that draws the hatching of a texture of thresholds, as dense as the light asks.
-
-    In EEVEE, the tone is the diffuse light on the surface. Cycles has no shader that returns the light;
-    there it is the ambient occlusion.
+    """Create a material that draws the hatching of a texture of thresholds; see `hatching_shader`.
 
     Parameters
     ----------
@@ -56,14 +69,31 @@ def new_hatching_material(
         Name of the UV map.
     group : bpy.types.NodeTree
         From `hatching_group`.
-    look : Look
-        The settings of the ink.
-    line_count : int
-        Number of lines through a point.
+    hatching : Hatching
     """
     material, build = new_empty_material(name)
-    tree = build.tree
-    image_node = _image_on_map(build, image, uv_map)
+    shader = hatching_shader(build, _image_on_map(build, image, uv_map), group, hatching)
+    build.tree.links.new(shader, build("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material
+
+
+def hatching_shader(
+    build: NodeBuilder,
+    image_node: bpy.types.Node,
+    group: bpy.types.NodeTree,
+    hatching: Hatching,
+) -> bpy.types.NodeSocket:
+    """Add nodes that draw hatching from an image of thresholds, as dense as the light asks.
+
+    In EEVEE, the tone is the diffuse light on the surface. Cycles has no shader that returns the light;
+    there it is the ambient occlusion.
+
+    Returns
+    -------
+    bpy.types.NodeSocket
+        The shader.
+    """
+    tree, look = build.tree, hatching.look
     # Has no effect, but Blender's exporter of glTF takes the color of the first emission, and follows all
     # links before it, which takes long in the group.
     exported = build("ShaderNodeEmission", label="For Exporters")
@@ -78,18 +108,18 @@ def new_hatching_material(
     occlusion = build("ShaderNodeAmbientOcclusion")
     tone = build.mix("FLOAT", 0.0, occlusion.outputs["AO"], luminance.outputs["Val"])
     tree.links.new(light.outputs["Alpha"], tone.node.inputs["Factor"])
-    hatching = build("ShaderNodeGroup", node_tree=group)
-    set_hatching_look(hatching, look, line_count)
-    tree.links.new(image_node.outputs["Color"], hatching.inputs["Thresholds"])
-    tree.links.new(image_node.outputs["Alpha"], hatching.inputs["Spread"])
-    tree.links.new(tone, hatching.inputs["Tone"])
-    emission, output = build("ShaderNodeEmission"), build("ShaderNodeOutputMaterial")
-    color = hatching.outputs["Ink" if look.clear_paper else "Color"]
+    ink = build("ShaderNodeGroup", node_tree=group)
+    set_hatching_look(ink, look, hatching.line_count)
+    tree.links.new(image_node.outputs["Color"], ink.inputs["Thresholds"])
+    tree.links.new(image_node.outputs["Alpha"], ink.inputs["Spread"])
+    tree.links.new(tone, ink.inputs["Tone"])
+    emission = build("ShaderNodeEmission")
+    color = ink.outputs["Ink" if look.clear_paper else "Color"]
     tree.links.new(color, emission.inputs["Color"])
     surface = emission.outputs["Emission"]
     if look.clear_paper:
         transparent, mix = build("ShaderNodeBsdfTransparent"), build("ShaderNodeMixShader")
-        tree.links.new(hatching.outputs["Coverage"], mix.inputs[0])
+        tree.links.new(ink.outputs["Coverage"], mix.inputs[0])
         tree.links.new(transparent.outputs["BSDF"], mix.inputs[1])
         tree.links.new(surface, mix.inputs[2])
         surface = mix.outputs["Shader"]
@@ -97,8 +127,7 @@ def new_hatching_material(
     unmixed.inputs[0].default_value = 0.0
     tree.links.new(surface, unmixed.inputs[1])
     tree.links.new(exported.outputs["Emission"], unmixed.inputs[2])
-    tree.links.new(unmixed.outputs["Shader"], output.inputs["Surface"])
-    return material
+    return unmixed.outputs["Shader"]
 
 
 def new_anisotropy_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:

@@ -7,13 +7,11 @@ material slots and modifiers are not changed. Its record is among those of the p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..cache import Cache
-from ..compositor.look import Look
 from ..errors import RosyError
 from ..progress import Task
 from ..projection.gbuffer import MeshInstance
@@ -27,7 +25,12 @@ from .picture_state import PictureState
 from .pictures import OutputSettings
 from .read_view import nonfinite_policy
 from .scene_reader import read_scene_task
-from .texture_nodes import new_anisotropy_material, new_hatching_material, new_texture_material
+from .texture_nodes import (
+    Hatching,
+    new_anisotropy_material,
+    new_hatching_material,
+    new_texture_material,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,21 +49,6 @@ class TextureInput:
     instance: MeshInstance
     uv: np.ndarray
     source: TextureSource
-
-
-class Hatching(NamedTuple):
-    """How a texture of thresholds is drawn.
-
-    Attributes
-    ----------
-    look : Look
-        The settings of the ink.
-    line_count : int
-        Number of lines through a point.
-    """
-
-    look: Look
-    line_count: int
 
 
 def uv_map_name(obj: bpy.types.Object) -> str:
@@ -149,7 +137,7 @@ def apply_texture(
             group, is_new = hatching_group()
             if is_new:
                 created.append(group)
-            material = new_hatching_material(name, image, source.uv_map, group, *hatching)
+            material = new_hatching_material(name, image, source.uv_map, group, hatching)
         created.append(material)
         node_group = new_group(name, material, None)
         created.append(node_group)

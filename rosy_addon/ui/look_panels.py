@@ -28,6 +28,7 @@ OUTPUT_SETTINGS = (
     "percentage",
     "device",
     "placement",
+    "relight",
     "emission",
     "diffuse",
     "backdrop",
@@ -139,9 +140,10 @@ def _make_settings_panel(
             _draw_setting(row, settings.look, setting)
             if name == "tone":
                 _draw_tone_source(column, context)
+        unused = _unused_output(settings)
         for name in names:
             row = column.row()
-            row.active = name != "backdrop" or is_hatched(settings.look)
+            row.active = name not in unused
             row.prop(settings, name)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
@@ -154,6 +156,13 @@ def _make_settings_panel(
         "draw": draw,
     }
     return type(f"VIEW3D_PT_rosy_{suffix}", (SidebarPanel, bpy.types.Panel), namespace)
+
+
+def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
+    """Return the properties of the output that have no effect."""
+    if not is_hatched(settings.look):
+        return "backdrop", "relight"
+    return ("device", "emission", "diffuse") if settings.relight else ()
 
 
 def _draw_setting(row: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting) -> None:

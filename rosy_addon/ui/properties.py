@@ -267,6 +267,11 @@ class RosyScene(bpy.types.PropertyGroup):
         description="How the picture is placed on the meshes",
         items=PLACEMENT_ITEMS,
     )
+    relight: bpy.props.BoolProperty(
+        name="Relight",
+        description="Store from which darkness on each pixel is covered by ink, instead of the ink. The material "
+        "then draws the hatching by the light of the scene, in EEVEE, without a new bake",
+    )
     emission: bpy.props.FloatProperty(
         name="Emission",
         description="Emission strength of the picture. 1: as it was drawn",

@@ -190,6 +190,7 @@ def output(monkey):
     settings.camera = monkey.pick(["SCENE", "SCENE", "ALL", "VIEW"])
     settings.percentage = monkey.pick([1, 50, 100, 100, 150])
     settings.placement = monkey.pick(["PROJECTION", "WINDOW"])
+    settings.relight = monkey.chance(0.3)
     settings.emission, settings.diffuse = monkey.random.random(), monkey.random.random()
     settings.store = monkey.pick(["PACKED", "PACKED", "SAVED"])
     settings.directory = monkey.pick(

@@ -329,7 +329,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
 }
 
 #: Names of attributes that hold fields.
-_FORMS = ("rosy", "rosy_angle", "dir[0-9]", "dir[0-9][0-9]")
+_FORMS = ("rosy", "rosy_angle", "rosy_tangent", "dir[0-9]", "dir[0-9][0-9]")
 FIELD_NAMES = (*_FORMS, ".*_rest", ".*_check")
 
 

@@ -88,6 +88,39 @@ def test_cycles_shows_the_picture(with_field, scene, tmp_path, placement):
     assert np.abs(rendered - picture)[..., :3][inside].mean() < 0.02
 
 
+def test_a_relit_picture_is_the_picture_of_any_tone(scene, tmp_path):
+    """The material draws from thresholds what the bake draws at the same tone."""
+    bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
+    plane = bpy.context.object
+    bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(1.0, 0.0, 0.3))
+    scene.view_settings.view_transform = "Standard"
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 8.0
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -5.0, 0.0), (np.pi / 2, 0.0, 0.0)
+    for preset in ("engraving", "cross-hatch"):
+        bpy.ops.rosy.preset_apply(preset=preset)
+        scene.rosy.look.shading, scene.rosy.look.light = 1.0, "headlight"
+        scene.rosy.look.tone_gamma = 1.0
+        scene.rosy.relight = True
+        assert bpy.ops.rosy.bake() == {"FINISHED"}
+        nodes = material_of(plane).node_tree.nodes
+        node = next(node for node in nodes if node.bl_idname == "ShaderNodeGroup")
+        node.id_data.links.remove(node.inputs["Tone"].links[0])
+        node.inputs["Tone"].default_value = 1.0  # the light of the headlight
+        relit = {}
+        for white in (1.25, 2.0, 4.0):
+            node.inputs["White"].default_value = white
+            relit[white] = render(scene, tmp_path)[..., :3].mean(axis=2)
+        scene.rosy.relight = False
+        for white, drawn in relit.items():
+            scene.rosy.look.tone_white = white
+            bpy.ops.rosy.bake()
+            expected = render(scene, tmp_path)[..., :3].mean(axis=2)
+            assert abs(drawn.mean() - expected.mean()) < 0.02, (preset, white)
+            assert np.corrcoef(drawn.ravel(), expected.ravel())[0, 1] > 0.92, (preset, white)
+    assert bpy.ops.rosy.remove() == {"FINISHED"}
+    assert not bpy.data.node_groups and not bpy.data.materials and not baked_images()
+
+
 @pytest.mark.parametrize("previous", ["another picture", "no picture"])
 def test_undo(with_field, scene, previous):
     """Undo restores the file as it was before the bake, with all pixels; redo restores the bake."""

@@ -166,6 +166,11 @@ def hatched(scene):
     scene.rosy.look.ink = "hatch"
 
 
+def relit(scene):
+    """Hatching by the light of the scene, whatever the light is."""
+    scene.rosy.look.ink, scene.rosy.look.light, scene.rosy.relight = "hatch", "scene", True
+
+
 def move(name, *offset):
     def change(scene):
         obj(name).matrix_world = Matrix.Translation(offset) @ obj(name).matrix_world
@@ -457,6 +462,11 @@ TABLE = {
     "percentage": (put("render.resolution_percentage", 50), None, "the size was changed"),
     "size": (put("rosy.percentage", 150), None, "the size was changed to 60 x 60"),
     "placement": (put("rosy.placement", "WINDOW"), None, "the placement was changed"),
+    "relighting": (put("rosy.relight", True), hatched, "the relighting was changed"),
+    "relighting without hatching": (put("rosy.relight", True), None, ""),
+    "light of a relit picture": (move("Key", -2.0, 0.0, 0.0), relit, ""),
+    "strength of a relit picture": (put("Key:data.energy", 900.0), relit, ""),
+    "ink of a relit picture": (put("rosy.look.crispness", 0.2), relit, "the look was changed"),
     "emission": (put("rosy.emission", 0.5), None, "the emission was changed"),
     "diffuse": (put("rosy.diffuse", 0.5), None, "the diffuse was changed"),
     "store": (put("rosy.store", "SAVED"), None, "the storage was changed"),
@@ -571,7 +581,10 @@ def test_frames_are_compared_with_the_present_one(tmp_path):
     assert word(5) == ("", "frame 5 was not drawn")
     obj("Plain").animation_data.action.name = "Lift"
     scene.name = "Shot"
-    scene.rosy.placement = "WINDOW"  # frames always fill the frame of the camera
+    scene.rosy.placement, scene.rosy.relight = (
+        "WINDOW",
+        True,
+    )  # frames always fill the frame of the camera
     assert word(3) == ("", "")
     obj("In Front").keyframe_insert("location", frame=3)
     obj("In Front").location.x += 0.1

@@ -57,6 +57,7 @@ def scene_case(rng: Generator, folder: Path) -> Case:
         bpy.ops.object.light_add(type=str(rng.choice(["POINT", "SUN", "SPOT", "AREA"])))
     _set_settings(rng, scene.rosy.look, settings_of(Look), 0.15)
     _set_settings(rng, scene.rosy.strokes, settings_of(StrokeStyle), 0.1)
+    scene.rosy.relight = bool(rng.random() < 0.2)
     scene.rosy.placement = str(rng.choice(_enum_items(scene.rosy, "placement")))
     scene.rosy.image_format = str(rng.choice(_enum_items(scene.rosy, "image_format")))
     _save(folder / "scene.blend")

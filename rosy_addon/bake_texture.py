@@ -89,6 +89,7 @@ def bake_texture_task(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     size, margin = scene.rosy.texture_size, scene.rosy.texture_margin
+    is_udim = scene.rosy.texture_udim
     drawn = []
     for index, obj in enumerate(objects):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
@@ -101,32 +102,35 @@ def bake_texture_task(
             look,
             size,
             margin=margin,
+            is_udim=is_udim,
             content=content,
             lights=lights,
             cache=BAKE_CACHE,
         )
         texture = yield from subtask(task, start, stop)
-        png = None
-        if not settings.as_float:
-            png = yield from subtask(
-                png_task(texture.rgba, is_color=not texture.is_data), stop, stop
-            )
+        tiles = {}
+        for number, rgba in texture.tiles().items():
+            png = None
+            if not settings.as_float:
+                png = yield from subtask(png_task(rgba, is_color=not texture.is_data), stop, stop)
+            tiles[number] = ImageData(rgba, png)
         note = texture.overlap_note(f"object '{obj.name}'")
         warnings = (note,) if note else ()
         hatching = None
         if content == "look" and texture.is_data:
             hatching = Hatching(look, texture.line_count)
-        image_data = ImageData(texture.rgba, png)
-        drawn.append((texture_input.source, image_data, state, hatching, warnings))
+        drawn.append((texture_input.source, tiles, state, hatching, warnings))
     BAKE_CACHE.evict_over_limit()
     yield Progress(0.98, "applying the textures")
     return [
         TextureResult(
             source.obj,
-            apply_texture(scene, source, image_data, settings, state, content, hatching),
+            apply_texture(
+                scene, source, tiles, settings, state, content, hatching, is_udim=is_udim
+            ),
             warnings,
         )
-        for source, image_data, state, hatching, warnings in drawn
+        for source, tiles, state, hatching, warnings in drawn
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -134,6 +136,72 @@ def new_image(
     return image
 
 
+def new_tiled_image(
+    name: str,
+    tiles: Mapping[int, ImageData],
+    *,
+    as_float: bool = False,
+    is_color: bool = True,
+    stem: Path | None = None,
+) -> bpy.types.Image:
+    """Create a Blender image of UDIM tiles.
+
+    Parameters
+    ----------
+    name, as_float, is_color
+        As for `new_image`.
+    tiles : mapping of int to ImageData
+        The tiles by their UDIM numbers.
+    stem : Path, optional
+        Path to save the tiles at, without their numbers and the suffix. By default they are packed into the
+        .blend file.
+
+    Raises
+    ------
+    RosyError
+        If a file cannot be written.
+    """
+    if stem is not None:
+        return _load_tiles(name, tiles, stem, as_float, is_color)
+    # Blender packs tiles only from files.
+    with tempfile.TemporaryDirectory(dir=bpy.app.tempdir or None) as folder:
+        image = _load_tiles(name, tiles, Path(folder) / "tile", as_float, is_color)
+        try:
+            image.pack()
+        except RuntimeError as reason:
+            bpy.data.images.remove(image)
+            raise RosyError(f"image '{name}': cannot be packed: {reason}") from reason
+    # Where the tiles go if they are unpacked.
+    image.filepath_raw = f"//{name}.<UDIM>{'.exr' if as_float else '.png'}"
+    for file in image.packed_files:
+        file.filepath = image.filepath_raw.replace("<UDIM>", str(file.tile_number))
+    return image
+
+
+def _load_tiles(
+    name: str, tiles: Mapping[int, ImageData], stem: Path, as_float: bool, is_color: bool
+) -> bpy.types.Image:
+    """Write tiles to files, and load them as one image."""
+    paths = {
+        number: stem.with_name(f"{stem.name}.{number}{'.exr' if as_float else '.png'}")
+        for number in sorted(tiles)
+    }
+    for number, path in paths.items():
+        write_frame(path, tiles[number])
+    first = next(iter(paths.values()))
+    image = bpy.data.images.load(_blend_relative(first), check_existing=False)
+    image.name = name
+    image.source = "TILED"  # finds the other tiles
+    image.alpha_mode = "CHANNEL_PACKED"
+    image.colorspace_settings.name = "sRGB" if is_color and not as_float else "Non-Color"
+    known = {tile.number for tile in image.tiles}
+    for number in known - paths.keys():  # files of an earlier texture
+        image.tiles.remove(image.tiles.get(number))
+    for number in paths.keys() - known:
+        image.tiles.new(number)
+    return image
+
+
 def with_bleed(rgba: np.ndarray) -> np.ndarray:
     """Return a picture whose border colors are extended by `BLEED_PIXELS` pixels.
 
@@ -183,7 +251,7 @@ def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
 
 
 def write_frame(path: Path, image_data: ImageData) -> None:
-    """Write one frame of an image sequence: 8-bit .png, or .exr with half floats.
+    """Write a frame of an image sequence or a tile: 8-bit .png, or .exr with half floats.
 
     If writing fails, no partial file is left.
 

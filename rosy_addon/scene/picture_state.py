@@ -48,7 +48,16 @@ from .tone_inputs import (
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
 #: Those that decide what a texture shows, and how it is stored.
-TEXTURE_OUTPUT = ("texture_content", "texture_bake_light", "store", "directory", "image_format")
+TEXTURE_OUTPUT = (
+    *(
+        "texture_content",
+        "texture_bake_light",
+        "texture_udim",
+        "store",
+        "directory",
+        "image_format",
+    ),
+)
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ _WATCHED_EVENTS = ("depsgraph_update_post", "frame_change_post", "undo_post", "r
 _OUTPUT_LABELS = {
     "texture_content": "content",
     "texture_bake_light": "baked light",
+    "texture_udim": "kind of tiles",
     "relight": "relighting",
     "store": "storage",
     "directory": "folder",

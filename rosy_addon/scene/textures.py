@@ -6,6 +6,7 @@ material slots and modifiers are not changed. Its record is among those of the p
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -16,7 +17,7 @@ from ..errors import RosyError
 from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
-from .blender_images import ImageData, new_image
+from .blender_images import ImageData, new_image, new_tiled_image
 from .file_names import picture_stem
 from .hatching_nodes import hatching_group
 from .owned_data import delete_unused, rollback_on_error
@@ -90,11 +91,13 @@ def read_texture_input_task(
 def apply_texture(
     scene: bpy.types.Scene,
     source: TextureSource,
-    image_data: ImageData,
+    tiles: Mapping[int, ImageData],
     settings: OutputSettings,
     state: PictureState,
     content: str = "look",
     hatching: Hatching | None = None,
+    *,
+    is_udim: bool = False,
 ) -> bpy.types.Image:
     """Show a texture on its object, and return its image. An older one is replaced.
 
@@ -104,13 +107,16 @@ def apply_texture(
     ----------
     scene : bpy.types.Scene
     source : TextureSource
-    image_data : ImageData
+    tiles : mapping of int to ImageData
+        One picture, or UDIM tiles by their numbers.
     settings : OutputSettings
     state : PictureState
     content : str
         What the image shows; see `surface_texture.draw.CONTENTS`.
     hatching : Hatching, optional
         How hatching is drawn, if the image has thresholds of ink and not colors.
+    is_udim : bool
+        Whether the image has UDIM tiles.
 
     Raises
     ------
@@ -125,9 +131,12 @@ def apply_texture(
         stem = settings.folder / picture_stem(obj.name, kind)
     with rollback_on_error() as created:
         is_color = content == "look" and hatching is None
-        image = new_image(
-            name, image_data, as_float=settings.as_float, is_color=is_color, stem=stem
-        )
+        first = next(iter(tiles.values()))
+        arguments = {"as_float": settings.as_float, "is_color": is_color, "stem": stem}
+        if is_udim:
+            image = new_tiled_image(name, tiles, **arguments)
+        else:
+            image = new_image(name, first, **arguments)
         created.append(image)
         if content == "anisotropy":
             material = new_anisotropy_material(name, image, source.uv_map)
@@ -141,7 +150,7 @@ def apply_texture(
         created.append(material)
         node_group = new_group(name, material, None)
         created.append(node_group)
-    size = image_data.pixels.shape[1], image_data.pixels.shape[0]
+    size = first.pixels.shape[1], first.pixels.shape[0]
     store_record(
         scene, obj.name, image, material, DrawnFrom(source, {None: state}, "cpu"), size=size
     )

@@ -176,6 +176,7 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
         column.prop(settings.look, "guiding_angle")
     elif is_hatched(settings.look):
         column.prop(settings, "texture_bake_light")
+    column.prop(settings, "texture_udim")
     column.prop(settings, "texture_size")
     column.prop(settings, "texture_margin")
     column.operator("rosy.bake_texture", icon="TEXTURE")

@@ -309,6 +309,10 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Draw the hatching in the present light of the scene as ink, for exports and other "
         "programs, instead of hatching that follows the light",
     )
+    texture_udim: bpy.props.BoolProperty(
+        name="UDIM",
+        description="Draw a picture for each tile of the UV map. Otherwise all tiles show the same picture",
+    )
     texture_size: bpy.props.IntProperty(
         name="Size",
         description="Width and height of textures in texels",

@@ -277,6 +277,7 @@ def bake_texture(monkey):
     settings.texture_size = monkey.pick([16, 64, 128])
     settings.texture_margin = monkey.pick([0, 2, 16])
     settings.texture_bake_light = monkey.chance(0.3)
+    settings.texture_udim = monkey.chance(0.2)
     settings.texture_content = monkey.pick(["LOOK", "LOOK", "ANISOTROPY", "FLOW"])
     if monkey.chance(0.7):
         settings.look.ink = "soft"

@@ -12,7 +12,7 @@ from rosy.rosy_addon.bake_texture import bake_texture
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_field, contents
+from scenes import add_field, contents, render
 
 
 @pytest.fixture
@@ -130,6 +130,38 @@ def test_folder_gets_a_file(scene, camera, monkey, tmp_path):
     scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path)
     bake_texture(scene, [monkey])
     assert [file.name for file in tmp_path.iterdir()] == [f"RoSy_{monkey.name}_texture.png"]
+
+
+def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
+    """Packed, in a folder, and read again from a saved file."""
+    layer = textured.data.uv_layers.active
+    uv = np.empty(2 * len(layer.uv), dtype=np.float32)
+    layer.uv.foreach_get("vector", uv)
+    layer.uv.foreach_set("vector", 2 * uv)
+    scene.rosy.texture_udim = True
+    assert stale_reason(scene)
+    (result,) = bake_texture(scene, [textured])
+    numbers = [1001, 1002, 1011, 1012]
+    assert result.image.source == "TILED" and len(result.image.packed_files) == 4
+    assert [tile.number for tile in result.image.tiles] == numbers
+    assert stale_reason(scene) == ""
+    name = textured.name
+    bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0.0, 0.0))
+    bpy.context.object.data.energy = 5.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
+    scene = bpy.context.scene
+    (image,) = (image for image in bpy.data.images if image.source == "TILED")
+    assert all(file.filepath.startswith("//RoSy ") for file in image.packed_files)
+    packed = render(scene, tmp_path / "packed.exr", samples=1)
+    assert packed[packed[..., 3] == 1][:, 0].std() > 0.05
+    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "tiles")
+    (result,) = bake_texture(scene, [scene.objects[name]])
+    assert not result.image.packed_files
+    files = sorted(file.name for file in (tmp_path / "tiles").iterdir())
+    assert files == [f"RoSy_{name}_texture.{number}.png" for number in numbers]
+    np.testing.assert_array_equal(render(scene, tmp_path / "files.exr", samples=1), packed)
+    assert remove_bakes(scene).images == 1
 
 
 def test_maps_of_directions(scene, textured, tmp_path):

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import pi
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 
 from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert_task
 from ..rosy_addon.field.curvature import MAGNITUDES
-from ..rosy_addon.field.rosy_field import MAX_DEGREE
+from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.progress import Progress, Task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
@@ -22,6 +22,8 @@ from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents_task
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
+
+_Result = TypeVar("_Result")
 
 #: Items of the new degree; the number of each item is the degree. Not inside the annotation: up to
 #: Python 3.11, a comprehension there cannot see module names.
@@ -67,6 +69,17 @@ class _FieldOperator:
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
+
+    def each_mesh_task(
+        self, context: bpy.types.Context, mesh_task: Callable[[bpy.types.Mesh], Task[_Result]]
+    ) -> Task[dict[bpy.types.Mesh, _Result]]:
+        """Run a task for each mesh, and return the results."""
+        meshes, results = list(self.required_data(context)), {}
+        for index, mesh in enumerate(meshes):
+            start, stop = index / len(meshes), (index + 1) / len(meshes)
+            results[mesh] = yield from subtask(mesh_task(mesh), start, stop)
+        yield Progress(1.0, "storing the fields")
+        return results
 
 
 class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
@@ -130,26 +143,24 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
 
     def make_task(self, context: bpy.types.Context) -> Task[int]:
         """Convert all fields, then store them. Return the number of meshes."""
-        meshes = list(self.required_data(context))
-        converted = {}
-        for index, mesh in enumerate(meshes):
-            start, stop = index / len(meshes), (index + 1) / len(meshes)
-            surface = yield from subtask(mesh_surface_task(mesh), start, start)
-            yield Progress(start, "reading the field")
-            field = read_mesh_field(mesh, surface=surface)
-            values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
-            if values is not None and values.min() < 0:
-                raise RosyError(
-                    f"{surface.name}: '{self.values}' has negative values, which cannot be lengths"
-                )
-            magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
-            conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
-            task = convert_task(surface, field, conversion)
-            field = yield from subtask(task, start, stop)
-            converted[mesh] = replace(field, source_directions=None)
-        yield Progress(1.0, "storing the fields")
+        converted = yield from self.each_mesh_task(context, self._converted_task)
         store_fields(self, context, converted)
         return len(converted)
+
+    def _converted_task(self, mesh: bpy.types.Mesh) -> Task[RosyField]:
+        """Return the converted field of a mesh."""
+        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
+        yield Progress(0.0, "reading the field")
+        field = read_mesh_field(mesh, surface=surface)
+        values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
+        if values is not None and values.min() < 0:
+            raise RosyError(
+                f"{surface.name}: '{self.values}' has negative values, which cannot be lengths"
+            )
+        magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
+        conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
+        field = yield from convert_task(surface, field, conversion)
+        return replace(field, source_directions=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
         self.report({"INFO"}, f"Converted {counted(result, 'field')}")
@@ -184,32 +195,16 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
 
     def make_task(self, context: bpy.types.Context) -> Task[int]:
         """Read all fields, then store them. Return the number of meshes."""
-        meshes = list(self.required_data(context))
         if self.form == "TANGENT":
-            return (yield from self._store_tangents(context, meshes))
-        fields = {}
-        for index, mesh in enumerate(meshes):
-            start, stop = index / len(meshes), (index + 1) / len(meshes)
-            surface = yield from subtask(mesh_surface_task(mesh), start, stop)
-            yield Progress(stop, "reading the field")
-            fields[mesh] = read_mesh_field(mesh, surface=surface)
-        yield Progress(1.0, "storing the fields")
+            guiding_angle = context.scene.rosy.look.guiding_angle
+            tangents = yield from self.each_mesh_task(
+                context, lambda mesh: mesh_tangents_task(mesh, guiding_angle)
+            )
+            assign_tangents(tangents, self.attribute)
+            return len(tangents)
+        fields = yield from self.each_mesh_task(context, _field_task)
         assign_fields(fields, self.attribute, self.form)
         return len(fields)
-
-    def _store_tangents(
-        self, context: bpy.types.Context, meshes: list[bpy.types.Mesh]
-    ) -> Task[int]:
-        """Store the tangents of all fields."""
-        guiding_angle = context.scene.rosy.look.guiding_angle
-        tangents = {}
-        for index, mesh in enumerate(meshes):
-            start, stop = index / len(meshes), (index + 1) / len(meshes)
-            task = mesh_tangents_task(mesh, guiding_angle)
-            tangents[mesh] = yield from subtask(task, start, stop)
-        yield Progress(1.0, "storing the tangents")
-        assign_tangents(tangents, self.attribute)
-        return len(tangents)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
         self.report({"INFO"}, f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
@@ -221,6 +216,13 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         layout.prop(self, "form")
         if self.form != "DIRECTIONS":
             layout.prop(self, "attribute")
+
+
+def _field_task(mesh: bpy.types.Mesh) -> Task[RosyField]:
+    """Return the field of a mesh."""
+    surface = yield from mesh_surface_task(mesh)
+    yield Progress(1.0, "reading the field")
+    return read_mesh_field(mesh, surface=surface)
 
 
 CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

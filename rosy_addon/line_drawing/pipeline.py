@@ -426,15 +426,15 @@ def geometry_task(
     yield Progress(0.8, label)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
     # surface.
-    is_along_normal = drawing.hidden or follows is not None
-    points = (offset_along_normal if is_along_normal else offset_toward_camera)(
-        strokes, camera, pen.width
-    )
-    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
     places = None
-    if follows is not None:
+    if drawing.hidden or follows is not None:
         height = pen.width * pixel_size(strokes.points, camera)
-        places = surface_points(strokes, height, follows)
+        points = strokes.points + height[:, None] * strokes.normal
+        if follows is not None:
+            places = surface_points(strokes, height, follows)
+    else:
+        points = offset_toward_camera(strokes, camera, pen.width)
+    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
     colors = pen.family_colors(strokes.names)
     return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, places)
 
@@ -465,11 +465,6 @@ def simplify_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
         start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),
         **{name: getattr(strokes, name)[kept] for name in POINT_COLUMNS},
     )
-
-
-def offset_along_normal(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
-    """Return (n, 3) float64: the points offset along the surface normals, by `width` pixels."""
-    return strokes.points + width * pixel_size(strokes.points, camera)[:, None] * strokes.normal
 
 
 def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:

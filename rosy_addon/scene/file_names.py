@@ -11,6 +11,9 @@ import bpy
 #: number and suffixes.
 MAX_STEM_BYTES = 180
 
+#: Kinds of pictures whose stems do not say it.
+PLAIN_KINDS = ("camera", "scene")
+
 
 def picture_stem(name: str, kind: str = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
@@ -24,7 +27,7 @@ def picture_stem(name: str, kind: str = "camera") -> str:
     """
     siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
     siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
-    if kind not in ("camera", "scene"):
+    if kind not in PLAIN_KINDS:
         siblings |= {(kind, obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
     siblings.add((kind, name))
     stem = _clean_stem(*_label(kind, name))
@@ -37,7 +40,7 @@ def picture_stem(name: str, kind: str = "camera") -> str:
 
 def _label(kind: str, name: str) -> tuple[str, str]:
     """Return what the stem consists of: a name, and what follows it."""
-    return name, "" if kind in ("camera", "scene") else f" {kind}"
+    return name, "" if kind in PLAIN_KINDS else f" {kind}"
 
 
 def _clean_stem(name: str, ending: str) -> str:

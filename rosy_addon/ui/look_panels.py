@@ -11,7 +11,7 @@ from ..compositor.look import Look, is_hatched
 from ..errors import as_sentence
 from ..settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
-from .sidebar import SidebarPanel, use_property_columns
+from .sidebar import SidebarPanel, draw_cycles_hint, use_property_columns
 
 #: Labels of the panels of a look's settings by their keys, from top to bottom.
 LOOK_PANELS = {
@@ -145,6 +145,8 @@ def _make_settings_panel(
             row = column.row()
             row.active = name not in unused
             row.prop(settings, name)
+            if name == "relight" and name not in unused and settings.relight:
+                draw_cycles_hint(column, context)
         if "tone" in look_names:
             column.operator("rosy.occlusion", icon="SHADING_RENDERED")
 

@@ -16,7 +16,13 @@ from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
 from .generator_settings import generator_setting_names
-from .sidebar import SidebarPanel, draw_progress, draw_wrapped, use_property_columns
+from .sidebar import (
+    SidebarPanel,
+    draw_cycles_hint,
+    draw_progress,
+    draw_wrapped,
+    use_property_columns,
+)
 
 #: Placeholder texts of empty settings of the generator.
 PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
@@ -176,6 +182,8 @@ def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
         column.prop(settings.look, "guiding_angle")
     elif is_hatched(settings.look):
         column.prop(settings, "texture_bake_light")
+        if not settings.texture_bake_light:
+            draw_cycles_hint(column, context)
     column.prop(settings, "texture_udim")
     column.prop(settings, "texture_size")
     column.prop(settings, "texture_margin")

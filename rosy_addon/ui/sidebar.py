@@ -54,3 +54,9 @@ def draw_progress(layout: bpy.types.UILayout) -> None:
     progress = job_status.current
     layout.progress(factor=progress.fraction, text=as_sentence(progress.label))
     layout.label(text="Press ESC to cancel")
+
+
+def draw_cycles_hint(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Say what hatching that follows the light does in Cycles, if that renders the scene."""
+    if context.scene.render.engine == "CYCLES":
+        layout.label(text="Cycles: occlusion, not light", icon="INFO")

@@ -24,6 +24,11 @@ from ..rosy_addon.scene.guides import (
     guide_vectors,
 )
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface_task
+from ..rosy_addon.scene.singularity_points import (
+    INDEX_ATTRIBUTE,
+    has_points,
+    read_singularity_points,
+)
 from ..rosy_addon.ui.generator_settings import generator_setting_names
 from .modal_task import ModalTaskMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
@@ -44,6 +49,14 @@ KIND_ITEMS = [
 
 def _search_guides(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
     return [obj.name for obj in guide_objects(context.scene.objects)]
+
+
+def _search_points(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    return [
+        obj.name
+        for obj in context.scene.objects
+        if has_points(obj) and INDEX_ATTRIBUTE in obj.data.attributes
+    ]
 
 
 def _search_uv_maps(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
@@ -144,6 +157,12 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         subtype="XYZ",
         default=(0.0, 0.0, 1.0),
     )
+    singularities: bpy.props.StringProperty(
+        name="Points",
+        description="Object whose points are the singularities, with an integer attribute 'index'. Empty: the "
+        "points that Singularities has made for the mesh, wherever you have moved them",
+        search=_search_points,
+    )
     attribute: bpy.props.StringProperty(
         name="Attribute",
         description="Name of the mesh attribute that stores the field. An existing field is replaced",
@@ -218,6 +237,10 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         settings = GeneratorSettings(self.kind, tuple(self.axis), self.reach, self.sharp_angle)
         if self.kind == "uv":
             return replace(settings, uv=corner_uvs(mesh, self.uv_map))
+        if self.kind == "prescribed":
+            target = self._first_object(context, mesh)
+            points = read_singularity_points(context.scene, target, self.degree, self.singularities)
+            return replace(settings, singularities=points)
         if self.kind == "features" and self.edges != "FEATURES":
             return replace(settings, edges=marked_edges(mesh, self.edges))
         if self.kind != "guided":

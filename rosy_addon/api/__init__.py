@@ -24,7 +24,16 @@ from .field import (
     from_vectors,
     read_field,
 )
-from .generators import along_axis, along_uv, curvature, features, form, guided, smoothest
+from .generators import (
+    along_axis,
+    along_uv,
+    curvature,
+    features,
+    form,
+    guided,
+    prescribed,
+    smoothest,
+)
 from .pictures import Picture, ambient_occlusion, list_presets, render, turntable
 from .surface import Surface
 from .textures import Texture, texture
@@ -53,6 +62,7 @@ __all__ = [
     "from_vectors",
     "guided",
     "list_presets",
+    "prescribed",
     "read_field",
     "render",
     "smoothest",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import RosyError, counted
+from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
 from ..field.surface import orientation_warning
 from .field import Field, check_same_surface, warn
@@ -200,6 +203,53 @@ def guided(
         uv=uv_map(surface) if uv else None,
         vectors=None if vectors is None else np.asarray(vectors, dtype=np.float64),
     )
+    return _generated(surface, settings, degree)
+
+
+def prescribed(
+    surface: Surface,
+    singularities: Mapping[int, int] | str | os.PathLike[str],
+    degree: int | None = None,
+) -> Field:
+    """Make the smoothest field that has given singularities, and no other ones.
+
+    The method is that of Crane, Desbrun and Schröder, "Trivial Connections on Discrete Surfaces" (SGP
+    2010). On a closed surface, the indices have to add up to N times the Euler characteristic.
+
+    Parameters
+    ----------
+    surface : Surface
+    singularities : mapping of int to int, or path-like
+        The indices of singular vertices, in units of 1/N; or a file of singularities, ``.sings``.
+    degree : int, optional
+        N, from 1 to 12. By default that of the file, or 4.
+
+    Raises
+    ------
+    RosyError
+        If the surface cannot have these singularities, the file cannot be read or is of another degree,
+        or there is not enough memory.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> field = rf.prescribed(torus, {10: 1, 200: -1})
+    >>> field.singularities.vertex.tolist(), field.singularities.index.tolist()
+    ([10, 200], [1, -1])
+    """
+    if isinstance(singularities, Mapping):
+        vertex = np.array(list(singularities), dtype=np.int64)
+        index = np.array(list(singularities.values()), dtype=np.int64)
+        degree = 4 if degree is None else degree
+    else:
+        file_degree, vertex, index = read_sings(Path(singularities))
+        if degree not in (None, file_degree):
+            raise RosyError(
+                f"{os.fspath(singularities)}: is of degree {file_degree}, not {degree}: leave the degree out"
+            )
+        degree = file_degree
+    settings = GeneratorSettings("prescribed", singularities=(vertex, index))
     return _generated(surface, settings, degree)
 
 

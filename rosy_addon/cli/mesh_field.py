@@ -57,7 +57,7 @@ def add_mesh_options(
         "--generate",
         choices=list(GENERATORS),
         help="generate a field instead of reading one; by default guided if there are guides, "
-        "otherwise form",
+        "prescribed if there are singularities, otherwise form",
     )
     parser.add_argument(
         "--axis",
@@ -93,6 +93,12 @@ def add_mesh_options(
         type=Path,
         metavar="FIELD",
         help="a field file that a guided field follows where its vectors are not zero",
+    )
+    parser.add_argument(
+        "--singularities",
+        type=Path,
+        metavar="FILE.sings",
+        help="singular vertices and their indices, for --generate prescribed",
     )
     parser.add_argument(
         "--uv", action="store_true", help="make a guided field follow the UV map of an .obj file"
@@ -141,7 +147,9 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     is_simulation = options.mesh.suffix.lower() in options.extras.simulation_suffixes
-    sources = (options.field, options.generate, options.strokes, options.guides)
+    sources = (
+        *(options.field, options.generate, options.strokes, options.guides, options.singularities),
+    )
     has_source = options.uv or any(source is not None for source in sources)
     for name in ("array", "step"):
         if getattr(options, name) is not None and not is_simulation:
@@ -187,7 +195,8 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
     """Generate a field of the kind that the options name."""
     degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
-    match options.generate or ("guided" if has_guides else "form"):
+    default = "guided" if has_guides else "form" if options.singularities is None else "prescribed"
+    match options.generate or default:
         case "form":
             return api.form(surface, degree)
         case "smoothest":
@@ -196,6 +205,12 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
             return api.curvature(surface, degree, reach=options.reach)
         case "features":
             return api.features(surface, degree, sharp_angle=np.radians(options.sharp_angle))
+        case "prescribed":
+            if options.singularities is None:
+                raise RosyError(
+                    f"{options.mesh}: give the singularities: --singularities FILE.sings"
+                )
+            return api.prescribed(surface, options.singularities, options.degree)
         case "axis":
             return api.along_axis(surface, options.axis, degree)
         case "uv":

@@ -34,7 +34,7 @@ from .view import add_view_options, requested_size
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
-    **dict.fromkeys(("array", "step")),
+    **dict.fromkeys(("array", "step", "singularities")),
     **dict.fromkeys(("uv", "undefined", "ortho"), False),
     "view": DEFAULT_VIEW,
 }

@@ -26,6 +26,7 @@ from .guides import (
     guides_from_strokes,
     uv_guides_task,
 )
+from .prescribed import prescribed_task
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_task
 from .surface import Surface
@@ -40,6 +41,7 @@ GENERATORS = {
     "curvature": "Along the principal directions of each face's own curvature (even degrees)",
     "features": "Along borders and sharp edges, and smooth between them",
     "guided": "Along guides (strokes, edges, a UV map, vectors or empties), and smooth between them",
+    "prescribed": "The smoothest field with the singularities that you place, and no other ones",
     "axis": "Along a direction, projected to the surface",
     "uv": "Along the axes of a UV map",
 }
@@ -48,7 +50,7 @@ GENERATORS = {
 MIN_PROJECTION = 1e-12
 
 #: Bytes of memory that a triangle takes at the peak, by kind. The other kinds take little.
-BYTES_PER_TRIANGLE = {"form": 1200, "smoothest": 640, "features": 1000, "guided": 950}
+BYTES_PER_TRIANGLE = dict(form=1200, smoothest=640, features=1000, guided=950, prescribed=900)
 
 #: For "curvature", bytes that a face takes, and bytes that a triangle takes with a reach.
 CURVATURE_BYTES_PER_FACE, REACH_BYTES_PER_TRIANGLE = 710, 950
@@ -81,6 +83,8 @@ class GeneratorSettings:
         For "guided" and "uv": texture coordinates of the corners.
     vectors : (F, 3) float ndarray or None
         For "guided": a member vector for each face, zero where there is no guide.
+    singularities : ((K,) int ndarray, (K,) int ndarray) or None
+        For "prescribed": vertices, and their indices in units of 1 / N.
     """
 
     kind: str
@@ -92,6 +96,7 @@ class GeneratorSettings:
     axis_guides: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
     uv: np.ndarray | None = None
     vectors: np.ndarray | None = None
+    singularities: tuple[np.ndarray, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         if self.smoothing_length < MIN_SMOOTHING_LENGTH:
@@ -157,6 +162,12 @@ def generate_task(
         return (yield from _features_task(surface, settings, degree))
     if settings.kind == "guided":
         return (yield from _guides_task(surface, settings, degree))
+    if settings.kind == "prescribed":
+        if settings.singularities is None:
+            raise RosyError(
+                f"{surface.name}: no singularities are given: give their vertices and indices"
+            )
+        return (yield from prescribed_task(surface, degree, *settings.singularities))
     if settings.kind == "uv":
         if settings.uv is None:
             raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")

@@ -16,7 +16,7 @@ from .connection import connection_task, laplacian_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import corner_frame_angles, node_sum_per_face, smoothest_task
-from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task, w_cycle
 from .surface import Surface
 
 #: Residual norm relative to that of the right-hand side at which conjugate gradients stop, by default.
@@ -184,7 +184,11 @@ def _eliminate_fixed_task(
 
 
 def conjugate_gradient_task(
-    matrix: CSRMatrix, rhs: np.ndarray, tolerance: float = RELATIVE_TOLERANCE
+    matrix: CSRMatrix,
+    rhs: np.ndarray,
+    tolerance: float = RELATIVE_TOLERANCE,
+    levels: list[Level] | None = None,
+    label: str = "interpolating between the guides",
 ) -> Task[np.ndarray]:
     """Solve ``matrix @ solution = rhs`` by conjugate gradients, preconditioned with W-cycles.
 
@@ -195,6 +199,10 @@ def conjugate_gradient_task(
     rhs : (n,) complex ndarray
     tolerance : float
         Residual norm relative to that of `rhs` at which the iteration stops.
+    levels : list of Level, optional
+        `hierarchy_task` of the matrix, if it is known.
+    label : str
+        Of the progress.
 
     Yields
     ------
@@ -205,12 +213,13 @@ def conjugate_gradient_task(
     (n,) complex ndarray
         The last iterate, after at most `MAX_ITERATIONS`.
     """
-    levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
+    if levels is None:
+        levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
     solution, residual = np.zeros_like(rhs), rhs.copy()
     tolerance *= np.sqrt(_real_inner_product(rhs, rhs))
     direction, previous = None, 1.0
     for iteration in range(MAX_ITERATIONS):
-        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), "interpolating between the guides")
+        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), label)
         if np.sqrt(_real_inner_product(residual, residual)) <= tolerance:
             break
         preconditioned = w_cycle(levels, residual)

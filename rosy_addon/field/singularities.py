@@ -73,7 +73,7 @@ def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndar
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
     yield Progress(0.8, label)
-    corner_angles = yield from subtask(_signed_corner_angles_task(surface, x, y), 0.8, 0.9, label)
+    corner_angles = yield from subtask(signed_corner_angles_task(surface, x, y), 0.8, 0.9, label)
     angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
     yield Progress(0.9, label)
     angle_sum = angle_sum + angle_defect
@@ -117,7 +117,7 @@ def description_task(
     return ", ".join(parts)
 
 
-def _signed_corner_angles_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[np.ndarray]:
+def signed_corner_angles_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[np.ndarray]:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
     for faces, corners, starts in face_blocks(surface.face_start):

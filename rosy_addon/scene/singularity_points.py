@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..errors import RosyError
 from ..field.singularities import find_singularities
 from ..field.validate import vertex_normals
-from .meshes import mesh_surface
+from .meshes import mesh_surface, read_attribute, vertex_positions
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .scene_reader import read_scene
@@ -100,6 +101,93 @@ def add_singularity_points(
     for collection in obj.users_collection or (scene.collection,):
         collection.objects.link(point_object)
     return point_object
+
+
+def read_singularity_points(
+    scene: bpy.types.Scene, obj: bpy.types.Object, degree: int, name: str = ""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices of a mesh that are next to points of singularities, and their indices.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    obj : bpy.types.Object
+        The object of the mesh.
+    degree : int
+        N of the indices that are returned. The points may be of another degree.
+    name : str
+        Name of the object with the points; by default the one of `add_singularity_points` for `obj`.
+
+    Returns
+    -------
+    vertex : (K,) int64 ndarray
+        In ascending order. The indices of points at the same vertex add up.
+    index : (K,) int64 ndarray
+        In units of 1 / N.
+
+    Raises
+    ------
+    RosyError
+        If there is no such object, its points have no indices, or the degree does not allow them.
+    """
+    source = scene.objects.get(name) if name else singularity_point_object(scene, obj)
+    if source is None:
+        missing = (
+            f"object '{name}' is not in this scene"
+            if name
+            else f"object '{obj.name}': has no points"
+        )
+        raise RosyError(
+            f"{missing}: press Singularities to get points, then move them and change their index"
+        )
+    index = (
+        read_attribute(source.data, INDEX_ATTRIBUTE, np.int64, 1) if has_points(source) else None
+    )
+    if index is None:
+        raise RosyError(
+            f"object '{source.name}': has no integer attribute '{INDEX_ATTRIBUTE}' on its points, or is in "
+            "edit mode"
+        )
+    point_degree = read_attribute(source.data, DEGREE_ATTRIBUTE, np.int64, 1)
+    if point_degree is not None:
+        scaled = index * degree
+        if (scaled % point_degree).any():
+            bad = np.flatnonzero(scaled % point_degree)[0]
+            raise RosyError(
+                f"object '{source.name}': a field of degree {degree} has no singularity of the index "
+                f"{index[bad]}/{point_degree[bad]}: choose another degree"
+            )
+        index = scaled // point_degree
+    points = read_attribute(source.data, "position", np.float32, 3)
+    to_mesh = np.array(obj.matrix_world.inverted_safe() @ source.matrix_world)
+    points = points @ to_mesh[:3, :3].T + to_mesh[:3, 3]
+    vertices = vertex_positions(obj.data)
+    nearest = np.array(
+        [np.square(vertices - point).sum(axis=1).argmin() for point in points], dtype=np.int64
+    )
+    vertex, position = np.unique(nearest, return_inverse=True)
+    total = np.zeros(len(vertex), dtype=np.int64)
+    np.add.at(total, position, index)
+    return vertex[total != 0], total[total != 0]
+
+
+def has_points(obj: bpy.types.Object) -> bool:
+    """Whether an object has points with attributes: a mesh or a point cloud."""
+    return obj.type in ("MESH", "POINTCLOUD")
+
+
+def singularity_point_object(
+    scene: bpy.types.Scene, obj: bpy.types.Object
+) -> bpy.types.Object | None:
+    """Return the object of `add_singularity_points` for an object; None if there is none."""
+    return next(
+        (
+            candidate
+            for candidate in scene.objects
+            if isinstance(candidate.get(OWNED_TAG), str) and candidate.parent == obj
+        ),
+        None,
+    )
 
 
 def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object | None = None) -> int:

@@ -9,6 +9,7 @@ _SETTINGS_BY_KIND = {
     "curvature": ("reach",),
     "features": ("edges", "sharp_angle"),
     "guided": ("guides", "guide", "edges", "sharp_angle", "uv_map", "vectors", "reach"),
+    "prescribed": ("singularities",),
     "uv": ("uv_map",),
 }
 

@@ -417,6 +417,50 @@ def test_singularities_as_points(scene):
     )
 
 
+def test_singularities_are_where_their_points_are_moved(scene):
+    """The points of a field, moved and changed, make a field with these singularities alone."""
+    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import read_singularities
+
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, location=(1.0, 2.0, 0.0))
+    sphere = bpy.context.object
+    assert "has no points: press Singularities" in error_of(
+        bpy.ops.rosy.field_generate, kind="prescribed"
+    )
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    bpy.ops.rosy.singularities(show="POINTS")
+    points = bpy.data.objects["Icosphere singularities"]
+    count = len(points.data.attributes["index"].data)
+    assert count == 8
+    vertices = np.array([vertex.co for vertex in sphere.data.vertices])
+    chosen = np.argsort(vertices[:, 2])[:: len(vertices) // count][:count]
+    position = points.data.attributes["position"].data
+    position.foreach_set("vector", (vertices[chosen] * 1.2).astype(np.float32).ravel())
+    index = np.ones(count, dtype=np.int32)
+    index[0] = 2
+    points.data.attributes["index"].data.foreach_set("value", index)
+    message = error_of(bpy.ops.rosy.field_generate, kind="prescribed")
+    assert "add up to 9/4, but this closed surface needs 8/4" in message
+    index[1] = 0
+    points.data.attributes["index"].data.foreach_set("value", index)
+    assert bpy.ops.rosy.field_generate(kind="prescribed") == {"FINISHED"}
+    found = read_singularities(sphere, bpy.context.evaluated_depsgraph_get())
+    order = np.lexsort(found.points.T)
+    kept = np.flatnonzero(index)
+    expected = vertices[chosen[kept]]
+    expected_order = np.lexsort(expected.T)
+    np.testing.assert_allclose(found.points[order], expected[expected_order], atol=1e-6)
+    np.testing.assert_array_equal(found.index[order], index[kept][expected_order])
+    assert "of degree 3 has no singularity" in error_of(
+        bpy.ops.rosy.field_generate, kind="prescribed", degree=3
+    )
+    # With twice the degree, the indices are twice as large.
+    index[:] = 1
+    points.data.attributes["index"].data.foreach_set("value", index)
+    assert bpy.ops.rosy.field_generate(kind="prescribed", degree=8) == {"FINISHED"}
+    doubled = read_singularities(sphere, bpy.context.evaluated_depsgraph_get())
+    assert doubled.index.tolist() == [2] * count
+
+
 def test_singularities_of_fields_without_any_or_lost(scene):
     bpy.ops.mesh.primitive_plane_add()
     plane = bpy.context.object

@@ -211,9 +211,15 @@ def _field_file_case(rng: Generator, folder: Path) -> Case:
 
 
 def _guide_case(rng: Generator, folder: Path) -> Case:
-    """A field guided by strokes, another field or a UV map."""
+    """A field guided by strokes, another field or a UV map, or by its singularities."""
     mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
     name, options = _write_mesh(rng, folder, mesh), ["--generate", "guided"]
+    if rng.random() < 0.3:
+        data = field_bytes(rng, ".sings", mesh)
+        (folder / "a.sings").write_bytes(damaged(rng, data) if rng.random() < 0.2 else data)
+        options = ["--generate", "prescribed"] * int(rng.random() < 0.7)
+        options += ["--singularities", "a.sings"]
+        return _command(rng, folder, [name], options, rate=0.06)
     if rng.random() < 0.9:
         data = guide_bytes(rng, mesh)
         (folder / "guides.txt").write_bytes(damaged(rng, data) if rng.random() < 0.4 else data)

@@ -19,7 +19,7 @@ from .preset_files import setting_value
 FILE_OPTIONS = {
     *("help", "mesh", "field", "output", "strokes", "guides", "field_mesh", "against", "scene"),
     *("tone_image", "tone_picture", "tone_attribute", "uv", "object", "camera", "frames"),
-    *("all_cameras", "out", "save", "jobs", "scheduler"),
+    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler"),
 }
 
 

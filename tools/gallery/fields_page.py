@@ -9,6 +9,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_from_directions, tensor_field
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -66,6 +67,7 @@ def write() -> None:
     save(sheet([_free()]), IMAGES / "fields-directions.png")
     save(sheet([_tensor()]), IMAGES / "fields-tensor.png")
     save(sheet([_singular(monkey)]), IMAGES / "fields-singularities.png")
+    save(sheet([_prescribed()]), IMAGES / "fields-prescribed.png")
 
 
 def _form(monkey: Surface) -> list[list[Panel]]:
@@ -172,28 +174,54 @@ def _tensor() -> list[Panel]:
 
 def _singular(monkey: Surface) -> list[Panel]:
     """Draw the singularities of the smoothest fields."""
-    panels = []
-    for degree in (2, 4):
-        field = generate(monkey, "smoothest", degree)
-        vertex, index = find_singularities(monkey, field)
-        camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
-        picture = display(compose_view(monkey, field, LOOK, camera).rgba)
-        buffer = project([MeshInstance(monkey, np.eye(4), field)], camera)
-        depth = np.full(camera.height * camera.width, -np.inf)
-        depth[buffer.pixel] = buffer.position[:, 2]
-        clip = np.c_[monkey.vertices[vertex], np.ones(len(vertex))]
-        clip = clip @ (camera.projection @ camera.view).T
-        x, y = ((clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)).T
-        z = (monkey.vertices[vertex] @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
-        pixel = y.astype(int) * camera.width + x.astype(int)
-        visible = z > depth[pixel] - 0.03
-        for column, row, sign in zip(x[visible], y[visible], np.sign(index[visible]), strict=True):
-            supersampling = LOOK.supersampling
-            picture = dotted(
-                picture, column / supersampling, WIDE - row / supersampling, DOTS[int(sign)]
-            )
-        panels.append(Panel(picture, f"Singularities, N = {degree}"))
+    fields = [(degree, generate(monkey, "smoothest", degree)) for degree in (2, 4)]
+    return [
+        _dotted_panel(monkey, field, WIDE, f"Singularities, N = {degree}")
+        for degree, field in fields
+    ]
+
+
+def _prescribed() -> list[Panel]:
+    """Draw a sphere whose singularities are placed: in a square in front, and out of sight."""
+    ball = sphere()
+    toward_eye = view(ball, (-26, 8), (SIDE, SIDE), 1).view[2, :3]
+    across, up = view(ball, (-26, 8), (SIDE, SIDE), 1).view[:2, :3]
+    angle = np.arange(8) * np.pi / 4 + 0.2
+    ring = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up
+    panels = [_dotted_panel(ball, generate(ball, "smoothest", 4), SIDE, "Smoothest, N = 4")]
+    for text, centers in (
+        (
+            "Two in front, six behind",
+            toward_eye * np.where(angle < 1.7, 2, -2)[:, None],
+        ),
+        ("Out of sight", -2 * toward_eye),
+    ):
+        vertex = [int((ball.vertices @ point).argmax()) for point in normalize(ring + centers)]
+        settings = GeneratorSettings("prescribed", singularities=(vertex, np.ones(8, dtype=int)))
+        panels.append(_dotted_panel(ball, generate(ball, settings, 4), SIDE, text))
     return panels
+
+
+def _dotted_panel(surface: Surface, field: RosyField, side: int, text: str) -> Panel:
+    """Draw a field with dots at the visible singularities."""
+    vertex, index = find_singularities(surface, field)
+    camera = view(surface, (-26, 8), (side, side), LOOK.supersampling)
+    picture = display(compose_view(surface, field, LOOK, camera).rgba)
+    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    depth = np.full(camera.height * camera.width, -np.inf)
+    depth[buffer.pixel] = buffer.position[:, 2]
+    clip = np.c_[surface.vertices[vertex], np.ones(len(vertex))]
+    clip = clip @ (camera.projection @ camera.view).T
+    x, y = ((clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)).T
+    z = (surface.vertices[vertex] @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
+    pixel = y.astype(int) * camera.width + x.astype(int)
+    visible = z > depth[pixel] - 0.03
+    for column, row, sign in zip(x[visible], y[visible], np.sign(index[visible]), strict=True):
+        supersampling = LOOK.supersampling
+        picture = dotted(
+            picture, column / supersampling, side - row / supersampling, DOTS[int(sign)]
+        )
+    return Panel(picture, text)
 
 
 def _box() -> Surface:

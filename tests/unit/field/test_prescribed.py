@@ -1,0 +1,189 @@
+"""The smoothest field with given singularities: closed forms, all surfaces, and a dense solver."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from shapes import cylinder, from_quads, icosphere, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field import prescribed
+from rosy_addon.field.analysis import dirichlet_energy
+from rosy_addon.field.prescribed import face_graph_task, prescribed_field, spanning_forest_task
+from rosy_addon.field.representation import face_frames
+from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.progress import run_to_completion
+
+
+def globe(rows: int = 24, columns: int = 48) -> Surface:
+    """A sphere of meridians and parallels; its poles are the first and the last vertex."""
+    polar = np.linspace(0, np.pi, rows + 1)[1:-1, None]
+    azimuth = np.arange(columns) * 2 * np.pi / columns
+    rings = np.stack(
+        np.broadcast_arrays(
+            np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
+        ),
+        axis=-1,
+    ).reshape(-1, 3)
+    vertices = np.concatenate([[[0, 0, 1]], rings, [[0, 0, -1]]])
+    number = 1 + np.arange((rows - 1) * columns).reshape(rows - 1, columns)
+    following = np.roll(number, -1, axis=1)
+    caps = [(0, a, b) for a, b in zip(number[0], following[0], strict=True)]
+    caps += [(len(vertices) - 1, b, a) for a, b in zip(number[-1], following[-1], strict=True)]
+    quads = np.stack([number[:-1], number[1:], following[1:], following[:-1]], axis=-1)
+    faces = [*caps, *quads.reshape(-1, 4).tolist()]
+    start = np.cumsum([0, *map(len, faces)])
+    return build_surface(vertices, np.array([v for face in faces for v in face]), start)
+
+
+def block(holes: int, missing: int = 0) -> Surface:
+    """A rounded block of quads with holes through it, and some patches cut out of its surface."""
+    solid = np.ones((3 + 4 * max(holes, 1), 7, 3), dtype=bool)
+    for hole in range(holes):
+        solid[3 + 4 * hole : 5 + 4 * hole, 2:5] = False
+    solid = np.pad(np.kron(solid, np.ones((2, 2, 2), dtype=bool)), 1)
+    quads = []
+    for axis, side in itertools.product(range(3), (0, 1)):
+        cells = np.argwhere(solid & ~np.roll(solid, 1 - 2 * side, axis=axis))
+        steps = np.zeros((4, 3), dtype=int)
+        steps[:, axis] = side
+        steps[1:3, (axis + 1) % 3], steps[2:, (axis + 2) % 3] = 1, 1
+        quads.append(cells[:, None] + (steps if side else steps[::-1]))
+    corners = np.concatenate(quads).reshape(-1, 3)
+    vertices, quads = np.unique(corners, axis=0, return_inverse=True)
+    vertices, quads = vertices.astype(float), quads.reshape(-1, 4)
+    sides = np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)])
+    for _ in range(8):
+        mean = np.stack(
+            [np.bincount(sides[:, 0], column[sides[:, 1]]) for column in vertices.T], axis=1
+        )
+        vertices = (vertices + mean / np.bincount(sides[:, 0])[:, None]) / 2
+    random = np.random.default_rng(missing)
+    center = vertices[quads].mean(axis=1)
+    for patch in center[random.integers(len(quads), size=missing)]:
+        far = np.linalg.norm(center - patch, axis=1) > 3
+        quads, center = quads[far], center[far]
+    return from_quads(vertices, quads)
+
+
+def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
+    """Interior vertices in random order, no two of which share a face."""
+    graph = graph_of(surface)
+    is_interior = np.zeros(len(surface.vertices), dtype=bool)
+    is_interior[surface.corner_vertex[graph.is_interior[graph.corner_node]]] = True
+    faces = surface.corner_vertex.reshape(surface.face_count, -1)
+    chosen = []
+    for vertex in np.random.default_rng(seed).permutation(np.flatnonzero(is_interior)):
+        if is_interior[vertex] and len(chosen) < count:
+            chosen.append(vertex)
+            is_interior[faces[(faces == vertex).any(axis=1)]] = False
+    return np.array(chosen)
+
+
+def graph_of(surface):
+    return run_to_completion(face_graph_task(surface, *face_frames(surface)))
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_poles_give_the_meridians(degree):
+    """The smoothest field with all of the index at the poles is that of a rotated meridian."""
+    surface = globe()
+    last = len(surface.vertices) - 1
+    field = prescribed_field(surface, degree, [0, last], [degree, degree])
+    vertex, index = find_singularities(surface, field)
+    assert vertex.tolist() == [0, last] and index.tolist() == [degree, degree]
+    east = np.cross((0, 0, 1), surface.face_center)
+    east /= np.linalg.norm(east, axis=1)[:, None]
+    north = np.cross(surface.face_normal, east)
+    angle = np.arctan2((field.vectors * north).sum(axis=1), (field.vectors * east).sum(axis=1))
+    relative = np.exp(1j * degree * (angle - angle[100]))
+    assert np.degrees(np.abs(np.angle(relative)) / degree).max() < 1e-4
+
+
+def test_a_torus_without_singularities_has_parallel_lines():
+    surface = torus(48, 24)
+    field = prescribed_field(surface, 4, [], [])
+    assert not len(find_singularities(surface, field)[0])
+    along = np.cross((0, 0, 1), surface.face_center)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    cosine = np.abs((field.vectors * along).sum(axis=1))
+    assert np.minimum(cosine, np.sqrt(np.maximum(1 - cosine**2, 0))).max() < 1e-6
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+@pytest.mark.parametrize("holes, missing", [(0, 0), (1, 0), (3, 0), (0, 1), (0, 3), (1, 2)])
+def test_all_singularities_are_found_again(holes, missing, degree):
+    surface = block(holes, missing)
+    needed = degree * euler_characteristic(surface) if not missing else 0
+    vertex = spread_vertices(surface, abs(needed) + 6, seed=degree)
+    index = np.where(np.arange(len(vertex)) < abs(needed), np.sign(needed), 1)
+    index[-3:] = -1
+    field = prescribed_field(surface, degree, vertex, index)
+    found, found_index = find_singularities(surface, field)
+    order = np.argsort(vertex)
+    np.testing.assert_array_equal(found, vertex[order])
+    np.testing.assert_array_equal(found_index, index[order])
+
+
+@pytest.mark.parametrize(
+    "surface, degree, vertex, index",
+    [
+        (icosphere(2), 2, [0, 1, 2, 3], [1, 1, 1, 1]),
+        (torus(16, 8), 4, [3, 60], [1, -1]),
+        (torus(16, 8), 3, [], []),
+        (cylinder(12, 6), 4, [30], [1]),
+        (cylinder(8, 1), 4, [], []),
+    ],
+    ids=["sphere", "torus-pair", "torus", "tube", "ring"],
+)
+def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
+    """Which tries all multiples of a turn around the loops."""
+    graph = graph_of(surface)
+    edge = np.arange(len(graph.source))
+    sums = np.zeros((graph.node_count, len(edge)))
+    sums[graph.head, edge] += 1
+    sums[graph.tail, edge] -= 1
+    node_index = prescribed._index_at_nodes(
+        surface, graph, np.array(vertex, dtype=int), np.array(index, dtype=int)
+    )
+    turn = 2 * np.pi / degree
+    required = turn * node_index - graph.defect
+    task = spanning_forest_task(len(graph.component), graph.source, graph.target)
+    loops = run_to_completion(prescribed._loops_task(graph, run_to_completion(task)))
+    rows = np.zeros((len(loops), len(edge)))
+    for row, (crossed, signs) in zip(rows, loops, strict=True):
+        row[crossed] = signs
+    root = np.sqrt(graph.conductance)
+    system = np.concatenate([sums[graph.is_interior], rows]) * root
+    start, *_ = np.linalg.lstsq(system, np.r_[required[graph.is_interior], rows @ -graph.unfolding])
+    nearest = np.rint(rows @ (root * start + graph.unfolding) / turn)
+    energies = []
+    for change in itertools.product((-1, 0, 1), repeat=len(loops)):
+        loop_sums = turn * (nearest + change) - rows @ graph.unfolding
+        solution, *_ = np.linalg.lstsq(system, np.r_[required[graph.is_interior], loop_sums])
+        energies.append(solution @ solution)
+    angle, _ = run_to_completion(prescribed._turning_angles_task(graph, degree, required))
+    energy = (angle**2 / graph.conductance).sum()
+    assert energy == pytest.approx(min(energies), rel=1e-6, abs=1e-9)
+    # The field turns by these angles at all edges, also at those that close the loops.
+    field = prescribed_field(surface, degree, vertex, index)
+    expected = (2 * (1 - np.cos(degree * angle)) / graph.conductance).sum()
+    assert dirichlet_energy(surface, field) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "surface, vertex, index, message",
+    [
+        (torus(), [10], [1], "add up to 1/4, but this closed surface needs 0/4"),
+        (icosphere(2), [0], [4], "add up to 4/4, but this closed surface needs 8/4"),
+        (icosphere(2), [9999], [8], "has no vertex 9999: its vertices are numbered 0 to 161"),
+        (cylinder(12, 4), [0], [1], "vertex 0 cannot be singular, because it is at a border"),
+        (icosphere(2), [0, 1], [30, -22], "would turn too fast for the size of the faces"),
+    ],
+)
+def test_what_is_not_possible(surface, vertex, index, message):
+    with pytest.raises(RosyError, match=message):
+        prescribed_field(surface, 4, vertex, index)

@@ -13,6 +13,7 @@ from ..color import to_linear
 from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..errors import RosyError
+from ..field.frames import unit_direction
 from ..presets.store import default_user_folder, load_preset
 from ..progress import run_to_completion
 from ..projection.gbuffer import MeshInstance
@@ -206,8 +207,8 @@ def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
     RosyError
         If it is not three finite numbers, or all of them are 0.
     """
-    direction = np.asarray(light_direction, dtype=np.float64)
-    if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
+    direction = unit_direction(light_direction)
+    if direction is None:
         raise RosyError(
             "light_direction must be three numbers, the direction to a lamp: not all of them 0"
         )

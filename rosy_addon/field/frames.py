@@ -18,6 +18,20 @@ def normalize(vectors: np.ndarray) -> np.ndarray:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
+def unit_direction(vector: np.ndarray) -> np.ndarray | None:
+    """Return a (3,) vector of length 1; None if a vector of any shape is no direction.
+
+    Its length may be anything that a number can hold.
+    """
+    vector = np.asarray(vector, dtype=np.float64).reshape(-1)
+    largest = np.abs(vector).max(initial=0.0)
+    if vector.shape != (3,) or not np.isfinite(largest) or largest == 0:
+        return None
+    # Scaled exactly to about 1, so that its square neither overflows nor vanishes.
+    vector = np.ldexp(vector, -np.frexp(largest)[1])
+    return vector / np.linalg.norm(vector)
+
+
 def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Rotate tangent vectors by the minimal rotation that takes one normal to another.
 

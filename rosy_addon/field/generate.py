@@ -16,7 +16,7 @@ from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
 from .curvature import TINY, curvature_task
 from .form import form_task
-from .frames import normalize
+from .frames import normalize, unit_direction
 from .guided import guided_or_smoothest_task
 from .guides import (
     average_guides,
@@ -260,15 +260,11 @@ def axis_field(
     RosyError
         If the axis is zero, not finite, or not a vector of 3 numbers.
     """
-    direction = np.asarray(axis, dtype=np.float64).reshape(-1)
-    largest = np.abs(direction).max(initial=0.0)
-    if direction.shape != (3,) or not np.isfinite(largest) or largest == 0:
+    direction = unit_direction(axis)
+    if direction is None:
         raise RosyError(
             f"axis {tuple(axis)} is not a direction: give three finite numbers that are not all zero"
         )
-    # Scaled exactly to about 1, so that its square neither overflows nor vanishes.
-    direction = np.ldexp(direction, -np.frexp(largest)[1])
-    direction = direction / np.linalg.norm(direction)
     normal = surface.face_normal
     vectors = direction - (normal @ direction)[:, None] * normal
     vectors[~normal.any(axis=1) | (np.linalg.norm(vectors, axis=1) < MIN_PROJECTION)] = 0.0

@@ -86,8 +86,8 @@ def test_hatching_for_one_light():
     red, green = (np.asarray(thresholds)[..., channel].ravel() / 255 for channel in (0, 1))
     np.testing.assert_allclose(np.quantile(red, [0.2, 0.5, 0.8]), [0.2, 0.5, 0.8], atol=0.03)
     assert abs(np.corrcoef(red, green)[0, 1]) < 0.1
-    for cosine in (0.2, 0.5, 0.9):
-        light = (0, np.sqrt(1 - cosine**2), cosine)
+    for cosine, length in ((0.2, 1.0), (0.5, 1e-260), (0.9, 1e200)):
+        light = (0, length * np.sqrt(1 - cosine**2), length * cosine)
         ink = rf.texture(
             square, field, size=512, margin=0, light_direction=light, **settings
         ).tiles[1001]

@@ -187,6 +187,27 @@ def guided(
     array([[1., 0., 0.],
            [1., 0., 0.]])
     """
+    settings = GeneratorSettings(
+        "guided",
+        smoothing_length=reach,
+        edges=None if edges is None else np.asarray(edges),
+        strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
+        uv=uv_map(surface) if uv else None,
+        vectors=_guide_vectors(surface, vectors, degree),
+    )
+    return _generated(surface, settings, degree)
+
+
+def _guide_vectors(
+    surface: Surface, vectors: ArrayLike | Field | None, degree: int
+) -> np.ndarray | None:
+    """Return guides as (F, 3) vectors.
+
+    Raises
+    ------
+    RosyError
+        If they are a field of another surface or degree.
+    """
     if isinstance(vectors, Field):
         check_same_surface(surface, vectors)
         if vectors.degree != degree:
@@ -195,21 +216,15 @@ def guided(
                 f"{degree}: convert them with to_degree"
             )
         vectors = vectors.vectors
-    settings = GeneratorSettings(
-        "guided",
-        smoothing_length=reach,
-        edges=None if edges is None else np.asarray(edges),
-        strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
-        uv=uv_map(surface) if uv else None,
-        vectors=None if vectors is None else np.asarray(vectors, dtype=np.float64),
-    )
-    return _generated(surface, settings, degree)
+    return None if vectors is None else np.asarray(vectors, dtype=np.float64)
 
 
 def prescribed(
     surface: Surface,
     singularities: Mapping[int, int] | str | os.PathLike[str],
     degree: int | None = None,
+    *,
+    vectors: ArrayLike | Field | None = None,
 ) -> Field:
     """Make the smoothest field that has given singularities, and no other ones.
 
@@ -223,6 +238,9 @@ def prescribed(
         The indices of singular vertices, in units of 1/N; or a file of singularities, ``.sings``.
     degree : int, optional
         N, from 1 to 12. By default that of the file, or 4.
+    vectors : (F, 3) array_like or Field, optional
+        Guides, zero where there is none. On each connected part, the field is turned as a whole to be near
+        to them; by default, to the edges of the mesh.
 
     Raises
     ------
@@ -249,7 +267,11 @@ def prescribed(
                 f"{os.fspath(singularities)}: is of degree {file_degree}, not {degree}: leave the degree out"
             )
         degree = file_degree
-    settings = GeneratorSettings("prescribed", singularities=(vertex, index))
+    settings = GeneratorSettings(
+        "prescribed",
+        singularities=(vertex, index),
+        vectors=_guide_vectors(surface, vectors, degree),
+    )
     return _generated(surface, settings, degree)
 
 

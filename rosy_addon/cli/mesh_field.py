@@ -92,7 +92,8 @@ def add_mesh_options(
         "--guides",
         type=Path,
         metavar="FIELD",
-        help="a field file that a guided field follows where its vectors are not zero",
+        help="a field file that a guided field follows where its vectors are not zero; a prescribed field "
+        "is turned to it as a whole",
     )
     parser.add_argument(
         "--singularities",
@@ -195,8 +196,10 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
     """Generate a field of the kind that the options name."""
     degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
-    default = "guided" if has_guides else "form" if options.singularities is None else "prescribed"
-    match options.generate or default:
+    kind = options.generate or ("guided" if has_guides else "form")
+    if options.singularities is not None and options.generate is None:
+        kind = "prescribed"
+    match kind:
         case "form":
             return api.form(surface, degree)
         case "smoothest":
@@ -210,23 +213,34 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
                 raise RosyError(
                     f"{options.mesh}: give the singularities: --singularities FILE.sings"
                 )
-            return api.prescribed(surface, options.singularities, options.degree)
+            return api.prescribed(
+                surface,
+                options.singularities,
+                options.degree,
+                vectors=_guides(options, surface, options.degree),
+            )
         case "axis":
             return api.along_axis(surface, options.axis, degree)
         case "uv":
             return api.along_uv(surface, degree)
         case "guided":
             strokes = [] if options.strokes is None else read_guide_strokes(options.strokes)
-            guides = None
-            if options.guides is not None:
-                guides = read_field(options, options.guides, surface, degree)
             return api.guided(
                 surface,
                 degree,
                 strokes=strokes,
-                vectors=guides,
+                vectors=_guides(options, surface, degree),
                 uv=options.uv,
                 reach=options.reach,
             )
         case kind:
             raise RosyError(f"unknown generator '{kind}': choose {', '.join(GENERATORS)}")
+
+
+def _guides(
+    options: argparse.Namespace, surface: api.Surface, degree: int | None
+) -> api.Field | None:
+    """Read the field of the option --guides, if it is given."""
+    if options.guides is None:
+        return None
+    return read_field(options, options.guides, surface, degree)

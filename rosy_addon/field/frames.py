@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -18,18 +19,18 @@ def normalize(vectors: np.ndarray) -> np.ndarray:
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
-def unit_direction(vector: np.ndarray) -> np.ndarray | None:
+def unit_direction(vector: ArrayLike) -> np.ndarray | None:
     """Return a (3,) vector of length 1; None if a vector of any shape is no direction.
 
     Its length may be anything that a number can hold.
     """
-    vector = np.asarray(vector, dtype=np.float64).reshape(-1)
-    largest = np.abs(vector).max(initial=0.0)
-    if vector.shape != (3,) or not np.isfinite(largest) or largest == 0:
+    values = np.asarray(vector, dtype=np.float64).reshape(-1)
+    largest = np.abs(values).max(initial=0.0)
+    if values.shape != (3,) or not np.isfinite(largest) or largest == 0:
         return None
     # Scaled exactly to about 1, so that its square neither overflows nor vanishes.
-    vector = np.ldexp(vector, -np.frexp(largest)[1])
-    return vector / np.linalg.norm(vector)
+    values = np.ldexp(values, -np.frexp(largest)[1])
+    return values / np.linalg.norm(values)
 
 
 def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -82,7 +82,7 @@ class GeneratorSettings:
     uv : (C, 2) float ndarray or None
         For "guided" and "uv": texture coordinates of the corners.
     vectors : (F, 3) float ndarray or None
-        For "guided": a member vector for each face, zero where there is no guide.
+        For "guided" and "prescribed": a member vector for each face, zero where there is no guide.
     singularities : ((K,) int ndarray, (K,) int ndarray) or None
         For "prescribed": vertices, and their indices in units of 1 / N.
     """
@@ -167,7 +167,8 @@ def generate_task(
             raise RosyError(
                 f"{surface.name}: no singularities are given: give their vertices and indices"
             )
-        return (yield from prescribed_task(surface, degree, *settings.singularities))
+        task = prescribed_task(surface, degree, *settings.singularities, settings.vectors)
+        return (yield from task)
     if settings.kind == "uv":
         if settings.uv is None:
             raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")

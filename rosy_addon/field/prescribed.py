@@ -4,7 +4,7 @@ A field on faces turns by some angle from each face to the next, beyond parallel
 vertex, these angles and the angle defect add up to the singularity index. So a field with given indices
 solves linear equations for the angles, one for each interior vertex; and on surfaces with handles, or with
 several borders, one for each loop that no vertex can contract. Among the solutions, that of the least
-squared angles has the least Dirichlet energy, up to third order in the angles.
+squared angles has the least Dirichlet energy, but for terms of fourth order.
 
 The angles are those of a potential at the vertices, which solves a Poisson equation; and those of one
 harmonic solution for each loop. Around a loop, the field may turn by any multiple of 2 pi / N; the multiples

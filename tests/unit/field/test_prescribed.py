@@ -113,6 +113,18 @@ def test_a_torus_without_singularities_has_parallel_lines():
     assert np.minimum(cosine, np.sqrt(np.maximum(1 - cosine**2, 0))).max() < 1e-6
 
 
+def test_guides_turn_the_whole_field():
+    surface = globe(12, 24)
+    last = len(surface.vertices) - 1
+    guides = np.zeros((surface.face_count, 3))
+    guides[100] = surface.vertices[surface.corner_vertex[surface.face_start[100] + 2]]
+    guides[100] -= surface.vertices[surface.corner_vertex[surface.face_start[100]]]  # a diagonal
+    field = prescribed_field(surface, 2, [0, last], [2, 2], guides)
+    cosine = abs(field.vectors[100] @ guides[100]) / np.linalg.norm(guides[100])
+    assert cosine == pytest.approx(1, abs=1e-4)
+    assert find_singularities(surface, field)[0].tolist() == [0, last]
+
+
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
 @pytest.mark.parametrize("holes, missing", [(0, 0), (1, 0), (3, 0), (0, 1), (0, 3), (1, 2)])
 def test_all_singularities_are_found_again(holes, missing, degree):

@@ -40,7 +40,7 @@ def fields(cube: rf.Surface, folder: Path) -> rf.Field:
         rf.guided(cube, 2, strokes=[[[0.1, 0.5, 1.0], [0.9, 0.5, 1.0]]], uv=False),
         rf.along_axis(cube, (1.0, 2.0, 3.0), degree=1),
         rf.along_uv(cube),
-        rf.prescribed(cube, {0: 4, 6: 4}, 4),
+        rf.prescribed(cube, {vertex: 1 for vertex in range(8)}, 4),
         rf.from_vectors(cube, vectors, 4, nonfinite="zero"),
         rf.from_angles(cube, np.zeros(6), 4, magnitude=0.5),
         rf.from_representation(cube, np.ones(6), 4),

@@ -148,10 +148,8 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
     is_simulation = options.mesh.suffix.lower() in options.extras.simulation_suffixes
-    sources = (
-        *(options.field, options.generate, options.strokes, options.guides, options.singularities),
-    )
-    has_source = options.uv or any(source is not None for source in sources)
+    names = ("field", "generate", "strokes", "guides", "singularities")
+    has_source = options.uv or any(getattr(options, name) is not None for name in names)
     for name in ("array", "step"):
         if getattr(options, name) is not None and not is_simulation:
             raise RosyError(

@@ -36,18 +36,36 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     face_a, face_b = surface.corner_face[a], surface.corner_face[b]
     angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
-    start = surface.vertices[surface.corner_vertex[a]]
-    edge = surface.vertices[surface.corner_vertex[b]] - start
-    length = np.sqrt(dot(edge, edge))
-    edge_direction = normalize(edge)
-    center_distance = np.zeros(len(a))
-    for face in (face_a, face_b):
-        offset = surface.face_center[face] - start
-        offset -= dot(offset, edge_direction)[:, None] * edge_direction
-        center_distance += np.sqrt(dot(offset, offset))
+    length, center_distance = edge_lengths(surface, a, b)
     defined = (modulus[face_a] > 0) & (modulus[face_b] > 0) & (center_distance > 0)
     weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
     return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
+
+
+def edge_lengths(surface: Surface, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Measure interior edges, for two-point fluxes across them.
+
+    Parameters
+    ----------
+    surface : Surface
+    a, b : (I,) int ndarray
+        The columns of `Edges.halfedges`.
+
+    Returns
+    -------
+    length : (I,) float64 ndarray
+    center_distance : (I,) float64 ndarray
+        The summed distances of the centers of both faces from the edge.
+    """
+    start = surface.vertices[surface.corner_vertex[a]]
+    edge = surface.vertices[surface.corner_vertex[b]] - start
+    direction = normalize(edge)
+    center_distance = np.zeros(len(a))
+    for corner in (a, b):
+        offset = surface.face_center[surface.corner_face[corner]] - start
+        offset -= dot(offset, direction)[:, None] * direction
+        center_distance += np.sqrt(dot(offset, offset))
+    return np.sqrt(dot(edge, edge)), center_distance
 
 
 def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:

@@ -20,9 +20,15 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
-from .frames import dot, normalize
+from .analysis import edge_lengths
 from .guided import conjugate_gradient_task
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import (
+    complex_bincount,
+    edge_unfolding,
+    face_frames,
+    from_representation,
+    to_representation,
+)
 from .rosy_field import RosyField, check_degree
 from .singularities import signed_corner_angles_task
 from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task
@@ -70,6 +76,8 @@ class FaceGraph:
         2 pi minus the angles of its corners.
     component : (F,) int32 ndarray
         Connected component of each face.
+    node_component : (n,) int32 ndarray
+        That of the faces of each vertex node.
     """
 
     source: np.ndarray
@@ -82,6 +90,7 @@ class FaceGraph:
     is_interior: np.ndarray
     defect: np.ndarray
     component: np.ndarray
+    node_component: np.ndarray
 
     @property
     def node_count(self) -> int:
@@ -170,17 +179,9 @@ def face_graph_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[Face
     a, b = halfedges.T
     following = next_corners(surface.face_start)
     source, target = surface.corner_face[a], surface.corner_face[b]
-    start = surface.vertices[surface.corner_vertex[a]]
-    edge = surface.vertices[surface.corner_vertex[b]] - start
-    in_source = dot(edge, x[source]) + 1j * dot(edge, y[source])
-    in_target = dot(edge, x[target]) + 1j * dot(edge, y[target])
+    unfolding = edge_unfolding(surface, x, y, a, b)
     yield Progress(0.5, LABEL)
-    length, along = np.sqrt(dot(edge, edge)), normalize(edge)
-    distance = np.zeros(len(a))
-    for face in (source, target):
-        offset = surface.face_center[face] - start
-        offset -= dot(offset, along)[:, None] * along
-        distance += np.sqrt(dot(offset, offset))
+    length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
     np.clip(
@@ -200,17 +201,21 @@ def face_graph_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[Face
     yield Progress(0.8, LABEL)
     corner_angle = yield from subtask(signed_corner_angles_task(surface, x, y), 0.8, 0.9)
     yield Progress(0.9, LABEL)
+    component = connected_components(surface.face_count, np.stack([source, target], axis=1))
+    node_component = np.zeros(len(is_interior), dtype=component.dtype)
+    node_component[corner_node] = component[surface.corner_face]
     return FaceGraph(
         source=source,
         target=target,
-        unfolding=np.angle(in_target * in_source.conj()),
+        unfolding=np.angle(unfolding),
         tail=corner_node[a],
         head=corner_node[b],
         conductance=conductance,
         corner_node=corner_node,
         is_interior=is_interior,
         defect=2 * np.pi - np.bincount(corner_node, corner_angle, len(is_interior)),
-        component=connected_components(surface.face_count, np.stack([source, target], axis=1)),
+        component=component,
+        node_component=node_component,
     )
 
 
@@ -247,7 +252,7 @@ def _check_sums(surface: Surface, graph: FaceGraph, degree: int, node_index: np.
     RosyError
         If one has another sum.
     """
-    component = _node_components(surface, graph)
+    component = graph.node_component
     count = int(component.max(initial=-1)) + 1
     is_closed = np.ones(count, dtype=bool)
     is_closed[component[~graph.is_interior]] = False
@@ -263,13 +268,6 @@ def _check_sums(surface: Surface, graph: FaceGraph, degree: int, node_index: np.
         f"{surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
         f"closed surface needs {needed[first]}/{degree}: add or change singularities"
     )
-
-
-def _node_components(surface: Surface, graph: FaceGraph) -> np.ndarray:
-    """(n,) int: connected component of each vertex node."""
-    component = np.zeros(graph.node_count, dtype=np.intp)
-    component[graph.corner_node] = graph.component[surface.corner_face]
-    return component
 
 
 def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
@@ -353,10 +351,9 @@ def _least_angles_task(
 ) -> Task[np.ndarray]:
     """(I,) angles of least squares, weighted by 1 / conductance; see `_turning_angles_task`."""
     yield Progress(0.0, LABEL)
-    unknown = np.cumsum(graph.is_interior) - 1
     matrix = levels = None
     if graph.is_interior.any():
-        matrix = yield from subtask(_laplacian_task(graph, unknown), 0.0, 0.1)
+        matrix = yield from subtask(_laplacian_task(graph), 0.0, 0.1)
         levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.5)
 
     def potential_task(sums: np.ndarray) -> Task[np.ndarray]:
@@ -394,19 +391,18 @@ def _least_angles_task(
     return angle
 
 
-def _laplacian_task(graph: FaceGraph, unknown: np.ndarray) -> Task[CSRMatrix]:
+def _laplacian_task(graph: FaceGraph) -> Task[CSRMatrix]:
     """The Laplacian of potentials at interior nodes, which are 0 at the others.
 
-    `unknown`, (n,), are the numbers of the interior nodes. On closed components, the first node is
+    On closed components, the first node is
     tied to 0 as well; the sums of a solvable equation do not change that node.
     """
-    count = int(graph.is_interior.sum())
+    count, unknown = int(graph.is_interior.sum()), np.cumsum(graph.is_interior) - 1
     tail, head, conductance = graph.tail, graph.head, graph.conductance
     diagonal = np.bincount(np.concatenate([tail, head]), np.tile(conductance, 2), graph.node_count)
-    component = connected_components(graph.node_count, np.stack([tail, head], axis=1))
-    _, first = np.unique(component, return_index=True)
+    _, first = np.unique(graph.node_component, return_index=True)
     is_open = np.zeros(len(first), dtype=bool)
-    is_open[component[~graph.is_interior]] = True
+    is_open[graph.node_component[~graph.is_interior]] = True
     tied = first[~is_open]
     diagonal[tied] += diagonal[tied] / 6
     inside = graph.is_interior[tail] & graph.is_interior[head]
@@ -457,7 +453,7 @@ def _loops_task(
     rest = np.flatnonzero(~tree.has_edge)
     # All border nodes of a component are the same node.
     node = np.arange(graph.node_count)
-    component = connected_components(graph.node_count, np.stack([graph.tail, graph.head], axis=1))
+    component = graph.node_component
     border = np.flatnonzero(~graph.is_interior)
     first_border = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.intp)
     first_border[component[border[::-1]]] = border[::-1]

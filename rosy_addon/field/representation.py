@@ -113,6 +113,23 @@ def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
     return to_representation(field.vectors, x, y, field.degree)
 
 
+def edge_unfolding(
+    surface: Surface, x: np.ndarray, y: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> np.ndarray:
+    """Return (I,) complex128 factors of modulus 1, from the frame of the first face at each edge to the second.
+
+    A direction in the first face, as a complex number, times the factor is the same direction in the second
+    one if the faces are unfolded into one plane. The parameters are those of `matching_angles`.
+    """
+    source_face, target_face = surface.corner_face[a], surface.corner_face[b]
+    edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
+    edge_in_source = dot(edge, x[source_face]) + 1j * dot(edge, y[source_face])
+    edge_in_target = dot(edge, x[target_face]) + 1j * dot(edge, y[target_face])
+    unfolding = edge_in_target * edge_in_source.conj()
+    modulus = np.abs(unfolding)
+    return np.divide(unfolding, modulus, out=np.ones_like(unfolding), where=modulus > 0)
+
+
 def matching_angles(
     surface: Surface,
     x: np.ndarray,
@@ -146,12 +163,7 @@ def matching_angles(
         -pi / N to pi / N.
     """
     source_face, target_face = surface.corner_face[a], surface.corner_face[b]
-    edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
-    edge_in_source = dot(edge, x[source_face]) + 1j * dot(edge, y[source_face])
-    edge_in_target = dot(edge, x[target_face]) + 1j * dot(edge, y[target_face])
-    unfolding = edge_in_target * edge_in_source.conj()
-    modulus = np.abs(unfolding)
-    unfolding = np.divide(unfolding, modulus, out=np.ones_like(unfolding), where=modulus > 0)
+    unfolding = edge_unfolding(surface, x, y, a, b)
     return np.angle(z[target_face] * (z[source_face] * power(unfolding, degree)).conj()) / degree
 
 

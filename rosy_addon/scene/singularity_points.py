@@ -180,23 +180,21 @@ def singularity_point_object(
     scene: bpy.types.Scene, obj: bpy.types.Object
 ) -> bpy.types.Object | None:
     """Return the object of `add_singularity_points` for an object; None if there is none."""
-    return next(
-        (
-            candidate
-            for candidate in scene.objects
-            if isinstance(candidate.get(OWNED_TAG), str) and candidate.parent == obj
-        ),
-        None,
-    )
+    return next(iter(_point_objects(scene, obj)), None)
 
 
-def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object | None = None) -> int:
-    """Delete the point objects of an object, or of all objects of a scene. Return their number."""
-    point_objects = [
+def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """Return the point objects of an object, or of all objects of a scene."""
+    return [
         candidate
         for candidate in scene.objects
         if isinstance(candidate.get(OWNED_TAG), str) and (obj is None or candidate.parent == obj)
     ]
+
+
+def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object | None = None) -> int:
+    """Delete the point objects of an object, or of all objects of a scene. Return their number."""
+    point_objects = _point_objects(scene, obj)
     for point_object in point_objects:
         data = point_object.data
         bpy.data.objects.remove(point_object)

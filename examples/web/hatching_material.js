@@ -63,7 +63,8 @@ void main() {
   float edgeFactor = 1.6 * 1.6 * pow(0.125, crispness);
 
   vec3 color = paper;
-  for (int line = 0; line < 3; line++) {
+  // The lines that come first are on top of the others.
+  for (int line = 2; line >= 0; line--) {
     float share = begun[line] / max(total, 1e-6);
     float coverage = 1.0 - pow(max(left[line], 1e-3), share);
     float room = min(coverage, 1.0 - coverage), inner = coverage * (1.0 - coverage);

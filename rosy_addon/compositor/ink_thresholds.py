@@ -6,16 +6,15 @@ evenly distributed from 0 to 1, as are the values of a halftone screen. With the
 line, the hatching of any tone is a comparison: there is ink where the threshold is below the coverage.
 
 Lines share the ink in their order: the first covers the light tones, and further ones join in darker
-tones. The thresholds are stored in that order. Where two lines swap, they are merged such that those of
-the first and of the second are still independent and evenly distributed. With the density
-E = -log(1 - threshold), a line of the share s has ink from the density E / s of the tone on. The first
-ink of several lines is the smallest of these; the densities have an exponential distribution, and so do
-the smallest, and what is left of the others.
+tones. The thresholds are stored in that order, in layers. With the density E = -log(1 - threshold), a
+line of the share s has ink from the density E / s of the tone on. Where two lines swap, each has a share
+between those of their places, and both are merged into the first of the two layers: there is ink from the
+smaller of these densities on. Such thresholds depend on how the tone is shared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -79,8 +78,22 @@ MIN_TRANSMITTANCE = 1e-3
 #: Steps of the bisection that finds the thresholds of uneven lines: to 1 / 1024.
 BISECTION_STEPS = 10
 
-#: Entries of the table of densities of the first line, and its largest density.
+#: Entries of the table of densities, a power of two, and the largest density.
 DENSITY_STEPS, MAX_DENSITY = 1024, 16.0
+DENSITIES = np.linspace(0, MAX_DENSITY, DENSITY_STEPS, dtype=np.float32)
+
+#: Least share of a layer in the table, so that the thresholds of layers without ink are defined.
+LEAST_SHARE = 0.003
+
+#: Least density that is a divisor.
+LEAST_DENSITY = np.float32(1e-6)
+
+#: Lines whose places differ by less than this from whole ones do not swap.
+MAX_ROUNDING = 1e-3
+
+#: Where two lines swap, the one that gets the later place joins its layer while its share of that place
+#: rises from 0.5 to this, and leaves the earlier layer while it rises from this to 1.
+LAYER_CHANGE = 0.75
 
 
 def sharp_look(look: Look) -> Look:
@@ -191,22 +204,19 @@ def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarra
     return np.float32(0.5) * (low + high)
 
 
-def cyclic_weights(first_weights: np.ndarray) -> list[np.ndarray]:
-    """Return the weights of `ordered_thresholds` for lines that follow each other in the order of M.
+def cyclic_places(first: np.ndarray) -> np.ndarray:
+    """Return the places of `ordered_thresholds` for lines that follow each other in the order of M.
 
     Parameters
     ----------
-    first_weights : (M, P) float32 ndarray
+    first : (M, P) float32 ndarray
         How much each line comes first; the sum is 1.
     """
-    weights = [first_weights]
-    for layer in range(1, min(len(first_weights), MAX_LAYERS)):
-        weights.append(weights[-1] + np.roll(first_weights, layer, axis=0))
-    return weights
+    return np.stack([np.roll(first, place, axis=0) for place in range(min(len(first), MAX_LAYERS))])
 
 
 def ordered_thresholds(
-    thresholds: np.ndarray, weights: Sequence[np.ndarray], undefined: np.ndarray, look: Look
+    thresholds: np.ndarray, places: np.ndarray, undefined: np.ndarray, look: Look
 ) -> np.ndarray:
     """Sort the thresholds of lines by their order.
 
@@ -214,45 +224,93 @@ def ordered_thresholds(
     ----------
     thresholds : (M, P) float32 ndarray
         From `line_thresholds`.
-    weights : sequence of min(M, MAX_LAYERS) (M, P) float32 ndarrays
-        For each place in the order, how much each line has this place or an earlier one.
+    places : (L, M, P) float32 ndarray
+        For each of the first L = min(M, MAX_LAYERS) places in the order, how much each line has it. The
+        sum over the lines is 1.
     undefined : (P,) bool ndarray
         Where there are no lines, and the thresholds of the first hold for all ink together.
     look : Look
-        Its `layers` and `layering` are used where the field is undefined.
+        Its `layers` and `layering` are used where lines swap and where the field is undefined.
 
     Returns
     -------
-    (min(M, MAX_LAYERS), P) float32 ndarray
-        Independent of each other, and evenly distributed from 0 to 1.
+    (L, P) float32 ndarray
+        0 to 1. With the shares of `layer_shares`, the ink of all layers transmits what the tone asks.
     """
-    count = len(thresholds)
-    layers = min(count, MAX_LAYERS)
-    if count == 1:
+    if len(thresholds) == 1:
         return thresholds
-    # What is left of the density of each line, and whether it has begun.
     density = -np.log1p(-np.minimum(thresholds, np.float32(1 - np.exp(-MAX_DENSITY))))
-    has_begun = np.zeros(density.shape, dtype=bool)
-    ordered = np.empty((layers, density.shape[1]), dtype=np.float32)
-    points = np.arange(density.shape[1])
-    for layer in range(layers):
-        share = np.where(has_begun, np.float32(0), weights[layer])
-        share /= np.maximum(share.sum(axis=0), np.float32(1e-6))
-        begin = np.full(density.shape, np.inf, dtype=np.float32)
-        np.divide(density, share, out=begin, where=share > 0)
-        begin[has_begun] = np.inf
-        next_line = begin.argmin(axis=0)
-        earliest = np.minimum(begin[next_line, points], np.float32(MAX_DENSITY))
-        ordered[layer] = -np.expm1(-earliest)
-        density -= share * earliest
-        np.maximum(density, 0, out=density)
-        has_begun[next_line, points] = True
-    if undefined.any():
-        ordered[0, undefined] = _first_of_all(
-            thresholds[0, undefined], min(look.layers, layers), look.layering
-        )
-        ordered[1:, undefined] = 1
-    return ordered
+    densest = np.float32(MAX_DENSITY)
+    ordered = (density / np.maximum(places, np.float32(1e-6))).min(axis=1)
+    drawn = min(look.layers, len(places))
+    table = _layer_densities(drawn, look.layering)
+    swap = np.flatnonzero((places[:drawn].max(axis=1) < 1 - MAX_ROUNDING).any(axis=0))
+    ordered[:drawn, swap] = _merged_densities(density[:, swap], places[:drawn, :, swap], table)
+    ordered[0, undefined] = _layer_density(table[0], density[0, undefined])
+    ordered[1:, undefined] = densest
+    return -np.expm1(-np.minimum(ordered, densest))
+
+
+def _layer_densities(layers: int, layering: float) -> np.ndarray:
+    """(layers, DENSITY_STEPS) float32 densities of the ink of each layer, for the total `DENSITIES`.
+
+    They rise everywhere, and linearly beyond the table.
+    """
+    shares = np.stack(layer_shares(-np.expm1(-DENSITIES), layers, layering))
+    return (DENSITIES * np.maximum(shares, LEAST_SHARE)).astype(np.float32)
+
+
+def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """Interpolate a row of `_layer_densities` at total densities."""
+    position = total / DENSITIES[1]
+    index = np.minimum(position, DENSITY_STEPS - 2).astype(np.intp)
+    return table[index] + (position - index) * (table[index + 1] - table[index])
+
+
+def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
+    """Densities of layers from which there is ink of lines that swap.
+
+    Parameters
+    ----------
+    density : (M, P) float32 ndarray
+    places : (L, M, P) float32 ndarray
+        As for `ordered_thresholds`, of the layers that are drawn.
+    table : (L, DENSITY_STEPS) float32 ndarray
+        From `_layer_densities`.
+
+    Returns
+    -------
+    (L, P) float32 ndarray
+    """
+
+    def line_density(index: np.ndarray) -> np.ndarray:
+        return np.einsum("klp,klp->lp", places, table[:, index])
+
+    # The density of the tone from which each line has ink.
+    index = np.zeros(density.shape, dtype=np.intp)
+    for exponent in reversed(range(int(np.log2(DENSITY_STEPS)))):
+        middle = index + 2**exponent
+        np.copyto(index, middle, where=line_density(middle) <= density)
+    index = np.minimum(index, DENSITY_STEPS - 2)
+    low, high = line_density(index), line_density(index + 1)
+    begin = DENSITIES[1] * (index + (density - low) / np.maximum(high - low, np.float32(1e-7)))
+    # How much each line has these places or later ones.
+    total = np.maximum(places.sum(axis=0), np.float32(1e-6))
+    onward = np.cumsum(places[::-1], axis=0)[::-1] / total
+    onward[0] = 1
+    merged = np.empty((len(places), density.shape[1]), dtype=np.float32)
+    for layer, layer_table in enumerate(table):
+        # A line joins a layer before it leaves the layer before, and leaves it only for tones in which
+        # that layer has ink, so that its own ink always is in one.
+        joining = (onward[layer] - 0.5) / (LAYER_CHANGE - 0.5)
+        delay = 1 / np.clip(joining, np.float32(1e-6), 1) - 1
+        if layer + 1 < len(table):
+            leaving = (onward[layer + 1] - LAYER_CHANGE) / (1 - LAYER_CHANGE)
+            next_share = _layer_density(table[layer + 1], begin) / np.maximum(begin, LEAST_DENSITY)
+            is_replaced = np.maximum(next_share - LEAST_SHARE, 0)
+            delay += is_replaced * (1 / np.clip(1 - leaving, np.float32(1e-6), 1) - 1)
+        merged[layer] = _layer_density(layer_table, (begin + delay).min(axis=0))
+    return merged
 
 
 def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.ndarray]:
@@ -270,15 +328,6 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
     total = np.add.reduce(weights)
     return [weight / total for weight in weights]
-
-
-def _first_of_all(threshold: np.ndarray, layers: int, layering: float) -> np.ndarray:
-    """Thresholds of the first line, with which it alone has the coverage of all lines together."""
-    density = np.linspace(0, MAX_DENSITY, DENSITY_STEPS)
-    first = density * layer_shares(-np.expm1(-density), layers, layering)[0]
-    first = np.maximum.accumulate(first)
-    total = -np.log1p(-np.minimum(threshold, 1 - np.exp(-MAX_DENSITY)))
-    return -np.expm1(-np.interp(total, density, first))
 
 
 def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) -> np.ndarray:
@@ -343,18 +392,16 @@ def picture_thresholds(
         As of `threshold_pixels`.
     """
     lines, even_lines = range(field.line_count), modulation.even_lines
-    places = np.stack([soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)])
+    rank = np.stack([soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)])
     crowding = None
     if even_lines is not None:
         # Crowded lines come last, as in `line_shares`.
         crowding = np.stack([even_lines.crowding(line, look) for line in lines])
-        places += field.line_count * crowding
-        places -= places.min(axis=0)
+        rank += field.line_count * crowding
+        rank -= rank.min(axis=0)
     layers = range(min(field.line_count, MAX_LAYERS))
-    weights = [np.clip(layer + 1 - places, 0, 1) for layer in layers]
-    # How much each line has each place.
-    share = np.diff(np.stack(weights), axis=0, prepend=np.float32(0))
-    share /= np.maximum(share.sum(axis=1, keepdims=True), np.float32(1e-6))
+    places = np.stack([np.clip(1 - np.abs(rank - layer), 0, 1) for layer in layers])
+    places /= np.maximum(places.sum(axis=1, keepdims=True), np.float32(1e-6))
     pixels = np.zeros((len(field.pixel), 4), dtype=np.float32)
     is_sampled = even_lines is not None or images.slopes is not None
     for (node, weight), level in zip(PIXEL_NODES, PIXEL_LEVELS, strict=True):
@@ -364,14 +411,14 @@ def picture_thresholds(
         if even_lines is not None:
             sample, period = _even_sample(even_lines, crowding > level, node)
             part = modulation._replace(even_lines=sample)
-            resolved = np.einsum("klp,lp->kp", share, resolved_share(period, samples_per_side))
+            resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
         else:
             part = modulation
         if part.break_images is not None:
             part = part._replace(break_images=_streak_sample(part.break_images, node))
         part_images = _streak_sample(images, node)
         thresholds = np.stack([line_thresholds(line, part_images, look, part) for line in lines])
-        ordered = ordered_thresholds(thresholds, weights, field.representation == 0, look)
+        ordered = ordered_thresholds(thresholds, places, field.representation == 0, look)
         if modulation.outline is not None:
             ordered *= 1 - modulation.outline
         pixels += np.float32(weight if is_sampled else 1) * threshold_pixels(ordered, resolved)
@@ -456,9 +503,10 @@ def ink_of_thresholds(
     filtered_edge = np.sqrt(EDGE_VARIANCE * spread)
     evenness = np.minimum(3 * spread, 1)
     correction = FILTER_CORRECTION * evenness * evenness * (1 - evenness)
-    color = None if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
+    color = colors[-1] if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
     bare = np.ones(len(tone), dtype=np.float32)
-    for layer in range(layers):
+    # The lines that come first are on top of the others.
+    for layer in reversed(range(layers)):
         coverage = 1 - np.maximum(left[layer], MIN_TRANSMITTANCE) ** shares[layer]
         room = np.minimum(coverage, 1 - coverage)
         inner = coverage * (1 - coverage)
@@ -471,7 +519,7 @@ def ink_of_thresholds(
         is_dark = coverage > 0.5
         covered = np.clip(covered, is_dark * missed, 1 - ~is_dark * missed)
         covered = is_dark + np.minimum(room / EXACT_ENDS, 1) * (covered - is_dark)
-        ink = colors[layer]
-        color = ink if color is None else color + covered[:, None] * (ink - color)
         bare *= 1 - covered
+        part = covered / np.maximum(1 - bare, np.float32(1e-6)) if look.clear_paper else covered
+        color = color + part[:, None] * (colors[layer] - color)
     return color.astype(np.float32), 1 - bare

@@ -198,8 +198,9 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
     correction = evenness * evenness * (1 - evenness) * FILTER_CORRECTION
     softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
     edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
-    bare, color, ink_color = None, source["Paper"], inks[0]
-    for layer, threshold in enumerate(channels):
+    bare, color, ink_color = None, source["Paper"], inks[-1]
+    # The lines that come first are on top of the others.
+    for layer, threshold in reversed(list(enumerate(channels))):
         share = begun[layer] / total
         coverage = 1 - left[layer].at_least(MIN_TRANSMITTANCE) ** share
         # Edges as wide as this leave the mean coverage of all thresholds unchanged.
@@ -217,9 +218,12 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
         end = (room * (1 / EXACT_ENDS)).at_most(1.0)
         covered = is_dark + end * (covered - is_dark)
         color = build.mix("RGBA", covered.socket, color, inks[layer])
-        if layer:
-            ink_color = build.mix("RGBA", covered.socket, ink_color, inks[layer])
-        bare = 1 - covered if bare is None else bare * (1 - covered)
+        if bare is None:
+            bare = 1 - covered
+        else:
+            bare = bare * (1 - covered)
+            part = covered / (1 - bare).at_least(1e-6)
+            ink_color = build.mix("RGBA", part.socket, ink_color, inks[layer])
     build.connect(color, sink["Color"])
     build.connect(ink_color, sink["Ink"])
     build.connect((1 - bare).socket, sink["Coverage"])

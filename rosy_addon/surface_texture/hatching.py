@@ -19,7 +19,7 @@ from ..compositor.even_lines import (
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_thresholds import (
-    cyclic_weights,
+    cyclic_places,
     ink_of_thresholds,
     line_thresholds,
     ordered_thresholds,
@@ -114,7 +114,7 @@ def thresholds_task(
         in_frame = np.stack([member[block] * frame for member in members])
         first = first_line_weights(order.first_at(triangle, weights), in_frame, order.degree)
         undefined = field.representation[block] == 0
-        ordered = ordered_thresholds(thresholds, cyclic_weights(first), undefined, look)
+        ordered = ordered_thresholds(thresholds, cyclic_places(first), undefined, look)
         resolved = 1.0
         if part.even_lines is not None:
             resolved = resolved_share(part.even_lines.period.min(axis=0))

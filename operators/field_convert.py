@@ -83,7 +83,7 @@ class _FieldOperator:
 
 
 class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
-    """Change the degree of the fields of the selected meshes, rotate or smooth them, or replace their magnitudes"""
+    """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
     bl_idname = "rosy.field_convert"
     bl_label = "Convert Field"
@@ -115,6 +115,17 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
     smooth: bpy.props.FloatProperty(
         name="Smooth",
         description="Smooth the field over this fraction of the size of the mesh",
+        min=0.0,
+        max=10.0,
+        soft_max=0.2,
+        precision=3,
+        step=1,
+        default=0.0,
+    )
+    pair_distance: bpy.props.FloatProperty(
+        name="Cancel Pairs",
+        description="Remove pairs of singularities with opposite indices that are nearer than this fraction of "
+        "the size of the mesh",
         min=0.0,
         max=10.0,
         soft_max=0.2,
@@ -158,7 +169,9 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
                 f"{surface.name}: '{self.values}' has negative values, which cannot be lengths"
             )
         magnitude = values if self.magnitude in ("keep", "values") else self.magnitude
-        conversion = Conversion(self.degree or None, self.angle, self.smooth, magnitude)
+        conversion = Conversion(
+            self.degree or None, self.angle, self.smooth, self.pair_distance, magnitude
+        )
         field = yield from convert_task(surface, field, conversion)
         return replace(field, source_directions=None)
 
@@ -169,7 +182,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in ("new_degree", "angle", "smooth", "magnitude"):
+        for name in ("new_degree", "angle", "smooth", "pair_distance", "magnitude"):
             layout.prop(self, name)
         if self.magnitude == "values":
             layout.prop(self, "values")

@@ -178,6 +178,30 @@ class Field:
         """
         return self._converted(Conversion(smoothing_length=reach))
 
+    def without_pairs(self, reach: float) -> Field:
+        """Return the field without pairs of singularities that are near to each other.
+
+        The two of a pair have opposite indices, and no other singularity changes. Far from the pairs, neither
+        do directions.
+
+        Parameters
+        ----------
+        reach : float
+            Largest distance of a pair along edges, as a fraction of the longest side of the mesh.
+
+        Raises
+        ------
+        RosyError
+            If the field is not a RoSy, or would turn too fast for the size of the faces.
+
+        Examples
+        --------
+        >>> import rosyfields as rf
+        >>> bunny = rf.Surface("bunny.obj")
+        >>> field = rf.curvature(bunny).without_pairs(0.05)
+        """
+        return self._converted(Conversion(pair_distance=reach))
+
     def with_magnitude(self, magnitude: str | ArrayLike) -> Field:
         """Return the field with other magnitudes.
 

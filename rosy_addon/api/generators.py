@@ -225,6 +225,7 @@ def prescribed(
     degree: int | None = None,
     *,
     vectors: ArrayLike | Field | None = None,
+    reach: float = 0.0,
 ) -> Field:
     """Make the smoothest field that has given singularities, and no other ones.
 
@@ -241,6 +242,9 @@ def prescribed(
     vectors : (F, 3) array_like or Field, optional
         Guides, zero where there is none. On each connected part, the field is turned as a whole to be near
         to them; by default, to the edges of the mesh.
+    reach : float
+        If it is above 0, the field also bends to the guides. Their influence falls off over this distance, a
+        fraction of the longest side of the mesh.
 
     Raises
     ------
@@ -271,6 +275,7 @@ def prescribed(
         "prescribed",
         singularities=(vertex, index),
         vectors=_guide_vectors(surface, vectors, degree),
+        smoothing_length=reach,
     )
     return _generated(surface, settings, degree)
 

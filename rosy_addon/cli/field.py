@@ -48,6 +48,14 @@ def add_field_command(subparsers: Any, extras: Extras) -> None:
         help="diffuse the field over this fraction of the size of the mesh",
     )
     parser.add_argument(
+        "--cancel-pairs",
+        type=float_between(0.0, 10.0),
+        default=0.0,
+        metavar="SHARE",
+        help="remove pairs of singularities with opposite indices that are nearer than this fraction of the size "
+        "of the mesh",
+    )
+    parser.add_argument(
         "--magnitude", choices=list(MAGNITUDES), help="replace the lengths of the vectors"
     )
 
@@ -62,6 +70,8 @@ def run_field(options: argparse.Namespace) -> None:
         field = field.rotated(np.radians(options.turn))
     if options.smooth:
         field = field.smoothed(options.smooth)
+    if options.cancel_pairs:
+        field = field.without_pairs(options.cancel_pairs)
     if options.magnitude is not None:
         field = field.with_magnitude(options.magnitude)
     field.save(options.output)

@@ -72,7 +72,8 @@ def add_mesh_options(
         default=0.0,
         metavar="SHARE",
         help="distance as a fraction of the size of the mesh: how far curvature extends into flat "
-        "parts, or how far guides are smoothed; at 0 the field meets the guides exactly",
+        "parts, how far guides are smoothed (at 0 the field meets them exactly), or how far a field with "
+        "prescribed singularities bends to guides",
     )
     parser.add_argument(
         "--sharp-angle",
@@ -216,6 +217,7 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
                 options.singularities,
                 options.degree,
                 vectors=_guides(options, surface, options.degree),
+                reach=options.reach,
             )
         case "axis":
             return api.along_axis(surface, options.axis, degree)

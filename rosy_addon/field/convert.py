@@ -1,4 +1,4 @@
-"""Convert a field: change its degree, rotate it, smooth it, or replace its magnitudes."""
+"""Convert a field: change its degree, rotate or smooth it, cancel singularities, or replace its magnitudes."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
 from .guided import conjugate_gradient_task
+from .prescribed import change_singularities_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
+from .singularities import singularities_task
+from .singularity_pairs import opposite_pairs_task
 from .smoothest import corner_frame_angles, node_sum_per_face
 from .sparse_multigrid import from_coo
 from .surface import Surface, connected_components
@@ -33,6 +36,9 @@ class Conversion:
         Counter-clockwise rotation about the normals, radians.
     smoothing_length : float
         Distance of the diffusion relative to `Surface.extent`; 0 for none.
+    pair_distance : float
+        Distance relative to `Surface.extent` up to which singularities with opposite indices are cancelled; 0
+        for none.
     magnitude : str, (F,) ndarray or None
         One of `generate.MAGNITUDES`, or values; None to keep the magnitudes.
     """
@@ -40,6 +46,7 @@ class Conversion:
     degree: int | None = None
     rotation: float = 0.0
     smoothing_length: float = 0.0
+    pair_distance: float = 0.0
     magnitude: str | np.ndarray | None = None
 
 
@@ -62,7 +69,7 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
     Raises
     ------
     RosyError
-        If a step is not possible; see `change_degree` and `diffuse_task`.
+        If a step is not possible; see `change_degree`, `diffuse_task` and `cancel_pairs_task`.
     """
     yield Progress(0.0, "converting the field")
     if conversion.degree is not None:
@@ -73,6 +80,10 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
     if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
         time = (conversion.smoothing_length * surface.extent) ** 2
         field = yield from diffuse_task(surface, field, max(time, np.finfo(np.float64).tiny))
+    if conversion.pair_distance > 0:
+        field = yield from cancel_pairs_task(
+            surface, field, conversion.pair_distance * surface.extent
+        )
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
         magnitude = yield from magnitude_task(surface, magnitude)
@@ -255,6 +266,43 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
     """
     magnitude = np.broadcast_to(magnitude, (len(field.vectors),))[:, None]
     return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)
+
+
+def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -> Task[RosyField]:
+    """Remove pairs of singularities with opposite indices.
+
+    Far from them, the field turns by an angle that falls with the distance. All other singularities stay.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : RosyField
+        A RoSy.
+    max_distance : float
+        Largest length of a path along edges between the two of a pair, in object space.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
+        The field itself if it has no such pairs.
+
+    Raises
+    ------
+    RosyError
+        If the directions are not a RoSy.
+    """
+    _check_rosy(surface, field)
+    vertex, index = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
+    task = opposite_pairs_task(surface, vertex, index, max_distance)
+    pairs = (yield from subtask(task, 0.2, 0.4)).ravel()
+    if not len(pairs):
+        return field
+    task = change_singularities_task(surface, field, vertex[pairs], -index[pairs], max_distance)
+    return (yield from subtask(task, 0.4, 1.0))
 
 
 def _check_rosy(surface: Surface, field: RosyField) -> None:

@@ -52,6 +52,9 @@ MIN_PROJECTION = 1e-12
 #: Bytes of memory that a triangle takes at the peak, by kind. The other kinds take little.
 BYTES_PER_TRIANGLE = dict(form=1200, smoothest=640, features=1000, guided=950, prescribed=900)
 
+#: For "prescribed", bytes that a triangle takes if the field bends to guides.
+BENT_BYTES_PER_TRIANGLE = 1600
+
 #: For "curvature", bytes that a face takes, and bytes that a triangle takes with a reach.
 CURVATURE_BYTES_PER_FACE, REACH_BYTES_PER_TRIANGLE = 710, 950
 
@@ -69,7 +72,8 @@ class GeneratorSettings:
     smoothing_length : float
         Relative to `Surface.extent`. For "curvature": the distance over which directions of high
         confidence spread to regions of low confidence; 0 for none. For "guided": the distance over
-        which guides are smoothed; at 0 they are followed exactly.
+        which guides are smoothed; at 0 they are followed exactly. For "prescribed": the distance over which
+        the field bends to guides; at 0 they only turn the whole field.
     sharp_angle : float
         For "features": the smallest angle between face normals at a sharp edge, in radians.
     edges : (E, 2) int ndarray or None
@@ -167,7 +171,8 @@ def generate_task(
             raise RosyError(
                 f"{surface.name}: no singularities are given: give their vertices and indices"
             )
-        task = prescribed_task(surface, degree, *settings.singularities, settings.vectors)
+        reach = settings.smoothing_length * surface.extent
+        task = prescribed_task(surface, degree, *settings.singularities, settings.vectors, reach)
         return (yield from task)
     if settings.kind == "uv":
         if settings.uv is None:
@@ -180,6 +185,8 @@ def generate_task(
 def _peak_memory(surface: Surface, settings: GeneratorSettings) -> int:
     """Estimate the bytes that `generate_task` takes at its peak."""
     triangle_count = len(surface.triangles)
+    if settings.kind == "prescribed" and settings.vectors is not None and settings.smoothing_length:
+        return BENT_BYTES_PER_TRIANGLE * triangle_count
     if settings.kind != "curvature":
         return BYTES_PER_TRIANGLE.get(settings.kind, 0) * triangle_count
     reach_bytes = REACH_BYTES_PER_TRIANGLE * triangle_count if settings.smoothing_length else 0

@@ -90,7 +90,7 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
     """Draw the settings and the button of the conversion, and the menu of storage formats."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
     column = layout.column()
-    for name in ("new_degree", "angle", "smooth", "magnitude"):
+    for name in ("new_degree", "angle", "smooth", "pair_distance", "magnitude"):
         column.prop(settings, name)
     if settings.magnitude == "values":
         column.prop(settings, "values")

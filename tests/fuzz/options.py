@@ -141,6 +141,7 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "rate": _number(0.1, 1000, (24.0, 1.0)),
     "turn": _number(-360, 360, (0.0, 22.5)),
     "smooth": _number(0, 10, (0.0, 0.02, 0.2)),
+    "cancel_pairs": _number(0, 10, (0.0, 0.02, 0.2)),
     "spacing": _number(0.5, 512, (4.0, 9.0, 14.0)),
     "distance": _number(1e-6, 1e6, (0.1, 0.3)),
     "layering": _number(0, 1, (0.3,)),

@@ -33,6 +33,27 @@ def from_triangles(vertices: ArrayLike, triangles: ArrayLike, **settings) -> Sur
     )
 
 
+def globe(rows: int = 24, columns: int = 48) -> Surface:
+    """A sphere of meridians and parallels; its poles are the first and the last vertex."""
+    polar = np.linspace(0, np.pi, rows + 1)[1:-1, None]
+    azimuth = np.arange(columns) * 2 * np.pi / columns
+    rings = np.stack(
+        np.broadcast_arrays(
+            np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
+        ),
+        axis=-1,
+    ).reshape(-1, 3)
+    vertices = np.concatenate([[[0, 0, 1]], rings, [[0, 0, -1]]])
+    number = 1 + np.arange((rows - 1) * columns).reshape(rows - 1, columns)
+    following = np.roll(number, -1, axis=1)
+    caps = [(0, a, b) for a, b in zip(number[0], following[0], strict=True)]
+    caps += [(len(vertices) - 1, b, a) for a, b in zip(number[-1], following[-1], strict=True)]
+    quads = np.stack([number[:-1], number[1:], following[1:], following[:-1]], axis=-1)
+    faces = [*caps, *quads.reshape(-1, 4).tolist()]
+    start = np.cumsum([0, *map(len, faces)])
+    return build_surface(vertices, np.array([v for face in faces for v in face]), start)
+
+
 def torus(columns: int = 96, rows: int = 48, major: float = 1.0, minor: float = 0.4) -> Surface:
     """A torus about z; quads, the first edge of each along the large circle."""
     quads, count = grid_of_quads(columns, rows, True, True)

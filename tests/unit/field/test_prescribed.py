@@ -6,37 +6,17 @@ import itertools
 
 import numpy as np
 import pytest
-from shapes import cylinder, from_quads, icosphere, torus
+from shapes import cylinder, from_quads, globe, icosphere, torus
 
 from rosy_addon.errors import RosyError
-from rosy_addon.field import prescribed
+from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.analysis import dirichlet_energy
-from rosy_addon.field.prescribed import face_graph_task, prescribed_field, spanning_forest_task
+from rosy_addon.field.face_graph import face_graph_task, spanning_forest_task
+from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
-from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.surface import Surface
 from rosy_addon.progress import run_to_completion
-
-
-def globe(rows: int = 24, columns: int = 48) -> Surface:
-    """A sphere of meridians and parallels; its poles are the first and the last vertex."""
-    polar = np.linspace(0, np.pi, rows + 1)[1:-1, None]
-    azimuth = np.arange(columns) * 2 * np.pi / columns
-    rings = np.stack(
-        np.broadcast_arrays(
-            np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
-    vertices = np.concatenate([[[0, 0, 1]], rings, [[0, 0, -1]]])
-    number = 1 + np.arange((rows - 1) * columns).reshape(rows - 1, columns)
-    following = np.roll(number, -1, axis=1)
-    caps = [(0, a, b) for a, b in zip(number[0], following[0], strict=True)]
-    caps += [(len(vertices) - 1, b, a) for a, b in zip(number[-1], following[-1], strict=True)]
-    quads = np.stack([number[:-1], number[1:], following[1:], following[:-1]], axis=-1)
-    faces = [*caps, *quads.reshape(-1, 4).tolist()]
-    start = np.cumsum([0, *map(len, faces)])
-    return build_surface(vertices, np.array([v for face in faces for v in face]), start)
 
 
 def block(holes: int, missing: int = 0) -> Surface:
@@ -169,7 +149,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     turn = 2 * np.pi / degree
     required = turn * node_index - graph.defect
     task = spanning_forest_task(len(graph.component), graph.source, graph.target)
-    loops = run_to_completion(prescribed._loops_task(graph, run_to_completion(task)))
+    loops = run_to_completion(turning_angles._loops_task(graph, run_to_completion(task)))
     rows = np.zeros((len(loops), len(edge)))
     for row, (crossed, signs) in zip(rows, loops, strict=True):
         row[crossed] = signs
@@ -182,7 +162,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
         loop_sums = turn * (nearest + change) - rows @ graph.unfolding
         solution = least_squares(system, np.r_[required[graph.is_interior], loop_sums])
         energies.append(solution @ solution)
-    angle, _ = run_to_completion(prescribed._turning_angles_task(graph, degree, required))
+    angle, _ = run_to_completion(turning_angles.turning_angles_task(graph, degree, required))
     energy = (angle**2 / graph.conductance).sum()
     assert energy == pytest.approx(min(energies), rel=1e-6, abs=1e-9)
     # The field turns by these angles at all edges, also at those that close the loops.

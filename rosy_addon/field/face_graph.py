@@ -1,0 +1,216 @@
+"""The faces of a surface as a graph, and spanning forests of graphs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..progress import Progress, Task, subtask
+from .analysis import edge_lengths
+from .representation import edge_unfolding
+from .singularities import signed_corner_angles_task
+from .surface import Surface, connected_components, edges_task, next_corners
+
+#: Smallest and largest conductance of an edge, relative to the median.
+MAX_CONDUCTANCE_RATIO = 1e4
+
+#: Label of all steps.
+LABEL = "placing the singularities"
+
+
+@dataclass(frozen=True, eq=False)
+class FaceGraph:
+    """The faces of a surface as nodes of a graph, with an edge where a field continues.
+
+    A *vertex node* is a vertex with those of its corners that are connected by such edges.
+
+    Attributes
+    ----------
+    source, target : (I,) int32 ndarray
+        The two faces at each edge.
+    unfolding : (I,) float64 ndarray
+        Angle in radians that is added to a direction in the frame of the source, if it is transported to
+        that of the target.
+    tail, head : (I,) int32 ndarray
+        The vertex nodes at the start and at the end of the edge, as the source runs along it.
+    conductance : (I,) float64 ndarray
+        Distance of the centers of both faces over the length of the edge.
+    corner_node : (C,) int32 ndarray
+        Vertex node of each corner.
+    is_interior : (n,) bool ndarray
+        Whether edges surround the vertex node.
+    defect : (n,) float64 ndarray
+        2 pi minus the angles of its corners.
+    component : (F,) int32 ndarray
+        Connected component of each face.
+    node_component : (n,) int32 ndarray
+        That of the faces of each vertex node.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    unfolding: np.ndarray
+    tail: np.ndarray
+    head: np.ndarray
+    conductance: np.ndarray
+    corner_node: np.ndarray
+    is_interior: np.ndarray
+    defect: np.ndarray
+    component: np.ndarray
+    node_component: np.ndarray
+
+    @property
+    def node_count(self) -> int:
+        """n, the number of vertex nodes."""
+        return len(self.is_interior)
+
+    def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
+        """Return (n,) float64: how much (I,) angles at the edges add up to, counter-clockwise."""
+        count = self.node_count
+        return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
+
+
+def face_graph_task(
+    surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None
+) -> Task[FaceGraph]:
+    """Build the graph of the faces of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    x, y : (F, 3) ndarray
+        The frames of the faces.
+    is_defined : (F,) bool ndarray, optional
+        Where there is a field. By default on all faces with an area.
+    """
+    edges = yield from subtask(edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.3)
+    yield Progress(0.3, LABEL)
+    if is_defined is None:
+        is_defined = x.any(axis=1)
+    halfedges = edges.halfedges
+    halfedges = halfedges[is_defined[surface.corner_face[halfedges]].all(axis=1)]
+    a, b = halfedges.T
+    following = next_corners(surface.face_start)
+    source, target = surface.corner_face[a], surface.corner_face[b]
+    unfolding = edge_unfolding(surface, x, y, a, b)
+    yield Progress(0.5, LABEL)
+    length, distance = edge_lengths(surface, a, b)
+    conductance = distance / np.maximum(length, 1e-300)
+    median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
+    np.clip(
+        conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
+    )
+    yield Progress(0.6, LABEL)
+    corner_count = len(surface.corner_vertex)
+    pairs = np.concatenate(
+        [np.stack([a, following[b]], axis=1), np.stack([following[a], b], axis=1)]
+    )
+    corner_node = connected_components(corner_count, pairs)
+    continues = np.zeros(corner_count, dtype=bool)
+    continues[halfedges.ravel()] = True
+    is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
+    is_interior[corner_node[~continues]] = False
+    is_interior[corner_node[following[~continues]]] = False
+    yield Progress(0.8, LABEL)
+    corner_angle = yield from subtask(signed_corner_angles_task(surface, x, y), 0.8, 0.9)
+    yield Progress(0.9, LABEL)
+    component = connected_components(surface.face_count, np.stack([source, target], axis=1))
+    node_component = np.zeros(len(is_interior), dtype=component.dtype)
+    node_component[corner_node] = component[surface.corner_face]
+    return FaceGraph(
+        source=source,
+        target=target,
+        unfolding=np.angle(unfolding),
+        tail=corner_node[a],
+        head=corner_node[b],
+        conductance=conductance,
+        corner_node=corner_node,
+        is_interior=is_interior,
+        defect=2 * np.pi - np.bincount(corner_node, corner_angle, len(is_interior)),
+        component=component,
+        node_component=node_component,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SpanningForest:
+    """A spanning tree of each component of a graph.
+
+    Attributes
+    ----------
+    parent : (n,) intp ndarray
+        The node above each node; the node itself at a root.
+    parent_edge : (n,) intp ndarray
+        The edge from there; -1 at a root.
+    parent_sign : (n,) float64 ndarray
+        1 if that edge leads from the parent to the node, -1 if from the node; 0 at a root.
+    has_edge : (m,) bool ndarray
+        Whether each edge of the graph is in the forest.
+    """
+
+    parent: np.ndarray
+    parent_edge: np.ndarray
+    parent_sign: np.ndarray
+    has_edge: np.ndarray
+
+    def sums_from_root(self, value: np.ndarray) -> np.ndarray:
+        """Return (n,) float64: the sums of (m,) values along the edges from the root to each node."""
+        total = self.parent_sign * value[self.parent_edge] if len(value) else self.parent_sign * 0
+        pointer = self.parent
+        while True:
+            following = pointer[pointer]
+            if np.array_equal(following, pointer):
+                return total
+            # Roots have the sum 0.
+            total, pointer = total + total[pointer], following
+
+    def path_to_root(self, node: int) -> np.ndarray:
+        """Return the nodes from a node up to the one below its root."""
+        path = []
+        while self.parent_edge[node] >= 0:
+            path.append(node)
+            node = int(self.parent[node])
+        return np.array(path, dtype=np.intp)
+
+
+def spanning_forest_task(
+    node_count: int, first: np.ndarray, second: np.ndarray
+) -> Task[SpanningForest]:
+    """Find spanning trees, breadth first.
+
+    Parameters
+    ----------
+    node_count : int
+    first, second : (m,) int ndarray
+        The nodes that each edge connects.
+    """
+    ends, others = np.concatenate([first, second]), np.concatenate([second, first])
+    order = np.argsort(ends, kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=node_count))])
+    neighbor, edge = others[order], order % max(len(first), 1)
+    sign = np.where(order < len(first), 1.0, -1.0)
+    component = connected_components(node_count, np.stack([first, second], axis=1))
+    roots = np.unique(component, return_index=True)[1]
+    parent, parent_edge = np.arange(node_count), np.full(node_count, -1)
+    parent_sign = np.zeros(node_count)
+    is_reached = np.zeros(node_count, dtype=bool)
+    is_reached[roots] = True
+    front, done = roots, 0
+    while len(front):
+        done += len(front)
+        yield Progress(done / node_count, LABEL)
+        counts = start[front + 1] - start[front]
+        entry = np.arange(counts.sum()) + np.repeat(
+            start[front] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
+        )
+        entry = entry[~is_reached[neighbor[entry]]]
+        source = edge[entry]
+        front, kept = np.unique(neighbor[entry], return_index=True)
+        entry, source = entry[kept], source[kept]
+        is_reached[front] = True
+        parent_edge[front], parent_sign[front] = source, sign[entry]
+        parent[front] = np.where(sign[entry] > 0, first[source], second[source])
+    has_edge = np.zeros(len(first), dtype=bool)
+    has_edge[parent_edge[parent_edge >= 0]] = True
+    return SpanningForest(parent, parent_edge, parent_sign, has_edge)

@@ -1,0 +1,152 @@
+"""Turn a field to guides without changing its singularities.
+
+The singularities of a field stay if it is turned by an angle that is continuous over the surface. The
+Dirichlet energy of a field whose angles are of least squares grows by that of this angle alone
+(`turning_angles`). So the angle that follows guides solves a linear equation, once it is known by which
+multiple of 2 pi / N it follows each of them. A linear equation for the representation, which may have other
+singularities, tells these multiples; they are improved until they are the nearest ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..progress import Progress, Task, subtask
+from .face_graph import FaceGraph
+from .guided import conjugate_gradient_task
+from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task
+from .turning_angles import ANGLE_MARGIN, MAX_ATTEMPTS, MIN_ROOM
+
+#: Residual norm relative to that of the right-hand side at which the solver stops.
+TOLERANCE = 1e-8
+
+#: Number of times that the multiples of the guides are improved.
+MAX_ROUNDS = 12
+
+#: Penalty of the nodes without a guide, relative to the stiffness of their edges, so that all angles are
+#: defined.
+REGULARIZATION = 1e-9
+
+#: Label of all steps.
+LABEL = "turning the field to the guides"
+
+
+def guided_rotation_task(
+    graph: FaceGraph,
+    degree: int,
+    turning: np.ndarray,
+    z: np.ndarray,
+    target: np.ndarray,
+    penalty: np.ndarray,
+) -> Task[np.ndarray]:
+    """Compute the angle by which a field turns to follow guides.
+
+    Parameters
+    ----------
+    graph : FaceGraph
+    degree : int
+        N.
+    turning : (I,) ndarray
+        Angles by which the field turns at the edges; see `turning_angles`.
+    z : (F,) complex ndarray
+        Representation of the field, of modulus 1 or 0.
+    target : (F,) complex ndarray
+        Representation of the guides, 0 where there is none.
+    penalty : (F,) ndarray
+        Weight of the squared difference from the guide, relative to that of squared angles at edges whose
+        conductance is 1.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (F,) float64 ndarray
+        In radians. No edge turns by half the angle between two members because of it, unless the guides
+        leave no other way.
+    """
+    offset = target * z.conj()
+    is_guide = (offset != 0) & (penalty > 0)
+    if not is_guide.any():
+        return np.zeros(len(z))
+    penalty = np.where(is_guide, penalty, 0.0)
+    stiffness = 1 / graph.conductance
+    wanted = np.angle(offset) / degree
+    sector, limit = 2 * np.pi / degree, np.pi / degree
+    source, used = graph.source, graph.target
+    angle = None
+    for attempt in range(MAX_ATTEMPTS):
+        start, stop = 1 - 0.5**attempt, 1 - 0.5 ** (attempt + 1)
+        matrix = yield from subtask(_system_task(graph, stiffness, penalty), start, start, LABEL)
+        levels = yield from subtask(hierarchy_task(matrix), start, 0.5 * (start + stop))
+        if angle is None:
+            angle = yield from _initial_angle_task(
+                graph, stiffness, matrix, levels, offset, penalty
+            )
+            angle /= degree
+        for _ in range(MAX_ROUNDS):
+            yield Progress(0.5 * (start + stop), LABEL)
+            multiple = np.rint((angle - wanted) / sector)
+            rhs = penalty * (wanted + sector * multiple)
+            solution = yield from _solve_task(matrix, rhs, levels)
+            angle = solution.real
+            if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
+                break
+        added = angle[used] - angle[source]
+        if np.abs(turning + added).max(initial=0.0) < limit:
+            break
+        room = np.maximum(limit - np.sign(added) * turning, MIN_ROOM * limit)
+        stiffness = stiffness * np.maximum(np.abs(added) / (ANGLE_MARGIN * room), 1) ** 2
+    return angle
+
+
+def _system_task(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> Task[CSRMatrix]:
+    """The Laplacian of the faces, with the penalty on its diagonal."""
+    count = len(penalty)
+    source, target = graph.source.astype(np.intp), graph.target.astype(np.intp)
+    diagonal = np.bincount(np.concatenate([source, target]), np.tile(stiffness, 2), count)
+    diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
+    faces = np.arange(count)
+    return (
+        yield from from_coo_task(
+            np.concatenate([source, target, faces]),
+            np.concatenate([target, source, faces]),
+            np.concatenate([-stiffness, -stiffness, diagonal]).astype(np.complex128),
+            count,
+            count,
+        )
+    )
+
+
+def _initial_angle_task(
+    graph: FaceGraph,
+    stiffness: np.ndarray,
+    matrix: CSRMatrix,
+    levels: list[Level],
+    offset: np.ndarray,
+    penalty: np.ndarray,
+) -> Task[np.ndarray]:
+    """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
+    modulus = np.abs(offset)
+    unit = np.divide(offset, modulus, out=np.zeros_like(offset), where=modulus > 0)
+    mean = yield from _solve_task(matrix, penalty * unit, levels)
+    difference = np.angle(mean[graph.target] * mean[graph.source].conj())
+    count = len(offset)
+    divergence = np.bincount(graph.target, stiffness * difference, count)
+    divergence -= np.bincount(graph.source, stiffness * difference, count)
+    laplacian = yield from _system_task(graph, stiffness, np.zeros(count))
+    angle = (yield from _solve_task(laplacian, divergence, None)).real
+    parts = int(graph.component.max(initial=-1)) + 1
+    rest = penalty * unit * np.exp(-1j * angle)
+    real, imaginary = (np.bincount(graph.component, part, parts) for part in (rest.real, rest.imag))
+    return angle + np.arctan2(imaginary, real)[graph.component]
+
+
+def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> Task[np.ndarray]:
+    """Solve a system; see `conjugate_gradient_task`."""
+    return (
+        yield from conjugate_gradient_task(
+            matrix, rhs.astype(np.complex128), TOLERANCE, levels, LABEL
+        )
+    )

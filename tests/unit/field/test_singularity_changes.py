@@ -1,0 +1,175 @@
+"""Change singularities near them: cancel pairs, and bend fields to guides with the same singularities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cylinder, globe, icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.convert import Conversion, convert
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.prescribed import change_singularities, prescribed_field
+from rosy_addon.field.representation import face_frames, face_representation
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.singularity_pairs import opposite_pairs_task
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+
+#: Many faces meet at its poles, so that they can have large indices.
+BALL = globe(32, 64)
+
+
+def turned_by(surface, field, other):
+    """(F,) angles in degrees between the nearest members of two fields."""
+    relative = face_representation(surface, field) * face_representation(surface, other).conj()
+    return np.degrees(np.abs(np.angle(relative))) / field.degree
+
+
+def nearest_vertex(point):
+    point = np.array(point) / np.linalg.norm(point)
+    return int(np.linalg.norm(BALL.vertices - point, axis=1).argmin())
+
+
+def pole_field(degree, pairs):
+    """A field on the ball with singularities at two poles, and with further pairs."""
+    poles = [0, len(BALL.vertices) - 1]
+    vertex = [*poles, *(nearest_vertex(point) for pair in pairs for point in pair)]
+    index = [degree, degree, *([1, -1] * len(pairs))]
+    return prescribed_field(BALL, degree, vertex, index), poles
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_near_pairs_are_cancelled_and_nothing_else(degree):
+    pairs = [((1, 0, 0), (1, 0.2, 0)), ((0, 1, 0.3), (0, 1, -0.3)), ((0, -1, 0), (-1, 0, 0))]
+    field, poles = pole_field(degree, pairs)
+    assert len(find_singularities(BALL, field)[0]) == 8
+    for reach, left in ((0.05, 8), (0.15, 6), (0.4, 4), (1.0, 2)):
+        clean = convert(BALL, field, Conversion(pair_distance=reach))
+        vertex, _ = find_singularities(BALL, clean)
+        assert len(vertex) == left
+        assert set(poles) <= set(vertex)
+    vertex, index = find_singularities(BALL, clean)
+    assert vertex.tolist() == poles and index.tolist() == [degree, degree]
+
+
+def test_far_from_a_pair_nothing_turns():
+    field, _ = pole_field(4, [((1, 0, 0), (1, 0.2, 0))])
+    clean = convert(BALL, field, Conversion(pair_distance=0.15))
+    turned = turned_by(BALL, field, clean)
+    distance = np.linalg.norm(BALL.face_center - (1, 0.1, 0), axis=1)
+    assert turned[distance > 1].max() < 0.5
+    assert turned[distance < 0.1].max() > 20
+    assert convert(BALL, field, Conversion(pair_distance=0.01)) is field
+
+
+def test_magnitudes_and_undefined_faces_stay():
+    field, _ = pole_field(2, [((1, 0, 0), (1, 0.2, 0))])
+    vectors = field.vectors * np.linspace(1, 3, BALL.face_count)[:, None]
+    vectors[BALL.face_center[:, 2] < -0.5] = 0
+    clean = convert(BALL, RosyField(2, vectors), Conversion(pair_distance=0.15))
+    np.testing.assert_allclose(clean.magnitude, np.linalg.norm(vectors, axis=1), atol=1e-12)
+    assert len(find_singularities(BALL, clean)[0]) == 1  # the other pole is undefined
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_curvature_is_cleaned(degree):
+    """All remaining singularities were there, and their indices have the same sum."""
+    surface = icosphere(4)
+    random = np.random.default_rng(degree)
+    rough = surface.vertices * (1, 1.3, 0.7) + 0.01 * random.standard_normal(
+        (len(surface.vertices), 3)
+    )
+    surface = build_surface(rough, surface.corner_vertex, surface.face_start)
+    field = generate(surface, GeneratorSettings("curvature"), degree)
+    vertex, index = find_singularities(surface, field)
+    clean = convert(surface, field, Conversion(pair_distance=0.1))
+    left = dict(zip(*map(np.ndarray.tolist, find_singularities(surface, clean)), strict=True))
+    assert left.items() <= dict(zip(vertex.tolist(), index.tolist(), strict=True)).items()
+    assert len(left) < 0.5 * len(vertex)
+    assert sum(left.values()) == index.sum() == 2 * degree
+
+
+def test_a_singularity_moves_around_a_handle():
+    """Its way closes, so the field turns by no more than before around the handle."""
+    surface = torus(32, 16)
+    field = prescribed_field(surface, 4, [40, 200], [1, -1])
+    moved = change_singularities(surface, field, [40, 300], [-1, 1], 0.5)
+    assert find_singularities(surface, moved)[0].tolist() == [200, 300]
+    back = change_singularities(surface, moved, [40, 300], [1, -1], 0.5)
+    assert find_singularities(surface, back)[0].tolist() == [40, 200]
+
+
+def test_changes_that_a_closed_surface_cannot_have_are_refused():
+    field, poles = pole_field(4, [])
+    with pytest.raises(RosyError, match="add up to 1/4, but this closed surface needs 0/4"):
+        change_singularities(BALL, field, [poles[0]], [1], 0.5)
+    open_surface = cylinder(24, 12)
+    field = prescribed_field(open_surface, 4, [], [])
+    changed = change_singularities(open_surface, field, [150], [1], 0.5)
+    assert find_singularities(open_surface, changed)[0].tolist() == [150]
+
+
+def test_pairs_are_the_nearest_along_edges():
+    """On a grid, the length of a path is the sum of its steps."""
+    surface = plane(20, 20)
+    x, y = np.rint((surface.vertices[:, :2] - surface.vertices[:, :2].min(axis=0)).T * 1e6) / 1e6
+    step = np.unique(x)[1]
+    column, row = np.rint(x / step).astype(int), np.rint(y / step).astype(int)
+    place = {(c, r): v for v, (c, r) in enumerate(zip(column.tolist(), row.tolist(), strict=True))}
+    points = [(2, 2), (2, 5), (4, 5), (10, 10), (15, 12), (15, 15)]
+    vertex = np.array([place[point] for point in points])
+    index = np.array([1, -1, 1, 1, -1, 1])
+
+    def pairs(steps):
+        task = opposite_pairs_task(surface, vertex, index, (steps + 0.01) * step)
+        return {tuple(pair) for pair in run_to_completion(task).tolist()}
+
+    assert pairs(1.9) == set()
+    assert pairs(2) == {(1, 2)}
+    assert pairs(3) == {(1, 2), (4, 5)}
+    assert pairs(30) == {(1, 2), (4, 5)}
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_guides_bend_a_field_with_the_same_singularities(degree):
+    """Near the guides the field follows them, and no singularity comes or goes."""
+    last = pole_field(degree, [])[1]
+    guides = np.zeros((BALL.face_count, 3))
+    for center, direction in (
+        ((1, 0, 0), (0, 1, 1)),
+        ((-1, 0.3, 0), (0, 1, 0.2)),
+        ((0, 1, 0), (1, 0, 0)),
+    ):
+        near = (
+            np.linalg.norm(BALL.face_center - np.array(center) / np.linalg.norm(center), axis=1)
+            < 0.15
+        )
+        guides[near] = direction
+    whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
+    bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)
+    vertex, index = find_singularities(BALL, bent)
+    assert vertex.tolist() == last and index.tolist() == [degree, degree]
+    normal = BALL.face_normal
+    tangential = guides - (guides * normal).sum(axis=1, keepdims=True) * normal
+    is_guided = guides.any(axis=1)
+    error = turned_by(BALL, RosyField(degree, tangential), bent)[is_guided]
+    assert np.median(error) < 3 and error.max() < 10
+    assert turned_by(BALL, RosyField(degree, tangential), whole)[is_guided].max() > 15
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+def test_a_field_bends_by_several_members(degree):
+    """From one end of a tube to the other, guides turn by a whole turn."""
+    surface = cylinder(48, 48)
+    height = surface.face_center[:, 2]
+    angle = 2 * np.pi * (height - height.min()) / np.ptp(height)
+    x, y = face_frames(surface)
+    along = np.array([0.0, 0.0, 1.0]) - surface.face_normal * surface.face_normal[:, 2:]
+    start = np.arctan2((along * y).sum(axis=1), (along * x).sum(axis=1))
+    guides = np.cos(start + angle)[:, None] * x + np.sin(start + angle)[:, None] * y
+    field = prescribed_field(surface, degree, [], [], guides, 0.05 * np.ptp(height))
+    assert not len(find_singularities(surface, field)[0])
+    inner = np.abs(height - height.mean()) < 0.3 * np.ptp(height)
+    assert turned_by(surface, field, RosyField(degree, guides))[inner].max() < 1

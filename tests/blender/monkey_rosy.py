@@ -82,6 +82,7 @@ def convert_field(monkey):
         degree=monkey.pick([0, 0, 1, 2, 4, 8, 12]),
         angle=monkey.pick([0.0, 0.3, -6.0]),
         smooth=monkey.pick([0.0, 0.05, 10.0]),
+        pair_distance=monkey.pick([0.0, 0.0, 0.1, 10.0]),
         magnitude=monkey.pick(kinds),
         values=monkey.pick(["", "Weights", "rosy", "Occlusion", monkey.name()]),
     )

@@ -360,6 +360,18 @@ def test_convert(suzanne):
     assert len(before) == len(length)
 
 
+def test_pairs_of_singularities_are_cancelled(suzanne):
+    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import read_singularities
+
+    def count():
+        return len(read_singularities(suzanne, bpy.context.evaluated_depsgraph_get()))
+
+    bpy.ops.rosy.field_generate(kind="curvature", degree=4)
+    before = count()
+    assert bpy.ops.rosy.field_convert(pair_distance=0.1) == {"FINISHED"}
+    assert 0 < count() < 0.8 * before
+
+
 def test_errors_of_convert(suzanne):
     bpy.ops.rosy.field_generate(kind="axis", degree=4)
     before = contents()

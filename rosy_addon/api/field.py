@@ -182,7 +182,7 @@ class Field:
         """Return the field without pairs of singularities that are near to each other.
 
         The two of a pair have opposite indices, and no other singularity changes. Far from the pairs, neither
-        do directions.
+        do directions. Pairs stay where the field would otherwise turn too fast for the size of the faces.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class Field:
         Raises
         ------
         RosyError
-            If the field is not a RoSy, or would turn too fast for the size of the faces.
+            If the field is not a RoSy.
 
         Examples
         --------

@@ -14,7 +14,7 @@ from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
 from .guided import conjugate_gradient_task
-from .prescribed import change_singularities_task
+from .prescribed import TurningError, change_singularities_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .singularities import singularities_task
@@ -271,7 +271,8 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
 def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -> Task[RosyField]:
     """Remove pairs of singularities with opposite indices.
 
-    Far from them, the field turns by an angle that falls with the distance. All other singularities stay.
+    Far from them, the field turns by an angle that falls with the distance. All other singularities stay, and
+    so do pairs without which the field would turn too fast for the size of the faces.
 
     Parameters
     ----------
@@ -298,11 +299,34 @@ def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -
     _check_rosy(surface, field)
     vertex, index = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
     task = opposite_pairs_task(surface, vertex, index, max_distance)
-    pairs = (yield from subtask(task, 0.2, 0.4)).ravel()
-    if not len(pairs):
-        return field
-    task = change_singularities_task(surface, field, vertex[pairs], -index[pairs], max_distance)
-    return (yield from subtask(task, 0.4, 1.0))
+    pairs = yield from subtask(task, 0.2, 0.4)
+    start = 0.4
+    while len(pairs):
+        chosen = pairs.ravel()
+        task = change_singularities_task(
+            surface, field, vertex[chosen], -index[chosen], max_distance
+        )
+        try:
+            return (yield from subtask(task, start, 1.0))
+        except TurningError as error:
+            pairs = pairs[~_are_near(surface, vertex[pairs], error.vertices)]
+        start = 0.5 * (start + 1.0)
+    return field
+
+
+def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
+    is_near = np.zeros(len(surface.vertices), dtype=bool)
+    is_near[vertices] = True
+    corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
+    while not is_near[pairs].any():
+        touches = np.zeros(surface.face_count, dtype=bool)
+        touches[corner_face[is_near[corner_vertex]]] = True
+        before = int(is_near.sum())
+        is_near[corner_vertex[touches[corner_face]]] = True
+        if int(is_near.sum()) == before:
+            return np.ones(len(pairs), dtype=bool)
+    return is_near[pairs].any(axis=1)
 
 
 def _check_rosy(surface: Surface, field: RosyField) -> None:

@@ -21,6 +21,20 @@ from .surface import Surface, face_area_vectors, next_corners
 from .turning_angles import turning_angles_task
 
 
+class TurningError(RosyError):
+    """A field would turn too fast between two faces.
+
+    Attributes
+    ----------
+    vertices : (n,) intp ndarray
+        Those of the edges between such faces.
+    """
+
+    def __init__(self, vertices: np.ndarray, message: str) -> None:
+        super().__init__(message)
+        self.vertices = vertices
+
+
 def prescribed_field(
     surface: Surface,
     degree: int,
@@ -138,8 +152,9 @@ def change_singularities_task(
     ------
     RosyError
         If a vertex has no index (at a border, at faces without a direction,
-        or not in the mesh), if the changes do not add up to 0 on a closed surface, or if the field would
-        turn too fast for the size of the faces.
+        or not in the mesh), or if the changes do not add up to 0 on a closed surface.
+    TurningError
+        If the field would turn too fast for the size of the faces.
     """
     raise_mmap_threshold()
     degree, magnitude = field.degree, np.linalg.norm(field.vectors, axis=1, keepdims=True)
@@ -244,17 +259,21 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
     Raises
     ------
-    RosyError
+    TurningError
         If it does not: then other members match, and the indices are not those that were asked for.
     """
     if not len(angle) or np.abs(angle).max() < np.pi / degree:
         return
-    node = graph.head[np.abs(angle).argmax()]
-    vertex = surface.corner_vertex[np.flatnonzero(graph.corner_node == node)[0]]
-    raise RosyError(
-        f"{surface.name}: near vertex {vertex}, a field of degree {degree} with these singularities would "
+    vertex_of_node = np.empty(graph.node_count, dtype=np.intp)
+    vertex_of_node[graph.corner_node[::-1]] = surface.corner_vertex[::-1]
+    is_fast = np.abs(angle) >= np.pi / degree
+    vertices = np.unique(vertex_of_node[np.concatenate([graph.tail[is_fast], graph.head[is_fast]])])
+    worst = vertex_of_node[graph.head[np.abs(angle).argmax()]]
+    raise TurningError(
+        vertices,
+        f"{surface.name}: near vertex {worst}, a field of degree {degree} with these singularities would "
         "turn too fast for the size of the faces: subdivide the mesh, move singularities apart, or choose "
-        "smaller indices"
+        "smaller indices",
     )
 
 

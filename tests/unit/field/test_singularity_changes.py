@@ -73,21 +73,28 @@ def test_magnitudes_and_undefined_faces_stay():
     assert len(find_singularities(BALL, clean)[0]) == 1  # the other pole is undefined
 
 
-@pytest.mark.parametrize("degree", [2, 4])
-def test_curvature_is_cleaned(degree):
-    """All remaining singularities were there, and their indices have the same sum."""
-    surface = icosphere(4)
+@pytest.mark.parametrize(
+    "degree, subdivisions, noise",
+    [(2, 4, 0.01), (4, 4, 0.01), (4, 2, 0.35)],
+    ids=["2", "4", "coarse"],
+)
+def test_curvature_is_cleaned(degree, subdivisions, noise):
+    """All remaining singularities were there, and their indices have the same sum.
+
+    With large faces, some pairs have to stay.
+    """
+    surface = icosphere(subdivisions)
     random = np.random.default_rng(degree)
-    rough = surface.vertices * (1, 1.3, 0.7) + 0.01 * random.standard_normal(
+    rough = surface.vertices * (1, 1.3, 0.7) + noise * random.standard_normal(
         (len(surface.vertices), 3)
     )
     surface = build_surface(rough, surface.corner_vertex, surface.face_start)
     field = generate(surface, GeneratorSettings("curvature"), degree)
     vertex, index = find_singularities(surface, field)
-    clean = convert(surface, field, Conversion(pair_distance=0.1))
+    clean = convert(surface, field, Conversion(pair_distance=0.4 / subdivisions))
     left = dict(zip(*map(np.ndarray.tolist, find_singularities(surface, clean)), strict=True))
     assert left.items() <= dict(zip(vertex.tolist(), index.tolist(), strict=True)).items()
-    assert len(left) < 0.5 * len(vertex)
+    assert 0 < len(left) < 0.7 * len(vertex)
     assert sum(left.values()) == index.sum() == 2 * degree
 
 

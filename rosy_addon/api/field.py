@@ -197,8 +197,8 @@ class Field:
         Examples
         --------
         >>> import rosyfields as rf
-        >>> bunny = rf.Surface("bunny.obj")
-        >>> field = rf.curvature(bunny).without_pairs(0.05)
+        >>> torus = rf.Surface("torus.obj")
+        >>> field = rf.curvature(torus).without_pairs(0.05)
         """
         return self._converted(Conversion(pair_distance=reach))
 

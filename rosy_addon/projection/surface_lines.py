@@ -30,8 +30,8 @@ from .vector_components import tangent_frame_components
 #: Longest edge of the triangles on which the phase is computed, in distances between lines.
 MAX_EDGE = 1.4
 
-#: Largest number of triangles on which the phase is computed, unless the mesh has more. Beyond it,
-#: lines end and begin in fewer places.
+#: Largest number of triangles on which the phase is computed by default. Beyond it, lines end and begin
+#: in fewer places.
 MAX_TRIANGLES = 600_000
 
 #: Bytes of a triangle while phases are computed, and of each of its families of lines.
@@ -80,6 +80,7 @@ def cached_surface_lines_task(
     display: str,
     spacing: float,
     cache: Cache | None = None,
+    max_triangles: int = MAX_TRIANGLES,
 ) -> Task[SurfaceLines]:
     """Do the same as `surface_lines_task`, with results stored in a cache if one is given.
 
@@ -90,12 +91,14 @@ def cached_surface_lines_task(
     # Rounded, as rotated matrices have rounding errors.
     spacing = float(f"{spacing / scale:.5g}")
     stretch = np.round(stretch / scale, 5)
+    args = surface, stretch, field, display, spacing, max_triangles
     if cache is None:
-        return (yield from surface_lines_task(surface, stretch, field, display, spacing))
+        return (yield from surface_lines_task(*args))
+    content = _content(surface, field), stretch.tobytes()
     return (
         yield from cache.get_or_create_task(
-            ("surface lines", _content(surface, field), stretch.tobytes(), display, spacing),
-            lambda: surface_lines_task(surface, stretch, field, display, spacing),
+            ("surface lines", *content, display, spacing, max_triangles),
+            lambda: surface_lines_task(*args),
         )
     )
 
@@ -118,7 +121,12 @@ def _content(surface: Surface, field: RosyField) -> bytes:
 
 
 def surface_lines_task(
-    surface: Surface, stretch: np.ndarray, field: RosyField, display: str, spacing: float
+    surface: Surface,
+    stretch: np.ndarray,
+    field: RosyField,
+    display: str,
+    spacing: float,
+    max_triangles: int = MAX_TRIANGLES,
 ) -> Task[SurfaceLines]:
     """Compute evenly spaced lines along all directions of a field.
 
@@ -132,6 +140,8 @@ def surface_lines_task(
         As for `corner_field_task`.
     spacing : float
         Distance between neighboring lines after `stretch`.
+    max_triangles : int
+        Largest number of triangles on which the phase is computed, unless the mesh has more.
 
     Yields
     ------
@@ -170,7 +180,7 @@ def surface_lines_task(
         corner_field_task(rest, matrix, field, display), 0.05, 0.1, label
     )
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
-    max_triangles = max(MAX_TRIANGLES, len(rest.triangles))
+    max_triangles = max(max_triangles, len(rest.triangles))
     task = bisection_task(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
     tree = yield from subtask(task, 0.1, 0.2, label)
     count = len(tree.leaf_root)

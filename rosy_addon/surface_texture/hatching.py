@@ -43,7 +43,7 @@ from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field_task,
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
-from ..projection.surface_lines import SurfaceLines, cached_surface_lines_task
+from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surface_lines_task
 from .line_order import first_line_weights, line_order_task
 from .texel_field import frames_at
 from .texel_noise import texel_noise_task
@@ -51,6 +51,10 @@ from .texel_surface import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
 SWAP_GRAINS = 8.0
+
+#: Largest number of triangles on which lines are spaced, for each texel. It is reached only where texels
+#: are much smaller on parts of the surface than in the map as a whole, as where charts lie on each other.
+TRIANGLES_PER_TEXEL = 16
 
 #: Least number of spots along the side of a texture where a field has no direction.
 MIN_SPOTS = 8
@@ -265,13 +269,17 @@ def _even_lines_task(
     """Evaluate evenly spaced lines at the texels."""
     instance, texels = on.instance, on.texels
     spacing = SPACING_GRAINS * look.grain * on.step
-    lines: SurfaceLines = yield from subtask(
-        cached_surface_lines_task(
-            instance.surface, instance.matrix, instance.field, look.display, spacing, cache
-        ),
-        0.0,
-        0.8,
+    max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
+    task = cached_surface_lines_task(
+        instance.surface,
+        instance.matrix,
+        instance.field,
+        look.display,
+        spacing,
+        cache,
+        max_triangles,
     )
+    lines: SurfaceLines = yield from subtask(task, 0.0, 0.8)
     sides = on.mesh.points[:, 1:] - on.mesh.points[:, :1]
     sides = np.einsum("tkj,tj->kt", sides, on.mesh.x) + 1j * np.einsum(
         "tkj,tj->kt", sides, on.mesh.y

@@ -12,7 +12,10 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.surface_lines import cached_surface_lines_task
+from rosy_addon.surface_texture import hatching
 from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
 
 #: Lines that are wide enough for a small texture to show them well.
@@ -178,6 +181,24 @@ def test_overlapping_charts_are_counted():
     assert draw_texture(instance_of(surface, 4), uv, WIDE, 256).overlap == pytest.approx(
         0.5, abs=0.01
     )
+
+
+def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch):
+    """Where all charts lie on each other, a texel shows little of the surface."""
+    counts = []
+
+    def counted_task(*args):
+        lines = yield from cached_surface_lines_task(*args)
+        counts.append(len(lines.tree.leaf_root))
+        return lines
+
+    monkeypatch.setattr(hatching, "cached_surface_lines_task", counted_task)
+    grid = plane(1, 200)
+    surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
+    uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
+    look = Look(grain=1.0).with_settings({"ink": "hatch", "lines": "even"})
+    draw_texture(instance_of(surface, 2), uv, look, 16)
+    assert counts[0] < 2 * hatching.TRIANGLES_PER_TEXEL * 16**2
 
 
 def test_faces_without_area_in_the_map_end_streamlines():

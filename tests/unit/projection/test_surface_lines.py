@@ -17,7 +17,6 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import build_surface
 from rosy_addon.progress import run_to_completion
-from rosy_addon.projection import surface_lines
 from rosy_addon.projection.surface_lines import (
     cached_surface_lines_task,
     rest_matrix,
@@ -234,10 +233,11 @@ def test_undefined_faces_have_no_lines():
     assert np.median(np.abs(ratio[~undefined] - 1)) < 0.05
 
 
-def test_the_number_of_triangles_is_bounded(monkeypatch):
-    monkeypatch.setattr(surface_lines, "MAX_TRIANGLES", 2000)
+def test_the_number_of_triangles_is_bounded():
     surface = icosphere(2)
-    lines = lines_of(surface, generate(surface, "smoothest", 4), 0.004)
+    field = generate(surface, "smoothest", 4)
+    task = surface_lines_task(surface, np.eye(3), field, "smooth", 0.004, max_triangles=2000)
+    lines = run_to_completion(task)
     assert 500 < len(lines.tree.leaf_root) <= 2000
     assert np.isfinite(lines.pattern.phase).all()
 

@@ -1,4 +1,4 @@
-"""Rows of arrays in blocks, so that long work on a large mesh is done in short steps."""
+"""Rows of arrays in blocks, so that long work on a large mesh is done in short steps, and in ranges."""
 
 from __future__ import annotations
 
@@ -44,3 +44,19 @@ def by_rows_task(
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)
+
+
+def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return the concatenation of the ranges ``first[i]`` to ``first[i] + count[i] - 1``, intp.
+
+    Examples
+    --------
+    >>> concatenated_ranges(np.array([5, 10]), np.array([3, 2])).tolist()
+    [5, 6, 7, 10, 11]
+    """
+    stop = np.cumsum(count)
+    shift = first + count
+    shift -= stop
+    result = np.repeat(shift, count)
+    result += np.arange(len(result))
+    return result

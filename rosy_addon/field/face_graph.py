@@ -8,6 +8,7 @@ import numpy as np
 
 from ..progress import Progress, Task, subtask
 from .analysis import edge_lengths
+from .blocks import concatenated_ranges
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles_task
 from .surface import Surface, connected_components, edges_task, next_corners
@@ -201,9 +202,7 @@ def spanning_forest_task(
         done += len(front)
         yield Progress(done / node_count, LABEL)
         counts = start[front + 1] - start[front]
-        entry = np.arange(counts.sum()) + np.repeat(
-            start[front] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
-        )
+        entry = concatenated_ranges(start[front], counts)
         entry = entry[~is_reached[neighbor[entry]]]
         source = edge[entry]
         front, kept = np.unique(neighbor[entry], return_index=True)

@@ -14,8 +14,9 @@ import numpy as np
 from ..progress import Progress, Task, subtask
 from .face_graph import FaceGraph
 from .guided import conjugate_gradient_task
+from .representation import complex_bincount
 from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task
-from .turning_angles import ANGLE_MARGIN, MAX_ATTEMPTS, MIN_ROOM
+from .turning_angles import MAX_ATTEMPTS, added_resistance
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-8
@@ -74,7 +75,6 @@ def guided_rotation_task(
     stiffness = 1 / graph.conductance
     wanted = np.angle(offset) / degree
     sector, limit = 2 * np.pi / degree, np.pi / degree
-    source, used = graph.source, graph.target
     angle = None
     for attempt in range(MAX_ATTEMPTS):
         start, stop = 1 - 0.5**attempt, 1 - 0.5 ** (attempt + 1)
@@ -93,11 +93,10 @@ def guided_rotation_task(
             angle = solution.real
             if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
                 break
-        added = angle[used] - angle[source]
+        added = angle[graph.target] - angle[graph.source]
         if np.abs(turning + added).max(initial=0.0) < limit:
             break
-        room = np.maximum(limit - np.sign(added) * turning, MIN_ROOM * limit)
-        stiffness = stiffness * np.maximum(np.abs(added) / (ANGLE_MARGIN * room), 1) ** 2
+        stiffness = stiffness * added_resistance(added, turning, limit)
     return angle
 
 
@@ -137,10 +136,9 @@ def _initial_angle_task(
     divergence -= np.bincount(graph.source, stiffness * difference, count)
     laplacian = yield from _system_task(graph, stiffness, np.zeros(count))
     angle = (yield from _solve_task(laplacian, divergence, None)).real
-    parts = int(graph.component.max(initial=-1)) + 1
     rest = penalty * unit * np.exp(-1j * angle)
-    real, imaginary = (np.bincount(graph.component, part, parts) for part in (rest.real, rest.imag))
-    return angle + np.arctan2(imaginary, real)[graph.component]
+    parts = int(graph.component.max(initial=-1)) + 1
+    return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]
 
 
 def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> Task[np.ndarray]:

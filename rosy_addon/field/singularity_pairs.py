@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import Progress, Task, subtask
+from .blocks import concatenated_ranges
 from .surface import Surface, edges_task
 
 #: Label of all steps.
@@ -75,9 +76,7 @@ def _near_task(
         yield Progress(0.5, LABEL)
         source, place = np.divmod(state, count)
         counts = start[place + 1] - start[place]
-        entry = np.arange(counts.sum()) + np.repeat(
-            start[place] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts
-        )
+        entry = concatenated_ranges(start[place], counts)
         reached = np.repeat(distance, counts) + length[entry]
         following = np.repeat(source, counts) * count + neighbor[entry]
         is_near = reached <= max_distance

@@ -75,11 +75,19 @@ def turning_angles_task(
         angle = yield from subtask(task, start, stop)
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
-        room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
-        excess = np.abs(angle) / (ANGLE_MARGIN * room)
         # Where the field turns too fast, it turns less with a smaller conductance.
-        graph = replace(graph, conductance=graph.conductance / np.maximum(excess, 1) ** 2)
+        conductance = graph.conductance / added_resistance(angle, present, limit)
+        graph = replace(graph, conductance=conductance)
     return angle, tree
+
+
+def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
+    """(I,) factors by which edges should resist angles more that are added to those present.
+
+    They are 1 where the sum is clearly below the limit.
+    """
+    room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
+    return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
 
 
 def _least_angles_task(

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import concatenated_ranges
 from ..progress import Progress, Task, run_to_completion, subtask
 
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
@@ -472,7 +473,7 @@ def _scan_convert(
     for block in _block_slices(top - bottom):
         first, rows = bottom[block], (top - bottom)[block]
         local_triangle = np.repeat(np.arange(block.start, block.stop), rows)
-        row = _concatenated_ranges(first, rows)
+        row = concatenated_ranges(first, rows)
         short_edge = local_triangle + len(middle) * (row >= middle.take(local_triangle))
         center_y = row + 0.5
         long_x, short_x = (
@@ -585,7 +586,7 @@ def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.nda
     needed, because each removes all fragments that are not in front of the kept one.
     """
     span = np.repeat(np.arange(len(spans.count)), spans.count)
-    pixel = _concatenated_ranges(spans.start, spans.count)
+    pixel = concatenated_ranges(spans.start, spans.count)
     depth = pixel - spans.start.take(span)
     depth = depth * spans.depth_step.take(span)
     depth += spans.depth.take(span)
@@ -612,22 +613,6 @@ def _block_slices(count: np.ndarray) -> Iterator[slice]:
         stop = max(int(np.searchsorted(total, done + BLOCK_SIZE, side="right")), start + 1)
         yield slice(start, stop)
         start, done = stop, int(total[stop - 1])
-
-
-def _concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """Return the concatenation of the ranges ``first[i]`` to ``first[i] + count[i] - 1``, intp.
-
-    Examples
-    --------
-    >>> _concatenated_ranges(np.array([5, 10]), np.array([3, 2])).tolist()
-    [5, 6, 7, 10, 11]
-    """
-    stop = np.cumsum(count)
-    shift = first + count
-    shift -= stop
-    result = np.repeat(shift, count)
-    result += np.arange(len(result))
-    return result
 
 
 def _sorted_by_y(

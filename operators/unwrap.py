@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -47,23 +47,27 @@ def unwrapping_task(
             )
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
+    map_names = {}
     for mesh in meshes:
         # The operator refuses meshes without faces.
         uv = _unwrapped(context, mesh) if mesh.polygons else np.zeros(0, dtype=np.float32)
-        mesh.uv_layers.new(name=UV_MAP_NAME).data.foreach_set("uv", uv)
-    with_cleanup = _removing_maps_task(list(meshes), task)
+        layer = mesh.uv_layers.new(name=UV_MAP_NAME)
+        layer.data.foreach_set("uv", uv)
+        # Blender adds a number if the mesh has another attribute of this name.
+        map_names[mesh] = layer.name
+    with_cleanup = _removing_maps_task(map_names, task)
     next(with_cleanup)  # from here on, it removes the maps also if it is closed
     return with_cleanup
 
 
-def _removing_maps_task(meshes: Sequence[bpy.types.Mesh], task: Task[Any]) -> Task[Any]:
+def _removing_maps_task(map_names: Mapping[bpy.types.Mesh, str], task: Task[Any]) -> Task[Any]:
     """Run a task. If it is not finished, the UV maps of `unwrapping_task` are removed from meshes."""
     try:
         yield Progress(0.0, "unwrapping")
         return (yield from task)
     except BaseException:
-        for mesh in meshes:
-            if (layer := mesh.uv_layers.get(UV_MAP_NAME)) is not None:
+        for mesh, name in map_names.items():
+            if (layer := mesh.uv_layers.get(name)) is not None:
                 mesh.uv_layers.remove(layer)
         raise
 

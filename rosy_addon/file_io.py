@@ -264,15 +264,20 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
-    """Check that files can be written to a folder. It may be missing if it can be created.
+    """Check that Blender can store pictures in a folder. It may be missing if it can be created.
 
     Call this before a long task.
 
     Raises
     ------
     RosyError
-        If the folder cannot be created or written.
+        If the folder cannot be created or written, or its path has a backslash in the name of a
+        folder, which Blender takes for a separator.
     """
+    if os.sep != "\\" and "\\" in os.path.abspath(folder):
+        raise RosyError(
+            f"{folder}: Blender takes the backslash in its path for a separator: choose another folder"
+        )
     try:
         if not stat.S_ISDIR(os.stat(folder).st_mode):
             raise RosyError(f"{folder}: is not a folder")

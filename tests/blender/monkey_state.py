@@ -173,6 +173,18 @@ def _plain(value: Any) -> Any:
         return value
 
 
+def _parent_name(obj: bpy.types.Object) -> str | None:
+    """Return the name of an object's parent, if it must stay.
+
+    An object that the user has parented to one of RoSy's loses that parent with it. Blender 4.3
+    itself forgets the parent of a library override when its creation is undone and redone, until the
+    file is opened again.
+    """
+    if obj.parent is None or obj.override_library is not None or is_owned(obj.parent):
+        return None
+    return obj.parent.name
+
+
 def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
     path = f"objects/{_full_name(obj)}"
     if is_owned(obj):
@@ -180,8 +192,7 @@ def _add_object(state: Fingerprint, obj: bpy.types.Object) -> None:
         return
     state[f"{path}/basis"] = (
         obj.data and obj.data.name,
-        # An object that the user has parented to one of RoSy's loses that parent with it.
-        obj.parent.name if obj.parent and not is_owned(obj.parent) else None,
+        _parent_name(obj),
         None if obj.animation_data else _plain(obj.matrix_basis),
         _plain(obj.matrix_parent_inverse),
         obj.hide_render,

@@ -121,6 +121,7 @@ def test_unwrapping_is_undone_if_the_bake_fails(with_field, scene):
     bpy.ops.mesh.primitive_cube_add()
     cube = bpy.context.object
     cube.data.uv_layers.remove(cube.data.uv_layers[0])
+    cube.data.attributes.new("UVMap", "FLOAT", "POINT")  # so that the new map gets another name
     bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
     with_field.select_set(True)
     before = contents()

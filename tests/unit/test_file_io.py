@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from rosy_addon.file_io import LEFTOVER_SECONDS, replacing, write_bytes
+from rosy_addon.errors import RosyError
+from rosy_addon.file_io import LEFTOVER_SECONDS, check_folder, replacing, write_bytes
 
 WRITER = """
 import sys, time
@@ -62,3 +63,9 @@ def test_leftovers_of_other_machines_are_deleted_after_a_day(tmp_path):
         os.utime(path, (0, time.time() - LEFTOVER_SECONDS - 100))
     write_bytes(tmp_path / "a.png", b"whole")
     assert names(tmp_path) == sorted(["a.png", *(path.name for path in others)])
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="the backslash is a separator")
+def test_a_folder_that_blender_would_look_for_elsewhere_is_refused(tmp_path):
+    with pytest.raises(RosyError, match="takes the backslash"):
+        check_folder(tmp_path / "a\\b" / "c")

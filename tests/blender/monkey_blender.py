@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import bmesh
 import bpy
 import numpy as np
 from monkey_actions import (
@@ -303,10 +304,16 @@ def edit_mesh(monkey):
         ]
     )
     grows = operator in ("mesh.subdivide", "mesh.extrude_region_move")
-    if (not grows or is_small(mesh, 4)) and len(bpy.data.objects) < MAX_OBJECTS:
+    is_safe = operator != "mesh.subdivide" or _is_manifold(mesh)
+    if (not grows or is_small(mesh, 4)) and is_safe and len(bpy.data.objects) < MAX_OBJECTS:
         monkey.blender(operator, **settings)
     if monkey.chance(0.8):
         monkey.blender("object.mode_set", mode="OBJECT")
+
+
+def _is_manifold(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh in edit mode has edges of one or two faces. Blender may crash when it subdivides others."""
+    return all(len(edge.link_faces) in (1, 2) for edge in bmesh.from_edit_mesh(mesh).edges)
 
 
 @action(1)

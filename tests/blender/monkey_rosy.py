@@ -231,8 +231,10 @@ def prepare(monkey, probability=0.5):
     obj.rosy.include = obj.visible_camera = True
     obj.parent = None
     obj.location, obj.scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-    for attribute in [a for a in obj.data.attributes if a.name in ("rosy", "dir0")]:
-        obj.data.attributes.remove(attribute)
+    attributes = obj.data.attributes
+    for name in ("rosy", "dir0"):
+        if name in attributes:
+            attributes.remove(attributes[name])
     obj.data.rosy.attribute = "rosy"
     render = scene.render
     render.resolution_x, render.resolution_y = monkey.pick([(64, 64), (96, 64), (80, 96)])

@@ -6,7 +6,7 @@ import sys
 
 
 def _stop_at_once(*_: object) -> None:
-    """End the process: a Ctrl-C while modules are imported. No file is open yet."""
+    """End the process: a Ctrl-C while modules are imported, or while Python ends. No file is open."""
     os.write(2, b"rosy: stopped\n")
     os._exit(130)
 
@@ -18,7 +18,11 @@ def run() -> int:
     from .extras.command_line import main
 
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    return main()
+    try:
+        return main()
+    finally:
+        # Python would print the traceback of a KeyboardInterrupt while it ends.
+        signal.signal(signal.SIGINT, _stop_at_once)
 
 
 if __name__ == "__main__":

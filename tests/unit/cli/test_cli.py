@@ -333,6 +333,19 @@ def test_ctrl_c_is_status_130_without_a_traceback(sphere, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is no signal there")
+def test_ctrl_c_while_python_ends_is_status_130_without_a_traceback():
+    code = (
+        "import atexit, os, signal, sys; from rosy_addon.__main__ import run;"
+        "signal.signal(signal.SIGINT, signal.SIG_DFL);"
+        "atexit.register(os.kill, os.getpid(), signal.SIGINT);"
+        "sys.argv = ['rosy_addon', '--help']; sys.exit(run())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 130
+    assert done.stderr == "rosy: stopped\n"
+
+
 def test_bake_without_blender_is_an_error(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "bpy", None)  # as if it were not installed
     assert parser.main(["bake", "--save"]) == 2

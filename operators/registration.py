@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..rosy_addon.ui.singularity_handles import VIEW3D_TOOL_rosy_singularities
 from ..rosy_addon.viewport import session
 from . import (
     bake,
@@ -16,6 +17,7 @@ from . import (
     field_export,
     field_generate,
     field_import,
+    field_singularities,
     modal_task,
     preset_apply,
     preset_export,
@@ -36,6 +38,7 @@ MODULES = (
     field_import,
     field_export,
     singularities,
+    field_singularities,
     strokes,
     bake_occlusion,
     bake,
@@ -55,16 +58,18 @@ MODULES = (
 
 
 def register() -> None:
-    """Register the operators."""
+    """Register the operators, and the tools that call them."""
     for module in MODULES:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
+    bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, separator=True)
 
 
 def unregister() -> None:
-    """Stop the current task and the live view, and unregister the operators."""
+    """Stop the current task and the live view, and unregister the tools and the operators."""
     modal_task.stop_current_job()
     session.stop()
+    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

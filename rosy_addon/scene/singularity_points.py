@@ -10,7 +10,13 @@ import numpy as np
 from ..errors import RosyError
 from ..field.singularities import find_singularities
 from ..field.validate import vertex_normals
-from .meshes import mesh_surface, read_attribute, vertex_positions
+from .meshes import (
+    evaluated_mesh,
+    mesh_surface,
+    read_attribute,
+    read_collection,
+    vertex_positions,
+)
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .scene_reader import read_scene
@@ -33,12 +39,15 @@ class Singularities:
         Singularity index in units of 1 / N.
     degree : int
         Degree N of the field.
+    vertex : (K,) int32 ndarray or None
+        Vertices of the object's own mesh; None if the singularities are those of the evaluated mesh.
     """
 
     points: np.ndarray
     normals: np.ndarray
     index: np.ndarray
     degree: int
+    vertex: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.index)
@@ -74,6 +83,41 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     points = surface.vertices[vertex].astype(np.float32)
     normals = vertex_normals(surface)[vertex].astype(np.float32)
     return Singularities(points, normals, index, field.degree)
+
+
+def read_editable_singularities(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> Singularities:
+    """Find the singularities of the field of an object's own mesh, at their places on the evaluated mesh.
+
+    They are what an edit of the field changes. Modifiers may give the evaluated mesh other ones.
+
+    Raises
+    ------
+    RosyError
+        If the field cannot be read.
+    """
+    label = f"object '{obj.name}'"
+    surface = mesh_surface(obj.data, label)
+    field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
+    vertex, index = find_singularities(surface, field)
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+        source = obj.data if mesh is None or len(mesh.vertices) < len(obj.data.vertices) else mesh
+        points = own_vertex_positions(obj, source)[vertex]
+        normals = read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
+    return Singularities(points, normals, index, field.degree, vertex)
+
+
+def own_vertex_positions(obj: bpy.types.Object, evaluated: bpy.types.Mesh) -> np.ndarray:
+    """Return where the vertices of an object's own mesh are on its evaluated mesh, (V, 3) float32.
+
+    Modifiers that keep vertices, or add new ones after them, are followed, such as *Armature*,
+    *Subdivision Surface* or *Mirror*. If vertices are lost, the positions are those of the own mesh.
+    """
+    count = len(obj.data.vertices)
+    if len(evaluated.vertices) < count:
+        return vertex_positions(obj.data)
+    return vertex_positions(evaluated)[:count]
 
 
 def add_singularity_points(

@@ -1,7 +1,7 @@
 """The overlay of singularities in the 3D view: dots colored by sign, labeled with their indices.
 
-Draw handlers exist only while something is shown. Singularities are computed once: the dots move
-with the object, but do not follow changes of the mesh.
+Draw handlers exist only while something is shown. Singularities are computed once, and again when a field
+is stored and after an undo: the dots move with the object, but do not follow other changes of the mesh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ..errors import RosyError
-from ..scene.singularity_points import Singularities, read_singularities
+from ..scene.singularity_points import (
+    Singularities,
+    read_editable_singularities,
+    read_singularities,
+)
 from ..viewport.view3d import redraw
 
 #: Linear colors by the sign of the index: orange for positive, blue for negative.
@@ -47,8 +51,9 @@ class _Overlay:
 
     def add_handlers(self) -> None:
         """Start drawing."""
-        if _clear_on_load not in bpy.app.handlers.load_pre:
-            bpy.app.handlers.load_pre.append(_clear_on_load)
+        for handlers, handler in _app_handlers():
+            if handler not in handlers:
+                handlers.append(handler)
         if not self.handlers and not bpy.app.background:
             add = bpy.types.SpaceView3D.draw_handler_add
             self.handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
@@ -56,8 +61,9 @@ class _Overlay:
 
     def remove_handlers(self) -> None:
         """Stop drawing."""
-        if _clear_on_load in bpy.app.handlers.load_pre:
-            bpy.app.handlers.load_pre.remove(_clear_on_load)
+        for handlers, handler in _app_handlers():
+            if handler in handlers:
+                handlers.remove(handler)
         while self.handlers:
             bpy.types.SpaceView3D.draw_handler_remove(self.handlers.pop(), "WINDOW")
 
@@ -89,14 +95,25 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
 
     They are hidden if they cannot be read, for example because a modifier loses the field.
     """
-    for name in list(_OVERLAY.singularities):
+    for name, shown_before in list(_OVERLAY.singularities.items()):
         obj = context.view_layer.objects.get(name)
         if obj is None or obj.data not in meshes:
             continue
+        read = read_singularities if shown_before.vertex is None else read_editable_singularities
         try:
-            show(name, read_singularities(obj, context.evaluated_depsgraph_get()))
+            show(name, read(obj, context.evaluated_depsgraph_get()))
         except RosyError:
             hide(name)
+
+
+def _app_handlers() -> list[tuple[Any, Any]]:
+    """Return the lists of application handlers, and the handler that belongs in each."""
+    handlers = bpy.app.handlers
+    return [
+        (handlers.load_pre, _clear_on_load),
+        (handlers.undo_post, _read_again),
+        (handlers.redo_post, _read_again),
+    ]
 
 
 def _clear_on_load(*_: Any) -> None:
@@ -104,9 +121,20 @@ def _clear_on_load(*_: Any) -> None:
     hide()
 
 
+def _read_again(*_: Any) -> None:
+    """Read all singularities again, as an undo step may have changed the fields."""
+    context = bpy.context
+    refresh(context, {obj.data for obj in context.view_layer.objects if obj.type == "MESH"})
+
+
 def is_shown(object_name: str) -> bool:
     """Return whether the singularities of an object are shown."""
     return object_name in _OVERLAY.singularities
+
+
+def shown(object_name: str) -> Singularities | None:
+    """Return the singularities of an object that are shown, or None."""
+    return _OVERLAY.singularities.get(object_name)
 
 
 def has_handlers() -> bool:
@@ -143,7 +171,7 @@ def _draw_dots() -> None:
     gpu.state.depth_test_set("LESS_EQUAL")
     scale = context.preferences.system.ui_scale
     for obj, singularities in _visible_singularities():
-        positions = _offset_points(obj, singularities)
+        positions = offset_points(obj, singularities)
         for sign, fill_color in COLOR_BY_SIGN.items():
             points = positions[np.sign(singularities.index) == sign]
             if not len(points):  # Blender makes no batch without vertices
@@ -196,12 +224,12 @@ def _draw_labels() -> None:
         if len(singularities) > MAX_LABELS:
             continue
         for point, index in zip(
-            _offset_points(obj, singularities), singularities.index.tolist(), strict=True
+            offset_points(obj, singularities), singularities.index.tolist(), strict=True
         ):
             screen_position = location_3d_to_region_2d(
                 context.region, context.region_data, Vector(point)
             )
-            if screen_position is not None and not _is_occluded(context, Vector(point)):
+            if screen_position is not None and not is_occluded(context, point):
                 blf.position(
                     font_id, screen_position.x + 8 * scale, screen_position.y + 5 * scale, 0
                 )
@@ -209,8 +237,9 @@ def _draw_labels() -> None:
     blf.disable(font_id, blf.SHADOW)
 
 
-def _is_occluded(context: bpy.types.Context, point: Vector) -> bool:
-    """Return whether something is between a point and the camera."""
+def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
+    """Return whether something is between a point in world space and the camera."""
+    point = Vector(point)
     view_to_world = context.region_data.view_matrix.inverted()
     view_direction = (
         view_to_world.translation - point
@@ -222,7 +251,7 @@ def _is_occluded(context: bpy.types.Context, point: Vector) -> bool:
     ]
 
 
-def _offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
+def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:
     """Return the (K, 3) positions in world space, slightly off the surface."""
     matrix = np.array(obj.matrix_world)
     offset = SURFACE_OFFSET * max(obj.dimensions)

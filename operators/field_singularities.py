@@ -1,0 +1,153 @@
+"""Operators: move singularities of a field, by numbers or with the mouse in the 3D view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import bpy
+
+from ..rosy_addon.errors import REPORTED_ERRORS
+from ..rosy_addon.field.singularity_moves import OUTSIDE, move_index_task
+from ..rosy_addon.progress import Progress, Task, subtask
+from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.scene.read_field import read_mesh_field
+from ..rosy_addon.ui import singularity_handles
+from .modal_task import ModalTaskMixin
+from .poll import (
+    poll_active_field,
+    poll_editable,
+    poll_view_3d,
+    selected_mesh_objects,
+    store_fields,
+)
+from .reports import report_error
+
+
+class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
+    """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
+
+    bl_idname = "rosy.field_singularities"
+    bl_label = "Move Singularity"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: bpy.props.IntProperty(
+        name="From",
+        description="Vertex whose index is moved. Without a singularity, it gets the opposite index. "
+        "-1: beyond the border",
+        min=OUTSIDE,
+        default=OUTSIDE,
+    )
+    target: bpy.props.IntProperty(
+        name="To",
+        description="Vertex to which the index is added. -1: beyond the border",
+        min=OUTSIDE,
+        default=OUTSIDE,
+    )
+    index: bpy.props.IntProperty(
+        name="Index",
+        description="What is moved, in units of 1/N. 0: the whole index",
+        soft_min=-4,
+        soft_max=4,
+        default=0,
+    )
+    reach: bpy.props.FloatProperty(
+        name="Reach",
+        description="Distance over which directions change, as a fraction of the size of the mesh. At least as "
+        "far as the singularity moves",
+        min=0.0,
+        max=10.0,
+        soft_max=0.5,
+        precision=3,
+        step=1,
+        default=0.1,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_editable(cls, context) and poll_active_field(cls, context)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return [selected_mesh_objects(context)[0].data]
+
+    def make_task(self, context: bpy.types.Context) -> Task[None]:
+        """Change the field of the active mesh."""
+        (mesh,) = self.required_data(context)
+        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
+        yield Progress(0.0, "reading the field")
+        field = read_mesh_field(mesh, surface=surface)
+        task = move_index_task(
+            surface, field, self.source, self.target, self.index, self.reach * surface.extent
+        )
+        field = yield from subtask(task, 0.0, 1.0)
+        store_fields(self, context, {mesh: replace(field, source_directions=None)})
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("source", "target", "index", "reach"):
+            layout.prop(self, name)
+
+
+class ROSY_OT_drag_singularity(bpy.types.Operator):
+    """Drag a singularity along the surface, onto another one to merge them, or with Ctrl from any vertex to make a pair"""
+
+    bl_idname = "rosy.drag_singularity"
+    bl_label = "Drag Singularity"
+    bl_options = {"INTERNAL"}
+
+    make_pair: bpy.props.BoolProperty(
+        name="Make Pair",
+        description="Start at any vertex, and leave the opposite index there",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return (
+            poll_view_3d(cls, context)
+            and poll_editable(cls, context)
+            and poll_active_field(cls, context)
+        )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        obj = selected_mesh_objects(context)[0]
+        mouse = event.mouse_region_x, event.mouse_region_y
+        try:
+            self._drag = singularity_handles.start_drag(context, obj, mouse, self.make_pair)
+        except REPORTED_ERRORS as error:
+            return report_error(self, error)
+        if self._drag is None:
+            return {"CANCELLED", "PASS_THROUGH"}
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
+            self._drag.move(context, (event.mouse_region_x, event.mouse_region_y))
+        elif event.type in {"ESC", "RIGHTMOUSE"}:
+            self.cancel(context)
+            return {"CANCELLED"}
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            source, target = self._drag.source, self._drag.target
+            self.cancel(context)
+            if target is None or target == source:
+                return {"CANCELLED"}
+            index = 1 if self.make_pair else 0
+            try:
+                bpy.ops.rosy.field_singularities(
+                    "INVOKE_DEFAULT", source=source, target=target, index=index
+                )
+            except RuntimeError as error:  # reported by that operator
+                self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+                return {"CANCELLED"}
+            return {"FINISHED"}
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop drawing. Blender calls this if the window is closed or a file is opened."""
+        self._drag.stop()
+
+
+CLASSES = (ROSY_OT_field_singularities, ROSY_OT_drag_singularity)

@@ -1,0 +1,89 @@
+"""Move singularities of a field: one to another vertex, onto another one, apart, or over a border."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion, subtask
+from .prescribed import change_singularities_task
+from .rosy_field import RosyField
+from .singularities import singularities_task
+from .surface import Surface
+
+#: Stands for no vertex: what is moved there leaves the surface over a border.
+OUTSIDE = -1
+
+
+def move_index(
+    surface: Surface, field: RosyField, source: int, target: int, index: int = 0, reach: float = 0.0
+) -> RosyField:
+    """Move a singularity index from one vertex to another; see `move_index_task`."""
+    return run_to_completion(move_index_task(surface, field, source, target, index, reach))
+
+
+def move_index_task(
+    surface: Surface, field: RosyField, source: int, target: int, index: int = 0, reach: float = 0.0
+) -> Task[RosyField]:
+    """Move a singularity index from one vertex to another.
+
+    All ways to edit singularities by hand are such moves. The index of a singularity that is moved onto
+    another one is added to it, so that opposite ones vanish. An index that is moved from a vertex without
+    one leaves its opposite there: a new pair. A part of an index splits a singularity.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : RosyField
+        A RoSy.
+    source, target : int
+        Vertices. `OUTSIDE` stands for none, on a surface with a border.
+    index : int
+        What is moved, in units of 1 / N. 0 is all that `source` has.
+    reach : float
+        Distance over which the change of direction falls off, in object space. It is not less than the
+        distance between the vertices, which is also the default.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    RosyField
+        All its other singularities are those of `field`.
+
+    Raises
+    ------
+    RosyError
+        If both vertices are the same, a vertex can have no index or has none to move, or nothing can
+        leave the surface because it is closed.
+    TurningError
+        If the field would turn too fast for the size of the faces.
+    """
+    if source == target:
+        raise RosyError(
+            f"{surface.name}: vertex {source} is both source and target: choose another target"
+        )
+    if index == 0:
+        vertex, indices = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
+        index = int(indices[vertex == source].sum())
+        if index == 0:
+            raise RosyError(
+                f"{surface.name}: vertex {source} is not singular: choose a singular vertex, or give the index "
+                "to move"
+            )
+    ends = np.array([source, target])
+    is_vertex = ends != OUTSIDE
+    change = np.array([-index, index])[is_vertex]
+    yield Progress(0.2, "moving a singularity")
+    distance = _distance(surface, ends) if is_vertex.all() else 0.1 * surface.extent
+    task = change_singularities_task(surface, field, ends[is_vertex], change, max(reach, distance))
+    return (yield from subtask(task, 0.2, 1.0))
+
+
+def _distance(surface: Surface, ends: np.ndarray) -> float:
+    """Distance between two vertices; 0 if there are none of these numbers."""
+    if (ends >= len(surface.vertices)).any():
+        return 0.0
+    return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))

@@ -1,0 +1,220 @@
+"""The tool *Singularities* of the 3D view: its handles, and dragging one of them along the surface.
+
+The handles are the dots of the overlay. Operators do the work.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
+from gpu_extras.batch import batch_for_shader
+
+from ..errors import RosyError
+from ..scene.field_attributes import has_field
+from ..scene.singularity_points import own_vertex_positions, read_editable_singularities
+from ..viewport.view3d import redraw
+from . import overlay
+
+#: Distance in pixels from the mouse up to which a handle is grabbed.
+GRAB_DISTANCE = 16.0
+
+#: The ring around the vertex where a singularity will be: its radius and line width in pixels, its color.
+RING_RADIUS, LINE_WIDTH = 9.0, 2.0
+RING_COLOR = (1.0, 1.0, 1.0, 1.0)
+
+#: Number of sides of the polygon that approximates the ring.
+RING_SEGMENTS = 24
+
+
+class Drag:
+    """A singularity that is being dragged.
+
+    Attributes
+    ----------
+    source : int
+        Vertex where it started.
+    target : int or None
+        Vertex under the mouse; None beside the object.
+    """
+
+    def __init__(self, obj: bpy.types.Object, source: int, region: bpy.types.Region) -> None:
+        self.source = source
+        self.target: int | None = None
+        self._obj = obj
+        self._region = region
+        self._points = {source: _vertex_point(bpy.context, obj, source)}
+        add = bpy.types.SpaceView3D.draw_handler_add
+        self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
+
+    def move(self, context: bpy.types.Context, mouse: tuple[float, float]) -> None:
+        """Follow the mouse."""
+        self.target = vertex_under(context, self._obj, mouse)
+        if self.target is not None:
+            self._points[self.target] = _vertex_point(context, self._obj, self.target)
+        redraw()
+
+    def stop(self) -> None:
+        """Stop drawing. Later calls have no effect."""
+        if self._handler is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
+            self._handler = None
+            redraw()
+
+    def _draw(self) -> None:
+        context = bpy.context
+        if context.region != self._region:
+            return
+        ends = [self.source] if self.target is None else [self.source, self.target]
+        points = _to_pixels(context, np.array([self._points[vertex] for vertex in ends]))
+        angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
+        ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        ring *= context.preferences.system.ui_scale
+        _draw_line(context, points[-1] + ring)
+        if len(points) > 1:
+            _draw_line(context, points)
+
+
+def start_drag(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    mouse: tuple[float, float],
+    from_any_vertex: bool,
+) -> Drag | None:
+    """Grab the handle under the mouse, or any vertex. Return None if there is none.
+
+    Raises
+    ------
+    RosyError
+        If the field cannot be read.
+    """
+    show_handles(context, obj)
+    source = (
+        vertex_under(context, obj, mouse) if from_any_vertex else _handle_under(context, obj, mouse)
+    )
+    return None if source is None else Drag(obj, source, context.region)
+
+
+def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    """Show the singularities that can be edited, if the overlay does not yet.
+
+    Raises
+    ------
+    RosyError
+        If the field cannot be read.
+    """
+    shown = overlay.shown(obj.name)
+    if shown is None or shown.vertex is None:
+        depsgraph = context.evaluated_depsgraph_get()
+        overlay.show(obj.name, read_editable_singularities(obj, depsgraph))
+
+
+def vertex_under(
+    context: bpy.types.Context, obj: bpy.types.Object, mouse: tuple[float, float]
+) -> int | None:
+    """Return the vertex of an object's own mesh that is next to the mouse, or None beside the object."""
+    region, view = context.region, context.region_data
+    to_object = obj.matrix_world.inverted_safe()
+    origin = to_object @ region_2d_to_origin_3d(region, view, mouse)
+    toward = to_object.to_3x3() @ region_2d_to_vector_3d(region, view, mouse)
+    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+    is_hit, location, _, _ = evaluated.ray_cast(origin, toward)
+    if not is_hit:
+        return None
+    positions = own_vertex_positions(obj, evaluated.data)
+    return int(np.square(positions - np.array(location, np.float32)).sum(axis=1).argmin())
+
+
+def _handle_under(
+    context: bpy.types.Context, obj: bpy.types.Object, mouse: tuple[float, float]
+) -> int | None:
+    """Return the vertex of the visible handle next to the mouse, or None if there is none."""
+    shown = overlay.shown(obj.name)
+    assert shown is not None and shown.vertex is not None
+    points = overlay.offset_points(obj, shown)
+    distance = np.linalg.norm(_to_pixels(context, points) - np.array(mouse), axis=1)
+    reach = GRAB_DISTANCE * context.preferences.system.ui_scale
+    for position in np.argsort(distance):
+        if not distance[position] <= reach:
+            break
+        if not overlay.is_occluded(context, points[position]):
+            return int(shown.vertex[position])
+    return None
+
+
+def _vertex_point(context: bpy.types.Context, obj: bpy.types.Object, vertex: int) -> np.ndarray:
+    """(3,) position of a vertex of an object's own mesh, in world space."""
+    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+    point = own_vertex_positions(obj, evaluated.data)[vertex]
+    matrix = np.array(obj.matrix_world)
+    return matrix[:3, :3] @ point + matrix[:3, 3]
+
+
+def _to_pixels(context: bpy.types.Context, points: np.ndarray) -> np.ndarray:
+    """(K, 2) positions in the region of (K, 3) points of world space; infinite behind the camera."""
+    matrix = np.array(context.region_data.perspective_matrix)
+    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    size = np.array([context.region.width, context.region.height])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixels = (clip[:, :2] / clip[:, 3:] + 1) / 2 * size
+    pixels[clip[:, 3] <= 0] = np.inf
+    return pixels
+
+
+def _draw_line(context: bpy.types.Context, points: np.ndarray) -> None:
+    """Draw a line through (n, 2) positions in the region."""
+    if not np.isfinite(points).all():
+        return
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    shader.bind()
+    shader.uniform_float("viewportSize", (context.region.width, context.region.height))
+    shader.uniform_float("lineWidth", LINE_WIDTH * context.preferences.system.ui_scale)
+    shader.uniform_float("color", RING_COLOR)
+    points_3d = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "LINE_STRIP", {"pos": points_3d}).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
+    """Move the singularities of a field"""
+
+    bl_space_type = "VIEW_3D"
+    bl_context_mode = "OBJECT"
+    bl_idname = "rosy.singularities_tool"
+    bl_label = "Field Singularities"
+    bl_description = (
+        "Drag a singularity of the field along the surface, or onto another one to merge them.\n"
+        "Ctrl: drag a new pair apart"
+    )
+    bl_icon = "ops.generic.cursor"
+    bl_keymap = (
+        ("rosy.drag_singularity", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        (
+            "rosy.drag_singularity",
+            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
+            {"properties": [("make_pair", True)]},
+        ),
+    )
+
+    # Blender calls both without an instance.
+    @staticmethod
+    def draw_settings(
+        context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
+    ) -> None:
+        properties = tool.operator_properties("rosy.field_singularities")
+        layout.prop(properties, "reach")
+
+    @staticmethod
+    def draw_cursor(
+        context: bpy.types.Context, tool: bpy.types.WorkSpaceTool, mouse: tuple[int, int]
+    ) -> None:
+        """Show the handles while the tool is active."""
+        obj = context.view_layer.objects.active
+        if obj is not None and has_field(obj):
+            with suppress(RosyError):  # dragging reports it
+                show_handles(context, obj)

@@ -6,6 +6,7 @@ The handles are the dots of the overlay. Operators do the work.
 from __future__ import annotations
 
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -191,7 +192,7 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
         "Drag a singularity of the field along the surface, or onto another one to merge them.\n"
         "Ctrl: drag a new pair apart"
     )
-    bl_icon = "ops.generic.cursor"
+    bl_icon = str(Path(__file__).parent / "icons" / "singularities")  # Blender adds .dat
     bl_keymap = (
         ("rosy.drag_singularity", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
         (

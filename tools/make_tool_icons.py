@@ -1,0 +1,60 @@
+"""Make the icons of RoSy's tools in Blender: python tools/make_tool_icons.py
+
+A file has the triangles of a picture of 256 x 256 units, y up: the header ``VCO``, a byte 0, the width and the
+height as one byte each and the origin, then the corners of all triangles, one byte for x and y each, then their
+colors as RGBA. Blender's own icons of tools have this format.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+FOLDER = Path(__file__).parents[1] / "rosy_addon" / "ui" / "icons"
+
+WHITE, ORANGE = (255, 255, 255, 255), (255, 150, 60, 255)
+
+
+def stroke(points: np.ndarray, width: float) -> np.ndarray:
+    """(n, 3, 2) triangles along (m, 2) points."""
+    along = np.gradient(points, axis=0)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    across *= width / 2 / np.linalg.norm(across, axis=1, keepdims=True)
+    left, right = points + across, points - across
+    first = np.stack([left[:-1], right[:-1], right[1:]], axis=1)
+    second = np.stack([left[:-1], right[1:], left[1:]], axis=1)
+    return np.concatenate([first, second])
+
+
+def disc(center: tuple[float, float], radius: float, count: int = 24) -> np.ndarray:
+    """(n, 3, 2) triangles."""
+    angle = np.linspace(0, 2 * np.pi, count + 1)
+    rim = np.array(center) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.stack([np.broadcast_to(center, rim[1:].shape), rim[:-1], rim[1:]], axis=1)
+
+
+def write_icon(name: str, parts: list[tuple[np.ndarray, tuple[int, ...]]]) -> None:
+    """Write a file of triangles with one color for each part."""
+    corners = np.concatenate([triangles for triangles, _ in parts]).reshape(-1, 2)
+    colors = np.concatenate([np.tile(color, (3 * len(part), 1)) for part, color in parts])
+    header = b"VCO\x00" + bytes([255, 255, 0, 0])
+    data = np.rint(corners).clip(0, 255).astype(np.uint8).tobytes()
+    (FOLDER / f"{name}.dat").write_bytes(header + data + colors.astype(np.uint8).tobytes())
+
+
+def singularities() -> list[tuple[np.ndarray, tuple[int, ...]]]:
+    """Lines around a singularity of index 1/2: parabolas with the same focus."""
+    center = np.array((128.0, 120.0))
+    parts = []
+    for distance in (26.0, 60.0):
+        half_width = np.sqrt(4 * distance * (distance + 78))
+        x = np.linspace(-min(half_width, 88), min(half_width, 88), 17)
+        y = distance - x**2 / (4 * distance)
+        parts.append((stroke(center + np.stack([x, y], axis=1), 13), WHITE))
+    parts.append((stroke(center + np.array([[0, -26.0], [0, -86.0]]), 13), WHITE))
+    return [*parts, (disc((128.0, 120.0), 19), ORANGE)]
+
+
+if __name__ == "__main__":
+    write_icon("singularities", singularities())

@@ -19,6 +19,7 @@ from ..field.directional_field import field_directions, tensor_field
 from ..field.field_io import load_field, write_field
 from ..field.rosy_field import RosyField, check_degree
 from ..field.singularities import find_singularities
+from ..field.singularity_moves import move_index
 from ..field.validate import apply_nonfinite_policy, validated_directions, validated_field
 from .surface import Surface
 
@@ -201,6 +202,42 @@ class Field:
         >>> field = rf.curvature(torus).without_pairs(0.05)
         """
         return self._converted(Conversion(pair_distance=reach))
+
+    def with_moved_singularity(
+        self, source: int, target: int, index: int = 0, *, reach: float = 0.1
+    ) -> Field:
+        """Return the field with a singularity at another vertex; all others stay.
+
+        On another singularity, its index is added to that one: opposite ones vanish. From a vertex that
+        is not singular, a pair is made; of a part of an index, the rest stays.
+
+        Parameters
+        ----------
+        source, target : int
+            Vertices. -1 stands for none: the singularity comes or leaves over a border.
+        index : int
+            What is moved, in units of 1/N; 0 for the whole index of `source`.
+        reach : float
+            Distance over which directions change, as a fraction of the longest side of the mesh. They
+            change at least as far as the singularity moves.
+
+        Raises
+        ------
+        RosyError
+            If the field is not a RoSy, a vertex can have no index or has none to move, or the field would
+            turn too fast for the size of the faces.
+
+        Examples
+        --------
+        >>> import rosyfields as rf
+        >>> torus = rf.Surface("torus.obj")
+        >>> field = rf.prescribed(torus, {10: 1, 200: -1}).with_moved_singularity(10, 12)
+        >>> field.singularities.vertex.tolist()
+        [12, 200]
+        """
+        mesh = self.surface.mesh
+        moved = move_index(mesh, self.rosy, source, target, index, reach * mesh.extent)
+        return Field(self.surface, moved)
 
     def with_magnitude(self, magnitude: str | ArrayLike) -> Field:
         """Return the field with other magnitudes.

@@ -111,7 +111,7 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
         If the degree is neither a multiple nor a divisor, or the directions are not a RoSy.
     """
     degree = check_degree(degree)
-    _check_rosy(surface, field)
+    check_rosy(surface, field)
     if degree % field.degree == 0:
         return RosyField(degree, field.vectors)
     if field.degree % degree:
@@ -217,7 +217,7 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
     RosyError
         If the directions are not a RoSy, or the time is not positive and finite.
     """
-    _check_rosy(surface, field)
+    check_rosy(surface, field)
     if not time > 0 or not np.isfinite(time):
         raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
     x, y = face_frames(surface)
@@ -296,7 +296,7 @@ def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -
     RosyError
         If the directions are not a RoSy.
     """
-    _check_rosy(surface, field)
+    check_rosy(surface, field)
     vertex, index = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
     task = opposite_pairs_task(surface, vertex, index, max_distance)
     pairs = yield from subtask(task, 0.2, 0.4)
@@ -329,9 +329,9 @@ def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.n
     return is_near[pairs].any(axis=1)
 
 
-def _check_rosy(surface: Surface, field: RosyField) -> None:
+def check_rosy(surface: Surface, field: RosyField) -> None:
     """Raise an error if the directions of a field are not a RoSy."""
     if field.direction_ratios is not None:
         raise RosyError(
-            f"{surface.name}: only RoSy fields can be converted, but the directions of this field are not a RoSy"
+            f"{surface.name}: only RoSy fields can be changed, but the directions of this field are not a RoSy"
         )

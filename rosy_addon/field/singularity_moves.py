@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
+from .convert import check_rosy
 from .prescribed import change_singularities_task
 from .rosy_field import RosyField
 from .singularities import singularities_task
@@ -13,6 +14,9 @@ from .surface import Surface
 
 #: Stands for no vertex: what is moved there leaves the surface over a border.
 OUTSIDE = -1
+
+#: Least distance over which the change falls off, relative to `Surface.extent`.
+MIN_REACH = 0.01
 
 
 def move_index(
@@ -41,8 +45,8 @@ def move_index_task(
     index : int
         What is moved, in units of 1 / N. 0 is all that `source` has.
     reach : float
-        Distance over which the change of direction falls off, in object space. It is not less than the
-        distance between the vertices, which is also the default.
+        Distance over which the change of direction falls off, in object space. The distance between the
+        vertices is used if that is larger.
 
     Yields
     ------
@@ -56,11 +60,12 @@ def move_index_task(
     Raises
     ------
     RosyError
-        If both vertices are the same, a vertex can have no index or has none to move, or nothing can
+        If the directions are not a RoSy, both vertices are the same, a vertex can have no index or has none to move, or nothing can
         leave the surface because it is closed.
     TurningError
         If the field would turn too fast for the size of the faces.
     """
+    check_rosy(surface, field)
     if source == target:
         raise RosyError(
             f"{surface.name}: vertex {source} is both source and target: choose another target"
@@ -77,13 +82,13 @@ def move_index_task(
     is_vertex = ends != OUTSIDE
     change = np.array([-index, index])[is_vertex]
     yield Progress(0.2, "moving a singularity")
-    distance = _distance(surface, ends) if is_vertex.all() else 0.1 * surface.extent
-    task = change_singularities_task(surface, field, ends[is_vertex], change, max(reach, distance))
+    reach = max(reach, _distance(surface, ends), MIN_REACH * surface.extent)
+    task = change_singularities_task(surface, field, ends[is_vertex], change, reach)
     return (yield from subtask(task, 0.2, 1.0))
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:
-    """Distance between two vertices; 0 if there are none of these numbers."""
-    if (ends >= len(surface.vertices)).any():
+    """Distance between two vertices; 0 if one is `OUTSIDE`, or not in the mesh."""
+    if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
     return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))

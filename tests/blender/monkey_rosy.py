@@ -137,6 +137,19 @@ def singularities(monkey):
     monkey.rosy("singularities", show=monkey.pick(["OVERLAY", "POINTS", "BOTH", "NONE"]))
 
 
+@action(1, uses_rosy=True)
+def move_singularity(monkey):
+    obj = select_mesh(monkey)
+    count = len(obj.data.vertices) if obj is not None else 0
+    monkey.rosy(
+        "field_singularities",
+        source=monkey.random.randrange(-1, count + 1),
+        target=monkey.random.randrange(-1, count + 1),
+        index=monkey.pick([0, 0, 1, -1, 3]),
+        reach=monkey.pick([0.0, 0.1, 10.0]),
+    )
+
+
 @action(0.7, uses_rosy=True)
 def occlusion(monkey):
     prepare(monkey)

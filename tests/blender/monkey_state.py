@@ -312,6 +312,7 @@ _STROKES = (
 MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_generate": _FIELD,
     "field_convert": _FIELD,
+    "field_singularities": _FIELD,
     "field_store": _FIELD,
     "field_import": _FIELD,
     "field_export": (),

@@ -475,6 +475,44 @@ def test_singularities_are_where_their_points_are_moved(scene):
     assert doubled.index.tolist() == [2] * count
 
 
+def editable_singularities(obj):
+    from bl_ext.user_default.rosy.rosy_addon.scene.singularity_points import (
+        read_editable_singularities,
+    )
+
+    found = read_editable_singularities(obj, bpy.context.evaluated_depsgraph_get())
+    return dict(zip(found.vertex.tolist(), found.index.tolist(), strict=True)), found
+
+
+def test_a_singularity_is_moved(scene):
+    """On the object's own mesh; its place is on the evaluated mesh."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    sphere = bpy.context.object
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    sphere.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    cast = sphere.modifiers.new("Cast", "CAST")
+    cast.factor, cast.use_radius_as_size, cast.size = 1.0, False, 3.0
+    before, found = editable_singularities(sphere)
+    assert len(before) == 8
+    np.testing.assert_allclose(np.linalg.norm(found.points, axis=1), 3.0, rtol=1e-5)
+    source = min(before)
+    target = next(vertex for vertex in range(500, 600) if vertex not in before)
+    bpy.ops.ed.undo_push(message="before")
+    move = bpy.ops.rosy.field_singularities
+    assert move(source=source, target=target) == {"FINISHED"}
+    after, _ = editable_singularities(sphere)
+    assert after == {**{v: i for v, i in before.items() if v != source}, target: before[source]}
+    vectors = member_vectors(sphere.data)
+    for settings, message in (
+        ({"source": source, "target": target}, f"vertex {source} is not singular"),
+        ({"source": target, "target": target}, "both source and target"),
+        ({"source": target, "target": 10**6}, "has no vertex 1000000"),
+        ({"source": target}, "this closed surface needs 0/4"),
+    ):
+        assert message in error_of(move, **settings)
+    np.testing.assert_array_equal(member_vectors(sphere.data), vectors)
+
+
 def test_singularities_of_fields_without_any_or_lost(scene):
     bpy.ops.mesh.primitive_plane_add()
     plane = bpy.context.object

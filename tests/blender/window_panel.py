@@ -15,6 +15,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
@@ -695,6 +696,65 @@ def stop_when_a_file_is_opened():
     yield from check_interruption(open_file, unchanged=False)
 
 
+def singularities_dragged_with_the_tool():
+    """Move one, undo that, and drag a new pair apart with Ctrl."""
+    yield from fresh_scene()
+    with in_view():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.ops.view3d.view_selected()
+        bpy.ops.wm.tool_set_by_id(name="rosy.singularities_tool")
+    overlay = rosy("rosy_addon.ui.overlay")
+    yield 1.0  # for a smooth view
+    yield from move_mouse((0.0, -1.0, 0.0))
+    yield from wait_until(lambda: overlay.shown("Sphere") is not None)
+    before = shown_singularities()
+    source = min(before, key=lambda vertex: bpy.context.object.data.vertices[vertex].co.y)
+    start = bpy.context.object.data.vertices[source].co
+    yield from drag(start, (0.1, -0.9, 0.3))
+    yield from wait_until(lambda: shown_singularities() != before)
+    moved = shown_singularities()
+    assert source not in moved and len(moved) == len(before)
+    with in_view():
+        bpy.ops.ed.undo()
+    yield 0.3
+    assert shown_singularities() == before
+    yield from drag((-0.4, -0.8, -0.4), (0.4, -0.8, -0.4), ctrl=True)
+    yield from wait_until(lambda: shown_singularities() != before)
+    added = dict(shown_singularities().items() - before.items())
+    assert sorted(added.values()) == [-1, 1]
+    with in_view():
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+
+
+def shown_singularities():
+    """Return the indices of the sphere's singularities that the overlay shows, by their vertices."""
+    shown = rosy("rosy_addon.ui.overlay").shown("Sphere")
+    return dict(zip(shown.vertex.tolist(), shown.index.tolist(), strict=True))
+
+
+def move_mouse(point, kind="MOUSEMOVE", value="NOTHING", **keys):
+    """Move the mouse to a point of the scene, and let another event happen there."""
+    window, _, region, _ = view()
+    place = location_3d_to_region_2d(region, view()[1].spaces.active.region_3d, Vector(point))
+    x, y = region.x + round(place.x), region.y + round(place.y)
+    window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y, **keys)
+    yield 0.1
+    if kind != "MOUSEMOVE":
+        window.event_simulate(type=kind, value=value, x=x, y=y, **keys)
+        yield 0.1
+
+
+def drag(start, end, **keys):
+    """Drag from a point of the scene to another one."""
+    yield from move_mouse(start, "LEFTMOUSE", "PRESS", **keys)
+    yield from move_mouse((Vector(start) + Vector(end)) / 2, **keys)
+    yield from move_mouse(end, "LEFTMOUSE", "RELEASE")
+
+
 def bake_the_current_view():
     yield from fresh_scene()
     make_field()
@@ -709,6 +769,7 @@ run_steps(
     panel_with_field,
     singularities_as_dots,
     no_singularities_to_show,
+    singularities_dragged_with_the_tool,
     bake_with_progress,
     panel_with_picture,
     panel_out_of_date,

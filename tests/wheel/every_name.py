@@ -56,6 +56,7 @@ def fields(cube: rf.Surface, folder: Path) -> rf.Field:
     numbers: list[float] = [difference.mean, difference.rms, difference.max, difference.compared]
     singularities: rf.Singularities = made[0].singularities
     vertex, index = singularities
+    made[0].with_moved_singularity(0, 6, 1, reach=0.5)
     energy: float = field.energy
     degree: int = field.degree
     is_rosy: bool = field.is_rosy

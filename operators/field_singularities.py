@@ -23,6 +23,19 @@ from .poll import (
 )
 from .reports import report_error
 
+#: The reach of both operators; that of the tool is passed on by the operator that it starts.
+REACH = {
+    "name": "Reach",
+    "description": "Distance over which directions change, as a fraction of the size of the mesh. At least as "
+    "far as the singularity moves",
+    "min": 0.0,
+    "max": 10.0,
+    "soft_max": 0.5,
+    "precision": 3,
+    "step": 1,
+    "default": 0.1,
+}
+
 
 class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
     """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
@@ -51,17 +64,7 @@ class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
         soft_max=4,
         default=0,
     )
-    reach: bpy.props.FloatProperty(
-        name="Reach",
-        description="Distance over which directions change, as a fraction of the size of the mesh. At least as "
-        "far as the singularity moves",
-        min=0.0,
-        max=10.0,
-        soft_max=0.5,
-        precision=3,
-        step=1,
-        default=0.1,
-    )
+    reach: bpy.props.FloatProperty(**REACH)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -102,6 +105,7 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
         description="Start at any vertex, and leave the opposite index there",
         options={"SKIP_SAVE"},
     )
+    reach: bpy.props.FloatProperty(**REACH)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -137,7 +141,7 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
             index = 1 if self.make_pair else 0
             try:
                 bpy.ops.rosy.field_singularities(
-                    "INVOKE_DEFAULT", source=source, target=target, index=index
+                    "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
                 )
             except RuntimeError as error:  # reported by that operator
                 self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))

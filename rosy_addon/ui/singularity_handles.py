@@ -207,7 +207,7 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
     def draw_settings(
         context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
     ) -> None:
-        properties = tool.operator_properties("rosy.field_singularities")
+        properties = tool.operator_properties("rosy.drag_singularity")
         layout.prop(properties, "reach")
 
     @staticmethod

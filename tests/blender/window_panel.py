@@ -707,6 +707,8 @@ def singularities_dragged_with_the_tool():
         bpy.ops.view3d.view_axis(type="FRONT")
         bpy.ops.view3d.view_selected()
         bpy.ops.wm.tool_set_by_id(name="rosy.singularities_tool")
+        tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT")
+        tool.operator_properties("rosy.drag_singularity").reach = 0.3
     overlay = rosy("rosy_addon.ui.overlay")
     yield 1.0  # for a smooth view
     yield from move_mouse((0.0, -1.0, 0.0))
@@ -717,6 +719,7 @@ def singularities_dragged_with_the_tool():
     yield from drag(start, (0.1, -0.9, 0.3))
     yield from wait_until(lambda: shown_singularities() != before)
     moved = shown_singularities()
+    assert math.isclose(bpy.context.window_manager.operators[-1].reach, 0.3, rel_tol=1e-6)
     assert source not in moved and len(moved) == len(before)
     with in_view():
         bpy.ops.ed.undo()

@@ -163,6 +163,10 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         "points that Singularities has made for the mesh, wherever you have moved them",
         search=_search_points,
     )
+    add_missing: bpy.props.BoolProperty(
+        name="Add Missing",
+        description="Add the further singularities that the field needs, where it is smoothest",
+    )
     attribute: bpy.props.StringProperty(
         name="Attribute",
         description="Name of the mesh attribute that stores the field. An existing field is replaced",
@@ -240,7 +244,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         if self.kind == "prescribed":
             target = self._first_object(context, mesh)
             points = read_singularity_points(context.scene, target, self.degree, self.singularities)
-            return replace(settings, singularities=points)
+            return replace(settings, singularities=points, add_missing=self.add_missing)
         if self.kind == "features" and self.edges != "FEATURES":
             return replace(settings, edges=marked_edges(mesh, self.edges))
         if self.kind != "guided":

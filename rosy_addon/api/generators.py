@@ -226,6 +226,7 @@ def prescribed(
     *,
     vectors: ArrayLike | Field | None = None,
     reach: float = 0.0,
+    add_missing: bool = False,
 ) -> Field:
     """Make the smoothest field that has given singularities, and no other ones.
 
@@ -245,6 +246,8 @@ def prescribed(
     reach : float
         If it is above 0, the field also bends to the guides. Their influence falls off over this distance, a
         fraction of the longest side of the mesh.
+    add_missing : bool
+        Add the further singularities that the field needs, where it is smoothest.
 
     Raises
     ------
@@ -276,6 +279,7 @@ def prescribed(
         singularities=(vertex, index),
         vectors=_guide_vectors(surface, vectors, degree),
         smoothing_length=reach,
+        add_missing=add_missing,
     )
     return _generated(surface, settings, degree)
 

@@ -103,6 +103,11 @@ def add_mesh_options(
         help="singular vertices and their indices, for --generate prescribed",
     )
     parser.add_argument(
+        "--add-missing",
+        action="store_true",
+        help="give a prescribed field the further singularities that it needs, where it is smoothest",
+    )
+    parser.add_argument(
         "--uv", action="store_true", help="make a guided field follow the UV map of an .obj file"
     )
     parser.add_argument(
@@ -218,6 +223,7 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
                 options.degree,
                 vectors=_guides(options, surface, options.degree),
                 reach=options.reach,
+                add_missing=options.add_missing,
             )
         case "axis":
             return api.along_axis(surface, options.axis, degree)

@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import NoFeaturesError, RosyError
 from ..memory import check_memory
 from ..progress import Progress, Task, run_to_completion, subtask
+from .cheapest_singularities import cheapest_singularities_task
 from .curvature import TINY, curvature_task
 from .form import form_task
 from .frames import normalize, unit_direction
@@ -89,6 +90,8 @@ class GeneratorSettings:
         For "guided" and "prescribed": a member vector for each face, zero where there is no guide.
     singularities : ((K,) int ndarray, (K,) int ndarray) or None
         For "prescribed": vertices, and their indices in units of 1 / N.
+    add_missing : bool
+        For "prescribed": whether the field gets the further singularities that it needs.
     """
 
     kind: str
@@ -101,6 +104,7 @@ class GeneratorSettings:
     uv: np.ndarray | None = None
     vectors: np.ndarray | None = None
     singularities: tuple[np.ndarray, np.ndarray] | None = None
+    add_missing: bool = False
 
     def __post_init__(self) -> None:
         if self.smoothing_length < MIN_SMOOTHING_LENGTH:
@@ -171,9 +175,13 @@ def generate_task(
             raise RosyError(
                 f"{surface.name}: no singularities are given: give their vertices and indices"
             )
+        singularities, start = settings.singularities, 0.0
+        if settings.add_missing:
+            task = cheapest_singularities_task(surface, degree, *singularities)
+            singularities, start = (yield from subtask(task, 0.0, 0.5)), 0.5
         reach = settings.smoothing_length * surface.extent
-        task = prescribed_task(surface, degree, *settings.singularities, settings.vectors, reach)
-        return (yield from task)
+        task = prescribed_task(surface, degree, *singularities, settings.vectors, reach)
+        return (yield from subtask(task, start, 1.0))
     if settings.kind == "uv":
         if settings.uv is None:
             raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")

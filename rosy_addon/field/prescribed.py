@@ -94,7 +94,7 @@ def prescribed_task(
     x, y = face_frames(surface)
     graph = yield from subtask(face_graph_task(surface, x, y), 0.0, 0.2, LABEL)
     yield Progress(0.2, LABEL)
-    node_index = _index_at_nodes(surface, graph, vertex, index)
+    node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, graph.defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - graph.defect
     angle, tree = yield from subtask(turning_angles_task(graph, degree, required), 0.2, 0.85)
@@ -164,7 +164,7 @@ def change_singularities_task(
     z[is_defined] /= np.abs(z[is_defined])
     graph = yield from subtask(face_graph_task(surface, x, y, is_defined), 0.0, 0.2, LABEL)
     yield Progress(0.2, LABEL)
-    node_change = _index_at_nodes(
+    node_change = index_at_nodes(
         surface, graph, np.asarray(vertex, dtype=np.int64), np.asarray(change, dtype=np.int64)
     )
     _check_sums(surface, graph, np.zeros(graph.node_count), node_change, degree)
@@ -199,7 +199,7 @@ def _bent_task(
     return z * np.exp(1j * degree * angle)
 
 
-def _index_at_nodes(
+def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
     """(n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
@@ -250,7 +250,7 @@ def _check_sums(
     part = "" if count == 1 else f"the part with vertex {vertices.min()}: "
     raise RosyError(
         f"{surface.name}: {part}the singularity indices add up to {given[first]}/{degree}, but this "
-        f"closed surface needs {needed[first]}/{degree}: add or change singularities"
+        f"closed surface needs {needed[first]}/{degree}: change them, or add the missing ones"
     )
 
 

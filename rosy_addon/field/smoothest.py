@@ -16,7 +16,7 @@ from .connection import BLOCK_TRIANGLES, Connection, connection_task, laplacian_
 from .frames import dot
 from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .sparse_multigrid import Level, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, Level, hierarchy_task, w_cycle
 from .surface import Surface
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
@@ -87,14 +87,42 @@ def smallest_eigenvectors_task(
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
-    label = "building the connection Laplacian"
-    yield Progress(0.0, label)
-    component = connection.component
+    yield Progress(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
-    yield Progress(0.05, label)
-    shift = SPECTRAL_SHIFT * 4 * np.pi / mass.sum()
+    shift = spectral_shift(mass)
     matrix = yield from subtask(laplacian_task(connection, degree, shift), 0.05, 0.1)
-    levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.4)
+    task = eigenproblem_task(matrix, mass, connection.component)
+    z, energy = yield from subtask(task, 0.1, 1.0)
+    return z, energy - shift
+
+
+def spectral_shift(mass: np.ndarray) -> float:
+    """Return the multiple of the masses that is added to an energy, so that multigrid can solve it."""
+    return SPECTRAL_SHIFT * 4 * np.pi / float(mass.sum())
+
+
+def eigenproblem_task(
+    matrix: CSRMatrix, mass: np.ndarray, component: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Compute the eigenvector of A z = e M z with the smallest e on each connected component.
+
+    Parameters
+    ----------
+    matrix : (n, n) CSRMatrix
+        Hermitian A, with the masses times `spectral_shift`.
+    mass : (n,) float64 ndarray
+        The diagonal of M.
+    component : (n,) int32 ndarray
+        Connected component of each node.
+
+    Returns
+    -------
+    z : (n,) complex128 ndarray
+        z* M z is 1 on each component.
+    energy : (components,) float64 ndarray
+        The eigenvalues e.
+    """
+    levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.35)
     masses, components = [mass], [component]
     for level in levels[:-1]:
         weight = np.abs(level.prolongation.data)
@@ -121,7 +149,7 @@ def smallest_eigenvectors_task(
         z, energy = yield from subtask(task, start, start + 0.1 / len(levels) if index else 1.0)
         if not is_finest:
             z = levels[index - 1].prolongation @ z
-    return z, energy - shift
+    return z, energy
 
 
 def _lobpcg_task(

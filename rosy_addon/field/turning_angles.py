@@ -71,7 +71,7 @@ def turning_angles_task(
     limit = np.pi / degree
     for attempt in range(MAX_ATTEMPTS):
         start, stop = 1 - 0.8 * 0.2**attempt, 1 - 0.8 * 0.2 ** (attempt + 1)
-        task = _least_angles_task(graph, degree, required, loops, present)
+        task = least_angles_task(graph, degree, required, loops, present)
         angle = yield from subtask(task, start, stop)
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
@@ -90,7 +90,7 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
 
 
-def _least_angles_task(
+def least_angles_task(
     graph: FaceGraph,
     degree: int,
     required: np.ndarray,
@@ -101,7 +101,7 @@ def _least_angles_task(
     yield Progress(0.0, LABEL)
     matrix = levels = None
     if graph.is_interior.any():
-        matrix = yield from subtask(_laplacian_task(graph), 0.0, 0.1)
+        matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.1)
         levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.5)
 
     def potential_task(sums: np.ndarray) -> Task[np.ndarray]:
@@ -138,7 +138,7 @@ def _least_angles_task(
     return angle
 
 
-def _laplacian_task(graph: FaceGraph) -> Task[CSRMatrix]:
+def potential_matrix_task(graph: FaceGraph) -> Task[CSRMatrix]:
     """The Laplacian of potentials at interior nodes, which are 0 at the others.
 
     On closed components, the first node is

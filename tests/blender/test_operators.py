@@ -454,6 +454,9 @@ def test_singularities_are_where_their_points_are_moved(scene):
     points.data.attributes["index"].data.foreach_set("value", index)
     message = error_of(bpy.ops.rosy.field_generate, kind="prescribed")
     assert "add up to 9/4, but this closed surface needs 8/4" in message
+    assert bpy.ops.rosy.field_generate(kind="prescribed", add_missing=True) == {"FINISHED"}
+    completed = read_singularities(sphere, bpy.context.evaluated_depsgraph_get())
+    assert completed.index.sum() == 8 and completed.index.max() == 2
     index[1] = 0
     points.data.attributes["index"].data.foreach_set("value", index)
     assert bpy.ops.rosy.field_generate(kind="prescribed") == {"FINISHED"}

@@ -143,7 +143,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     sums = np.zeros((graph.node_count, len(edge)))
     sums[graph.head, edge] += 1
     sums[graph.tail, edge] -= 1
-    node_index = prescribed._index_at_nodes(
+    node_index = prescribed.index_at_nodes(
         surface, graph, np.array(vertex, dtype=int), np.array(index, dtype=int)
     )
     turn = 2 * np.pi / degree

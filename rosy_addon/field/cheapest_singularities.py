@@ -1,0 +1,199 @@
+"""The singularities that a field needs besides given ones, where they cost least.
+
+A connection that turns around the given singularities takes their part of the curvature. The smoothest field of
+what is left (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013) has the other ones. They then go from vertex
+to vertex to where the energy of all angles is least (`turning_angles`): a singularity is a charge in the
+potential of the others and of the curvature. Those with opposite indices vanish where they meet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, subtask
+from .face_graph import LABEL, FaceGraph, face_graph_task
+from .guided import conjugate_gradient_task
+from .prescribed import index_at_nodes
+from .representation import face_frames, from_representation
+from .rosy_field import RosyField, check_degree
+from .singularities import singularities_task
+from .smoothest import eigenproblem_task, spectral_shift
+from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task
+from .surface import Surface, face_area_vectors
+from .turning_angles import least_angles_task, potential_matrix_task
+
+#: Largest number of steps to neighboring vertices.
+MAX_STEPS = 60
+
+#: Residual norm of the potential relative to that of the right-hand side.
+TOLERANCE = 1e-8
+
+#: Resistance between two neighbors in a triangulation, relative to that of the edge alone. It is the mean, by
+#: Foster's theorem.
+EDGE_RESISTANCE = 1 / 3
+
+#: Least share of the singularities that are moved at once.
+MIN_SHARE = 0.05
+
+
+def cheapest_singularities_task(
+    surface: Surface, degree: int, vertex: np.ndarray, index: np.ndarray
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Find the singularities that are missing where a field with all of them is smooth.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+        N.
+    vertex, index : (K,) int ndarray
+        The given singularities, in units of 1 / N.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    vertex, index : (K + L,) int64 ndarray
+        The given ones, and those that were found, at other vertices. On a closed surface, the indices have
+        the sum that it needs.
+
+    Raises
+    ------
+    RosyError
+        If a vertex has no index (at a border, or not in the mesh), or no face has an area.
+    """
+    degree = check_degree(degree)
+    vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
+    x, y = face_frames(surface)
+    if not x.any():
+        raise RosyError(f"{surface.name}: no face has an area")
+    graph = yield from subtask(face_graph_task(surface, x, y), 0.0, 0.1, LABEL)
+    area = np.linalg.norm(
+        face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
+    )
+    given = index_at_nodes(surface, graph, vertex, index)
+    required = 2 * np.pi / degree * (given - _spread(surface, graph, area, given))
+    angle = yield from subtask(least_angles_task(graph, degree, required, [], 0.0), 0.1, 0.3)
+    mass = np.maximum(area, 1e-12 * area.mean())
+    task = _energy_task(graph, degree, angle, spectral_shift(mass) * mass)
+    matrix = yield from subtask(task, 0.3, 0.35)
+    task = eigenproblem_task(matrix, mass, graph.component)
+    z, _ = yield from subtask(task, 0.35, 0.6)
+    modulus = np.abs(z)
+    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+    field = RosyField(degree, from_representation(z, x, y, degree))
+    found, found_index = yield from subtask(singularities_task(surface, field), 0.6, 0.65)
+    total = index_at_nodes(surface, graph, found, found_index)
+    added = yield from subtask(_settled_task(graph, degree, given, total - given), 0.65, 1.0)
+    node = np.flatnonzero(added)
+    vertex_of_node = np.empty(graph.node_count, dtype=np.int64)
+    vertex_of_node[graph.corner_node] = surface.corner_vertex
+    return np.concatenate([vertex, vertex_of_node[node]]), np.concatenate([index, added[node]])
+
+
+def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """(n,) parts of the given indices on each closed component, spread over its nodes by area."""
+    corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
+    node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
+    component = graph.node_component
+    count = int(component.max(initial=-1)) + 1
+    total = np.bincount(component, given, count)
+    total[component[~graph.is_interior]] = 0.0
+    component_area = np.bincount(component, node_area, count)
+    return node_area * (total / np.where(component_area > 0, component_area, 1))[component]
+
+
+def _settled_task(
+    graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
+) -> Task[np.ndarray]:
+    """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
+    if not added.any():
+        return added
+    matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.05)
+    levels = yield from subtask(hierarchy_task(matrix), 0.05, 0.2)
+    unit = 2 * np.pi / degree
+    neighbors = _Neighbors(graph)
+    best, least, share = added, np.inf, 1.0
+    potential = np.zeros(graph.node_count)
+    for step in range(MAX_STEPS):
+        yield Progress(1 - 0.8 * 0.95**step, LABEL)
+        charge = unit * (given + added) - graph.defect
+        solution = yield from conjugate_gradient_task(
+            matrix, charge[graph.is_interior].astype(np.complex128), TOLERANCE, levels, LABEL
+        )
+        energy = float(charge[graph.is_interior] @ solution.real)
+        # Those that are still at given singularities have to leave them, whatever it costs.
+        if energy < least or (best[given != 0] != 0).any():
+            best, least = added, energy
+            potential = np.zeros(graph.node_count)
+            potential[graph.is_interior] = solution.real
+        else:
+            share *= 0.5
+            if share < MIN_SHARE:
+                break
+        added = neighbors.step(best, given, unit, potential, share)
+        if np.array_equal(added, best):
+            break
+    return best
+
+
+class _Neighbors:
+    """The vertex nodes, and the interior ones next to each of them."""
+
+    def __init__(self, graph: FaceGraph) -> None:
+        ends = np.concatenate([graph.tail, graph.head])
+        others = np.concatenate([graph.head, graph.tail])
+        order = np.argsort(ends, kind="stable")
+        order = order[graph.is_interior[others[order]]]
+        self._neighbor = others[order]
+        self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[order]
+        self._start = np.searchsorted(ends[order], np.arange(graph.node_count + 1))
+
+    def step(
+        self,
+        added: np.ndarray,
+        given: np.ndarray,
+        unit: float,
+        potential: np.ndarray,
+        share: float,
+    ) -> np.ndarray:
+        """Return (n,) indices after a share of the singularities has gone to the best neighbors."""
+        moves = []
+        for node in np.flatnonzero(added).tolist():
+            around = slice(self._start[node], self._start[node + 1])
+            others = self._neighbor[around]
+            charge = unit * added[node]
+            change = 2 * charge * (potential[others] - potential[node])
+            change += charge**2 * self._resistance[around]
+            is_free = (given[others] == 0) & (added[others] * added[node] <= 0)
+            change[~is_free] = np.inf
+            if given[node] != 0:
+                change -= 1e9
+            if len(change) and change.min() < 0:
+                moves.append((float(change.min()), node, int(others[change.argmin()])))
+        moves.sort()
+        result = added.copy()
+        for _, node, other in moves[: max(1, round(share * len(moves)))]:
+            if result[node] == added[node] and result[other] * result[node] <= 0:
+                result[other] += result[node]
+                result[node] = 0
+        return result
+
+
+def _energy_task(
+    graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray
+) -> Task[CSRMatrix]:
+    """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
+    yield Progress(0.0, LABEL)
+    count, weight = len(diagonal), 1 / graph.conductance
+    source, target = graph.source, graph.target
+    transport = np.exp(1j * degree * (graph.unfolding + angle))
+    diagonal = diagonal + np.bincount(np.concatenate([source, target]), np.tile(weight, 2), count)
+    faces = np.arange(count)
+    row = np.concatenate([target, source, faces]).astype(np.intp)
+    column = np.concatenate([source, target, faces]).astype(np.intp)
+    value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
+    return (yield from subtask(from_coo_task(row, column, value, count, count), 0.0, 1.0))

@@ -1,0 +1,73 @@
+"""Singularities that are added to given ones, where they cost least."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cylinder, globe, icosphere, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.analysis import dirichlet_energy
+from rosy_addon.field.cheapest_singularities import cheapest_singularities_task
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.prescribed import prescribed_field
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.progress import run_to_completion
+
+
+def completed(surface, degree, vertex, index):
+    task = cheapest_singularities_task(surface, degree, vertex, index)
+    return run_to_completion(task)
+
+
+def energy_of(surface, degree, vertex, index):
+    return dirichlet_energy(surface, prescribed_field(surface, degree, vertex, index))
+
+
+def test_what_is_missing_costs_as_much_as_at_the_opposite_point():
+    """With one singularity of index 1 on a sphere, the other one belongs there."""
+    ball = icosphere(4)
+    vertex, index = completed(ball, 1, [7], [1])
+    assert vertex[0] == 7 and index.tolist() == [1, 1]
+    opposite = int((ball.vertices @ ball.vertices[7]).argmin())
+    assert energy_of(ball, 1, vertex, index) < 1.03 * energy_of(ball, 1, [7, opposite], [1, 1])
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_given_ones_stay_and_the_sum_is_right(degree):
+    """Also where the smoothest field wants one of the others at the vertex of a given one."""
+    random = np.random.default_rng(degree)
+    for surface, characteristic in ((torus(24, 12), 0), (icosphere(3), 2)):
+        for count in (1, 2, 4, 4):
+            given = random.choice(len(surface.vertices), count, replace=False)
+            sign = random.choice([-1, 1], count)
+            vertex, index = completed(surface, degree, given, sign)
+            assert vertex[:count].tolist() == given.tolist()
+            assert index[:count].tolist() == sign.tolist()
+            assert len(set(vertex.tolist())) == len(vertex)
+            assert index.sum() == degree * characteristic
+
+
+@pytest.mark.parametrize("degree, count", [(4, 8), (6, 12)])
+def test_one_given_costs_no_more_than_the_smoothest_field(degree, count):
+    """The sphere can be turned so that one of its singularities is there."""
+    ball = icosphere(4)
+    vertex, index = completed(ball, degree, [7], [1])
+    assert index.tolist() == [1] * count
+    energy = energy_of(ball, degree, vertex, index)
+    assert energy < dirichlet_energy(ball, smoothest_field(ball, degree))
+
+
+def test_a_field_with_a_border_needs_no_more():
+    tube = cylinder(24, 12)
+    settings = GeneratorSettings(
+        "prescribed", singularities=(np.array([150]), np.array([1])), add_missing=True
+    )
+    vertex, index = find_singularities(tube, generate(tube, settings, 4))
+    assert vertex.tolist() == [150] and index.tolist() == [1]
+
+
+def test_bad_vertices_are_named():
+    with pytest.raises(RosyError, match="has no vertex 5000"):
+        completed(globe(8, 16), 4, [5000], [1])

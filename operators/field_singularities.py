@@ -21,7 +21,7 @@ from .poll import (
     selected_mesh_objects,
     store_fields,
 )
-from .reports import report_error
+from .reports import report_error, report_operator_error
 
 #: The reach of both operators; that of the tool is passed on by the operator that it starts.
 REACH = {
@@ -144,8 +144,7 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
                     "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
                 )
             except RuntimeError as error:  # reported by that operator
-                self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
-                return {"CANCELLED"}
+                return report_operator_error(self, error)
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 

@@ -16,7 +16,7 @@ from ..rosy_addon.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.progress import Progress, Task, run_to_completion
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.viewport.view3d import redraw_sidebars
-from .reports import report_error
+from .reports import report_error, report_operator_error
 
 #: Seconds of work in each slice. Events of the user are handled between slices.
 SLICE_SECONDS = 0.05
@@ -291,6 +291,5 @@ class DialogTaskMixin(ModalTaskMixin):
         try:
             result = operator("INVOKE_DEFAULT", **settings)
         except RuntimeError as error:  # reported by the second operator
-            self.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
-            return {"CANCELLED"}
+            return report_operator_error(self, error)
         return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}

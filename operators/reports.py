@@ -15,6 +15,12 @@ def report_error(operator: bpy.types.Operator, error: Exception) -> set[str]:
     return {"CANCELLED"}
 
 
+def report_operator_error(operator: bpy.types.Operator, error: RuntimeError) -> set[str]:
+    """Report the error of another operator that was called. Return the result of one that has failed."""
+    operator.report({"ERROR"}, str(error).strip().removeprefix("Error: "))
+    return {"CANCELLED"}
+
+
 def report_warning(operator: bpy.types.Operator, message: str) -> None:
     """Report what the user should know about a result."""
     operator.report({"WARNING"}, as_sentence(message))

@@ -170,13 +170,13 @@ class _Neighbors:
             change += charge**2 * self._resistance[around]
             is_free = (given[others] == 0) & (added[others] * added[node] <= 0)
             change[~is_free] = np.inf
-            if given[node] != 0:
-                change -= 1e9
-            if len(change) and change.min() < 0:
-                moves.append((float(change.min()), node, int(others[change.argmin()])))
+            least = float(change.min(initial=np.inf))
+            must_leave = given[node] != 0
+            if least < 0 or (must_leave and least < np.inf):
+                moves.append((not must_leave, least, node, int(others[change.argmin()])))
         moves.sort()
         result = added.copy()
-        for _, node, other in moves[: max(1, round(share * len(moves)))]:
+        for *_, node, other in moves[: max(1, round(share * len(moves)))]:
             if result[node] == added[node] and result[other] * result[node] <= 0:
                 result[other] += result[node]
                 result[node] = 0

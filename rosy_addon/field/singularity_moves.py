@@ -60,8 +60,8 @@ def move_index_task(
     Raises
     ------
     RosyError
-        If the directions are not a RoSy, both vertices are the same, a vertex can have no index or has none to move, or nothing can
-        leave the surface because it is closed.
+        If the directions are not a RoSy, both vertices are the same, a vertex can have no index or has
+        none to move, or nothing can leave the surface because it is closed.
     TurningError
         If the field would turn too fast for the size of the faces.
     """

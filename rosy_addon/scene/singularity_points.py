@@ -102,22 +102,20 @@ def read_editable_singularities(
     field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
     vertex, index = find_singularities(surface, field)
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
-        source = obj.data if mesh is None or len(mesh.vertices) < len(obj.data.vertices) else mesh
-        points = own_vertex_positions(obj, source)[vertex]
+        source = mesh_of_own_vertices(obj, mesh)
+        points = vertex_positions(source)[vertex]
         normals = read_collection(source.vertex_normals, "vector", np.float32, 3)[vertex]
     return Singularities(points, normals, index, field.degree, vertex)
 
 
-def own_vertex_positions(obj: bpy.types.Object, evaluated: bpy.types.Mesh) -> np.ndarray:
-    """Return where the vertices of an object's own mesh are on its evaluated mesh, (V, 3) float32.
+def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None) -> bpy.types.Mesh:
+    """Return the mesh whose first vertices are those of an object's own mesh, as they are seen.
 
-    Modifiers that keep vertices, or add new ones after them, are followed, such as *Armature*,
-    *Subdivision Surface* or *Mirror*. If vertices are lost, the positions are those of the own mesh.
+    It is the evaluated mesh if modifiers keep the vertices, or add new ones after them, such as
+    *Armature*, *Subdivision Surface* or *Mirror*. If vertices are lost, it is the own mesh.
     """
-    count = len(obj.data.vertices)
-    if len(evaluated.vertices) < count:
-        return vertex_positions(obj.data)
-    return vertex_positions(evaluated)[:count]
+    is_lost = evaluated is None or len(evaluated.vertices) < len(obj.data.vertices)
+    return obj.data if is_lost else evaluated
 
 
 def add_singularity_points(

@@ -1,4 +1,4 @@
-"""The tool *Singularities* of the 3D view: its handles, and dragging one of them along the surface.
+"""The tool *Field Singularities* of the 3D view: its handles, and dragging one of them along the surface.
 
 The handles are the dots of the overlay. Operators do the work.
 """
@@ -17,7 +17,8 @@ from gpu_extras.batch import batch_for_shader
 
 from ..errors import RosyError
 from ..scene.field_attributes import has_field
-from ..scene.singularity_points import own_vertex_positions, read_editable_singularities
+from ..scene.meshes import vertex_positions
+from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
 from ..viewport.view3d import redraw
 from . import overlay
 
@@ -48,15 +49,16 @@ class Drag:
         self.target: int | None = None
         self._obj = obj
         self._region = region
-        self._points = {source: _vertex_point(bpy.context, obj, source)}
+        self._ends = _own_points(bpy.context, obj)[[source]]
         add = bpy.types.SpaceView3D.draw_handler_add
         self._handler: Any = add(self._draw, (), "WINDOW", "POST_PIXEL")
 
     def move(self, context: bpy.types.Context, mouse: tuple[float, float]) -> None:
         """Follow the mouse."""
-        self.target = vertex_under(context, self._obj, mouse)
-        if self.target is not None:
-            self._points[self.target] = _vertex_point(context, self._obj, self.target)
+        points = _own_points(context, self._obj)
+        self.target = _vertex_under(context, self._obj, points, mouse)
+        vertices = [self.source] if self.target is None else [self.source, self.target]
+        self._ends = points[vertices]
         redraw()
 
     def stop(self) -> None:
@@ -70,8 +72,7 @@ class Drag:
         context = bpy.context
         if context.region != self._region:
             return
-        ends = [self.source] if self.target is None else [self.source, self.target]
-        points = _to_pixels(context, np.array([self._points[vertex] for vertex in ends]))
+        points = _to_pixels(context, _to_world(self._obj, self._ends))
         angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
         ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         ring *= context.preferences.system.ui_scale
@@ -94,9 +95,10 @@ def start_drag(
         If the field cannot be read.
     """
     show_handles(context, obj)
-    source = (
-        vertex_under(context, obj, mouse) if from_any_vertex else _handle_under(context, obj, mouse)
-    )
+    if from_any_vertex:
+        source = _vertex_under(context, obj, _own_points(context, obj), mouse)
+    else:
+        source = _handle_under(context, obj, mouse)
     return None if source is None else Drag(obj, source, context.region)
 
 
@@ -114,10 +116,19 @@ def show_handles(context: bpy.types.Context, obj: bpy.types.Object) -> None:
         overlay.show(obj.name, read_editable_singularities(obj, depsgraph))
 
 
-def vertex_under(
-    context: bpy.types.Context, obj: bpy.types.Object, mouse: tuple[float, float]
+def _own_points(context: bpy.types.Context, obj: bpy.types.Object) -> np.ndarray:
+    """(V, 3) positions of the vertices of an object's own mesh as they are seen, in object space."""
+    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+    return vertex_positions(mesh_of_own_vertices(obj, evaluated.data))[: len(obj.data.vertices)]
+
+
+def _vertex_under(
+    context: bpy.types.Context,
+    obj: bpy.types.Object,
+    points: np.ndarray,
+    mouse: tuple[float, float],
 ) -> int | None:
-    """Return the vertex of an object's own mesh that is next to the mouse, or None beside the object."""
+    """Return which of `_own_points` is next to the mouse, or None beside the object."""
     region, view = context.region, context.region_data
     to_object = obj.matrix_world.inverted_safe()
     origin = to_object @ region_2d_to_origin_3d(region, view, mouse)
@@ -126,8 +137,7 @@ def vertex_under(
     is_hit, location, _, _ = evaluated.ray_cast(origin, toward)
     if not is_hit:
         return None
-    positions = own_vertex_positions(obj, evaluated.data)
-    return int(np.square(positions - np.array(location, np.float32)).sum(axis=1).argmin())
+    return int(np.square(points - np.array(location, np.float32)).sum(axis=1).argmin())
 
 
 def _handle_under(
@@ -147,12 +157,10 @@ def _handle_under(
     return None
 
 
-def _vertex_point(context: bpy.types.Context, obj: bpy.types.Object, vertex: int) -> np.ndarray:
-    """(3,) position of a vertex of an object's own mesh, in world space."""
-    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-    point = own_vertex_positions(obj, evaluated.data)[vertex]
+def _to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+    """(K, 3) points of object space in world space."""
     matrix = np.array(obj.matrix_world)
-    return matrix[:3, :3] @ point + matrix[:3, 3]
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _to_pixels(context: bpy.types.Context, points: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ TOP_LEVEL = {
 #: The folder of the presets.
 PRESETS = "rosy_addon/presets/shipped/"
 
-SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt"}
+SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt", "dat"}
 
 #: Modules that come with Blender.
 BLENDER_MODULES = {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
@@ -46,6 +46,7 @@ FILES_WITH_PATHS = {
     "presets/store.py": "presets",
     "rendering/band_workers.py": "the code of the workers",
     "scene/video.py": "the script that encodes videos",
+    "ui/singularity_handles.py": "the icon of the tool",
 }
 
 REFUSED_CALLS = {"eval", "exec", "compile", "__import__", "breakpoint", "input"}

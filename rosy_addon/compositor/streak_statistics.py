@@ -7,7 +7,7 @@ straight lines.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,8 +34,11 @@ BREAK_LENGTH_GRAINS, MAX_BREAK_FRACTION = 4.0, 0.4
 #: Entries of tables of thresholds, by coverage, and the number of break amounts that are sampled.
 COVERAGE_STEPS, BREAK_LEVELS = 256, 17
 
-#: Side of the sample of noise: in grains, and its bounds in pixels.
-SAMPLE_GRAINS, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS = 64, 320, 768
+#: Side of the sample of noise: in grains, and its least value in pixels.
+SAMPLE_GRAINS, MIN_SAMPLE_PIXELS = 64, 320
+
+#: Largest grain of the sample in pixels. Coarser noise is measured at a smaller scale.
+MAX_SAMPLE_GRAIN = 12.0
 
 #: Bins of the histogram of a sample.
 HISTOGRAM_BINS = 1600
@@ -53,6 +56,10 @@ class NoiseSettings(NamedTuple):
     grain: float
     density: float
     high_pass: float
+
+    def scaled(self, factor: float) -> NoiseSettings:
+        """Return the settings with all lengths multiplied by a factor."""
+        return NoiseSettings(factor * self.grain, self.density, factor * self.high_pass)
 
 
 @dataclass(frozen=True)
@@ -92,6 +99,18 @@ class StreakSettings:
     wobble: float = 0.0
     paper_grain_amplitude: float = 0.0
     surface_paper_grain: NoiseSettings | None = None
+
+    def scaled(self, factor: float) -> StreakSettings:
+        """Return the settings with all lengths multiplied by a factor."""
+        paper = self.surface_paper_grain
+        return replace(
+            self,
+            length=factor * self.length,
+            grain=factor * self.grain,
+            high_pass=factor * self.high_pass,
+            break_length=factor * self.break_length,
+            surface_paper_grain=paper and paper.scaled(factor),
+        )
 
 
 class StreakStatistics(NamedTuple):
@@ -162,7 +181,8 @@ def look_streak_statistics_task(look: Look) -> Task[StreakStatistics]:
 def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
     """Measure the statistics of streaks in a sample of noise."""
     yield Progress(0.0, STEP_LABEL)
-    side = int(np.clip(SAMPLE_GRAINS * settings.grain, MIN_SAMPLE_PIXELS, MAX_SAMPLE_PIXELS))
+    settings = settings.scaled(min(MAX_SAMPLE_GRAIN / settings.grain, 1.0))
+    side = max(int(SAMPLE_GRAINS * settings.grain), MIN_SAMPLE_PIXELS)
     length_pixels = max(round(settings.length), 1)
     width = side + length_pixels
     noise = _noise_sample(

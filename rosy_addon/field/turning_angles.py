@@ -31,6 +31,9 @@ MAX_ATTEMPTS, ANGLE_MARGIN = 8, 0.8
 #: Least angle that is left to add, relative to half the angle between two members.
 MIN_ROOM = 1e-6
 
+#: Least eigenvalue of the matrix of the loops, relative to the largest one. Smaller ones are rounding errors.
+MIN_EIGENVALUE = 1e-8
+
 #: Number of loops up to which their multiples are also changed in pairs.
 MAX_PAIRED_LOOPS = 20
 
@@ -167,9 +170,12 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
     """(m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
 
     The energy is c @ matrix @ c. The nearest multiples are found by rounding, then one by one and in
-    pairs as long as that reduces the energy.
+    pairs as long as that reduces the energy. This ends: the inverse is made positive definite, so that only
+    finitely many multiples have less energy than the first ones.
     """
-    inverse = np.linalg.pinv(matrix, hermitian=True)
+    eigenvalue, vector = np.linalg.eigh((matrix + matrix.T) / 2)
+    largest = max(float(np.abs(eigenvalue).max()), 1e-300)
+    inverse = vector / np.maximum(eigenvalue, MIN_EIGENVALUE * largest) @ vector.T
     multiple = np.rint(-sums / turn)
 
     def energy(multiple: np.ndarray) -> float:

@@ -184,3 +184,11 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
 def test_what_is_not_possible(surface, vertex, index, message):
     with pytest.raises(RosyError, match=message):
         prescribed_field(surface, 4, vertex, index)
+
+
+def test_multiples_of_loops_end_with_a_matrix_of_rounding_errors():
+    # Of a mesh whose faces are far too large for its singularities: the energy had no least value.
+    matrix = np.array([[0.00060347, -0.00141453], [-0.03459111, 0.14504907]])
+    sums = np.array([-25.94447767, 87.74193075])
+    coefficients = turning_angles._nearest_lattice_coefficients(matrix, sums, np.pi / 2)
+    assert np.isfinite(coefficients).all()

@@ -16,6 +16,7 @@ from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.field.singularities import description_task
 from ..rosy_addon.field.surface import Surface, orientation_warning
 from ..rosy_addon.progress import Progress, Task, subtask
+from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE
 from ..rosy_addon.scene.guides import (
     annotation_strokes,
     corner_uvs,
@@ -148,7 +149,8 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     )
     vectors: bpy.props.StringProperty(
         name="Vectors",
-        description="Vector attribute on faces, points or corners that the field follows",
+        description="Vector attribute on faces, points or corners that the field follows. Empty: the guides that "
+        "you have combed",
         search=_search_attributes,
     )
     axis: bpy.props.FloatVectorProperty(
@@ -266,7 +268,12 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         if "UV" in self.guides:
             settings = replace(settings, uv=corner_uvs(mesh, self.uv_map))
         if "ATTRIBUTE" in self.guides:
-            settings = replace(settings, vectors=guide_vectors(mesh, self.vectors))
+            name = self.vectors or GUIDE_ATTRIBUTE
+            settings = replace(
+                settings,
+                vectors=guide_vectors(mesh, name),
+                vectors_have_firmness=name == GUIDE_ATTRIBUTE,
+            )
         return settings
 
     def _first_object(self, context: bpy.types.Context, mesh: bpy.types.Mesh) -> bpy.types.Object:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import bpy
 
+from ..rosy_addon.ui import comb_brush
+from ..rosy_addon.ui.comb_brush import VIEW3D_TOOL_rosy_comb, VIEW3D_TOOL_rosy_comb_sculpt
 from ..rosy_addon.ui.singularity_handles import VIEW3D_TOOL_rosy_singularities
 from ..rosy_addon.viewport import session
 from . import (
@@ -13,6 +15,7 @@ from . import (
     bake_remove,
     bake_show,
     bake_texture,
+    field_comb,
     field_convert,
     field_export,
     field_generate,
@@ -39,6 +42,7 @@ MODULES = (
     field_export,
     singularities,
     field_singularities,
+    field_comb,
     strokes,
     bake_occlusion,
     bake,
@@ -62,14 +66,19 @@ def register() -> None:
     for module in MODULES:
         for cls in module.CLASSES:
             bpy.utils.register_class(cls)
-    bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, separator=True)
+    bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb, separator=True)
+    bpy.utils.register_tool(VIEW3D_TOOL_rosy_singularities, after={VIEW3D_TOOL_rosy_comb.bl_idname})
+    bpy.utils.register_tool(VIEW3D_TOOL_rosy_comb_sculpt, separator=True)
 
 
 def unregister() -> None:
     """Stop the current task and the live view, and unregister the tools and the operators."""
     modal_task.stop_current_job()
     session.stop()
+    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb_sculpt)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
+    bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
+    comb_brush.unregister()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

@@ -56,5 +56,16 @@ def singularities() -> list[tuple[np.ndarray, tuple[int, ...]]]:
     return [*parts, (disc((128.0, 120.0), 19), ORANGE)]
 
 
+def comb() -> list[tuple[np.ndarray, tuple[int, ...]]]:
+    """Lines that bend along a stroke."""
+    x = np.linspace(-88.0, 88.0, 25)
+    parts = []
+    for y, color in ((58.0, WHITE), (6.0, ORANGE), (-46.0, WHITE)):
+        wave = y + 26 * np.sin(x / 56)
+        parts.append((stroke(np.stack([128 + x, 122 + wave], axis=1), 15), color))
+    return parts
+
+
 if __name__ == "__main__":
+    write_icon("comb", comb())
     write_icon("singularities", singularities())

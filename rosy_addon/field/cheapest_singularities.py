@@ -8,18 +8,20 @@ potential of the others and of the curvature. Those with opposite indices vanish
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..errors import RosyError
 from ..progress import Progress, Task, subtask
+from .conjugate_gradient import conjugate_gradient_task
 from .face_graph import LABEL, FaceGraph, face_graph_task
-from .guided import conjugate_gradient_task
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .singularities import singularities_task
 from .smoothest import eigenproblem_task, spectral_shift
-from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task
+from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
 from .surface import Surface, face_area_vectors
 from .turning_angles import least_angles_task, potential_matrix_task
 
@@ -122,7 +124,11 @@ def _settled_task(
         yield Progress(1 - 0.8 * 0.95**step, LABEL)
         charge = unit * (given + added) - graph.defect
         solution = yield from conjugate_gradient_task(
-            matrix, charge[graph.is_interior].astype(np.complex128), TOLERANCE, levels, LABEL
+            matrix,
+            charge[graph.is_interior].astype(np.complex128),
+            TOLERANCE,
+            partial(w_cycle, levels),
+            LABEL,
         )
         energy = float(charge[graph.is_interior] @ solution.real)
         # Those that are still at given singularities have to leave them, whatever it costs.

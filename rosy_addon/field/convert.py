@@ -8,12 +8,12 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
+from .conjugate_gradient import conjugate_gradient_task
 from .connection import connection_task, laplacian_task
 from .curvature import magnitude_task
 from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .guided import conjugate_gradient_task
 from .prescribed import TurningError, change_singularities_task
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree

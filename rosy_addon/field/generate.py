@@ -19,6 +19,7 @@ from .curvature import TINY, curvature_task
 from .form import form_task
 from .frames import normalize, unit_direction
 from .guided import guided_or_smoothest_task
+from .guided_system import firmness_weights
 from .guides import (
     average_guides,
     feature_edges_task,
@@ -88,6 +89,9 @@ class GeneratorSettings:
         For "guided" and "uv": texture coordinates of the corners.
     vectors : (F, 3) float ndarray or None
         For "guided" and "prescribed": a member vector for each face, zero where there is no guide.
+    vectors_have_firmness : bool
+        For "guided": whether the lengths of `vectors` are the firmness of the guides; see
+        `guided_system.firmness_weights`.
     singularities : ((K,) int ndarray, (K,) int ndarray) or None
         For "prescribed": vertices, and their indices in units of 1 / N.
     add_missing : bool
@@ -103,6 +107,7 @@ class GeneratorSettings:
     axis_guides: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
     uv: np.ndarray | None = None
     vectors: np.ndarray | None = None
+    vectors_have_firmness: bool = False
     singularities: tuple[np.ndarray, np.ndarray] | None = None
     add_missing: bool = False
 
@@ -250,10 +255,14 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
     faces = np.tile(np.arange(surface.face_count), len(guide_sets))
     yield Progress(0.0, label)
     guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
-    weight = (
-        (settings.smoothing_length * surface.extent) ** -2 if settings.smoothing_length else None
-    )
-    return (yield from guided_or_smoothest_task(surface, degree, guides, weight))
+    firmness = np.ones(surface.face_count)
+    if settings.vectors is not None and settings.vectors_have_firmness:
+        firmness = np.linalg.norm(settings.vectors, axis=1)
+        for guide in guide_sets[:-1]:
+            firmness[guide.any(axis=1)] = 1.0
+    reach = settings.smoothing_length * surface.extent
+    weight, is_exact = firmness_weights(firmness, surface.mean_edge_length, reach)
+    return (yield from guided_or_smoothest_task(surface, degree, guides, weight, is_exact))
 
 
 def axis_field(

@@ -9,13 +9,15 @@ singularities, tells these multiples; they are improved until they are the neare
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..progress import Progress, Task, subtask
+from .conjugate_gradient import conjugate_gradient_task
 from .face_graph import FaceGraph
-from .guided import conjugate_gradient_task
 from .representation import complex_bincount
-from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task
+from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task, w_cycle
 from .turning_angles import MAX_ATTEMPTS, added_resistance
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
@@ -145,6 +147,6 @@ def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) 
     """Solve a system; see `conjugate_gradient_task`."""
     return (
         yield from conjugate_gradient_task(
-            matrix, rhs.astype(np.complex128), TOLERANCE, levels, LABEL
+            matrix, rhs.astype(np.complex128), TOLERANCE, partial(w_cycle, levels), LABEL
         )
     )

@@ -117,10 +117,7 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
         If no stroke is within `MAX_STROKE_DISTANCE` of the surface, no stroke has a length, or they
         need more than `MAX_STROKE_SAMPLES` samples.
     """
-    corners = surface.vertices[surface.corner_vertex]
-    edge = corners[surface.next_corner] - corners
-    spacing = 0.5 * float(np.sqrt(dot(edge, edge)).mean())
-    spacing = max(spacing, MIN_STROKE_SPACING * surface.extent)
+    spacing = max(0.5 * surface.mean_edge_length, MIN_STROKE_SPACING * surface.extent)
     polylines = [
         polyline
         for stroke in strokes

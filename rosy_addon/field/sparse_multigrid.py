@@ -84,6 +84,40 @@ class CSRMatrix:
         on_diagonal = self.indices == self.row_indices
         return np.bincount(self.row_indices[on_diagonal], self.data[on_diagonal].real, len(self))
 
+    def plus_diagonal(self, values: np.ndarray) -> CSRMatrix:
+        """Return the matrix with (n,) values added to its diagonal, which has an entry in each row."""
+        data = self.data.copy()
+        data[self.diagonal_entries] += values
+        return self.with_values(data)
+
+    @cached_property
+    def diagonal_entries(self) -> np.ndarray:
+        """(n,) intp: the entries on the diagonal, if there is one in each row."""
+        return np.flatnonzero(self.indices == self.row_indices)
+
+    def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
+        """(k,) intp: the entries of (m,) rows, row by row."""
+        count = np.diff(self.indptr)[rows]
+        stop = np.cumsum(count)
+        return np.arange(stop[-1] if len(stop) else 0) + np.repeat(
+            self.indptr[:-1][rows] - stop + count, count
+        )
+
+    def rows(self, rows: np.ndarray) -> CSRMatrix:
+        """Return the (m, n) matrix of (m,) rows."""
+        entries = self.entries_of_rows(rows)
+        indptr = np.concatenate([[0], np.cumsum(np.diff(self.indptr)[rows])])
+        return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
+
+    def columns(self, columns: np.ndarray) -> CSRMatrix:
+        """Return the matrix of (m,) different columns, of which each row must have an entry."""
+        new_column = np.full(self.column_count, -1)
+        new_column[columns] = np.arange(len(columns))
+        kept = np.flatnonzero(new_column[self.indices] >= 0)
+        indptr = np.searchsorted(kept, self.indptr)
+        indices = new_column[self.indices[kept]]
+        return CSRMatrix(indptr, indices, self.data[kept], len(columns))
+
     @cached_property
     def adjoint(self) -> CSRMatrix:
         """The conjugate transpose."""
@@ -250,6 +284,31 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
         adjoint = prolongation.adjoint
         yield Progress(stop, label)
         matrix = yield from subtask(matrix_product_task(adjoint, product), stop, stop, label)
+
+
+def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:
+    """Return multigrid levels for a matrix with other values on its diagonal.
+
+    This is much faster than `hierarchy_task`. Each coarser matrix gets the sum of what is added at the
+    unknowns of its aggregates, which is an upper bound of their Galerkin product.
+
+    Parameters
+    ----------
+    levels : list of Level
+        From `hierarchy_task`.
+    diagonal : (n,) float64 ndarray
+        Values that are added, not negative.
+    """
+    result = []
+    for level in levels:
+        matrix = level.matrix.plus_diagonal(diagonal)
+        inverse = None if level.inverse is None else _dense_inverse(matrix)
+        result.append(Level(matrix, level.prolongation, _jacobi_weights(matrix), inverse))
+        if level.prolongation is not None:
+            p = level.prolongation
+            terms = np.abs(p.data) * diagonal.take(p.row_indices)
+            diagonal = np.bincount(p.indices, terms, p.column_count)
+    return result
 
 
 def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:

@@ -95,6 +95,13 @@ class Surface:
         return float(np.ptp(self.box_corners, axis=0).max())
 
     @cached_property
+    def mean_edge_length(self) -> float:
+        """The mean length of the edges of the faces, in Blender units."""
+        corners = self.vertices[self.corner_vertex]
+        edge = corners[self.next_corner] - corners
+        return float(np.sqrt(dot(edge, edge)).mean())
+
+    @cached_property
     def used_vertices(self) -> np.ndarray:
         """(n,) intp: the vertices that have a face, in ascending order."""
         return _used_vertices(self.corner_vertex, len(self.vertices))

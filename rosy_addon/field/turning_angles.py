@@ -13,13 +13,14 @@ the multiples of least energy are chosen.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..progress import Progress, Task, subtask
+from .conjugate_gradient import conjugate_gradient_task
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest_task
-from .guided import conjugate_gradient_task
-from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task
+from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-10
@@ -112,7 +113,11 @@ def least_angles_task(
         if matrix is None:
             return np.zeros(len(graph.source))
         solution = yield from conjugate_gradient_task(
-            matrix, sums[graph.is_interior].astype(np.complex128), TOLERANCE, levels, LABEL
+            matrix,
+            sums[graph.is_interior].astype(np.complex128),
+            TOLERANCE,
+            partial(w_cycle, levels),
+            LABEL,
         )
         potential = np.zeros(graph.node_count)
         potential[graph.is_interior] = solution.real

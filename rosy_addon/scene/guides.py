@@ -13,7 +13,8 @@ from ..errors import RosyError
 from .compat import is_annotation_in_space, scene_annotation
 from .face_values import read_face_vectors
 from .libraries import check_not_missing
-from .meshes import mesh_label, read_attribute
+from .meshes import mesh_label, mesh_surface, read_attribute
+from .rest_shape import follow_mesh, read_rest_shape
 
 #: Object types that can guide a field: those with strokes, and all.
 STROKE_TYPES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
@@ -171,6 +172,8 @@ def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
 def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 
+    Vectors that RoSy has stored are turned as the faces were turned since.
+
     Returns
     -------
     (F, 3) float64 ndarray
@@ -184,7 +187,9 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         raise RosyError(
             f"{mesh_label(mesh)} has no attribute '{name}' to follow: choose a vector attribute"
         )
-    return read_face_vectors(mesh, name)
+    return follow_mesh(
+        read_rest_shape(mesh, name), read_face_vectors(mesh, name), mesh_surface(mesh)
+    )
 
 
 def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:

@@ -49,7 +49,7 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
         return
     # Only now: a new attribute may move the others in memory.
     mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
-    mesh.attributes[check_name].data.foreach_set("value", _checks(vectors).astype(np.float32))
+    mesh.attributes[check_name].data.foreach_set("value", vector_checks(vectors).astype(np.float32))
 
 
 def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
@@ -99,7 +99,7 @@ def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surf
     first = vectors.reshape(len(vectors), -1, 3)[:, 0]
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.abs(first).max(axis=1)
-        is_stored = np.abs(_checks(first) - checks) <= CHECK_TOLERANCE * length
+        is_stored = np.abs(vector_checks(first) - checks) <= CHECK_TOLERANCE * length
     carried = carried_vectors(surface.in_rest_shape(), stored_positions, vectors)
     is_stored = is_stored.reshape(-1, *(1 for _ in vectors.shape[1:]))
     return np.where(is_stored, carried, vectors)
@@ -115,6 +115,6 @@ def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
     )
 
 
-def _checks(vectors: np.ndarray) -> np.ndarray:
+def vector_checks(vectors: np.ndarray) -> np.ndarray:
     """(F,) float64 checks of (F, 3) vectors."""
     return vectors.astype(np.float64) @ CHECK_COEFFICIENTS

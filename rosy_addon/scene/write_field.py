@@ -20,7 +20,7 @@ from .field_attributes import (
     get_or_create_attribute,
     is_face_vector_field,
 )
-from .meshes import mesh_surface
+from .meshes import mesh_surface, read_attribute
 from .rest_shape import store_rest_shape
 
 #: Name of the attribute of a field that is stored as angles.
@@ -130,6 +130,28 @@ def _store(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> bpy.
             mesh.rosy.attribute = name
     mesh.update()
     return attribute
+
+
+def overwrite_vectors(mesh: bpy.types.Mesh, vectors: np.ndarray) -> np.ndarray:
+    """Replace the vectors of a field that is stored as one vector on each face, without any check.
+
+    For changes that are shown while they are made. `write_mesh_field` stores the result.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    vectors : (F, 3) ndarray
+
+    Returns
+    -------
+    (F, 3) float32 ndarray
+        The vectors before.
+    """
+    name = attribute_name(mesh)
+    before = read_attribute(mesh, name, np.float32, 3)
+    mesh.attributes[name].data.foreach_set("vector", vectors.astype(np.float32).ravel())
+    mesh.update()
+    return before
 
 
 def _check_storable(mesh: bpy.types.Mesh, field: RosyField, name: str, form: str) -> None:

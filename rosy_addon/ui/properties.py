@@ -234,10 +234,33 @@ def _show_backdrops(settings: RosyScene, _context: bpy.types.Context) -> None:
     update_backdrops(settings.id_data)
 
 
+class RosyComb(bpy.types.PropertyGroup):
+    """The brush of the tool *Comb Field*."""
+
+    size: bpy.props.IntProperty(
+        name="Size",
+        description="Radius of the brush on screen",
+        subtype="PIXEL",
+        min=1,
+        max=2000,
+        soft_max=500,
+        default=50,
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How much of its effect the brush has",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        default=1.0,
+    )
+
+
 class RosyScene(bpy.types.PropertyGroup):
     """How the fields of a scene are drawn, and the baked pictures."""
 
     look: bpy.props.PointerProperty(type=RosyLook)
+    comb: bpy.props.PointerProperty(type=RosyComb)
     preset: bpy.props.EnumProperty(
         name="Preset",
         description="Preset of the look",
@@ -406,6 +429,7 @@ class RosyObject(bpy.types.PropertyGroup):
 
 CLASSES = (
     RosyLook,
+    RosyComb,
     RosyFrameState,
     RosyBake,
     RosyProjection,

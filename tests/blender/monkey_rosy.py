@@ -150,6 +150,31 @@ def move_singularity(monkey):
     )
 
 
+@action(0.8, uses_rosy=True)
+def comb(monkey):
+    obj = select_mesh(monkey)
+    vertices = obj.data.vertices if obj is not None else ()
+    stroke = [
+        {
+            "name": "",
+            "location": tuple(monkey.pick(list(vertices)).co) if len(vertices) else (0.0, 0.0, 0.0),
+            "pressure": monkey.pick([0.0, 0.5, 1.0]),
+            "is_start": monkey.pick([False, False, True]),
+        }
+        for _ in range(monkey.random.randrange(6))
+    ]
+    monkey.rosy(
+        "field_comb",
+        stroke=stroke,
+        effect=monkey.pick(["COMB", "COMB", "ERASE", "SMOOTH"]),
+        radius=monkey.pick([1e-6, 0.2, 1.0, 1e6]),
+        exact=monkey.pick([False, True]),
+        front_faces=monkey.pick([False, True]),
+        mirror=[monkey.pick([False, True]) for _ in range(3)],
+        reach=monkey.pick([0.0, 0.1, 10.0]),
+    )
+
+
 @action(0.7, uses_rosy=True)
 def occlusion(monkey):
     prepare(monkey)

@@ -313,6 +313,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_generate": _FIELD,
     "field_convert": _FIELD,
     "field_singularities": _FIELD,
+    "field_comb": (*_FIELD, "meshes/SELECTED/attributes/*rosy_guides*"),
     "field_store": _FIELD,
     "field_import": _FIELD,
     "field_export": (),

@@ -404,6 +404,106 @@ def names_of_readable_field(obj):
     return obj.data.attributes.keys()
 
 
+# --- combing ---------------------------------------------------------------------------------
+
+
+def stroke_of(points, pressure=1.0):
+    return [
+        {"name": "", "location": tuple(point), "pressure": pressure, "is_start": False}
+        for point in points
+    ]
+
+
+def arc(start, stop, height=0.0):
+    """Points of a unit sphere."""
+    angle = np.linspace(start, stop, 40)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    return np.sqrt(1 - height**2) * ring + [0, 0, height]
+
+
+def test_combed_field_runs_along_the_stroke_and_is_made_again_from_its_guides(scene):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
+    mesh = bpy.context.object.data
+    bpy.ops.rosy.field_generate(kind="axis", axis=(1.0, 1.0, 1.0), degree=2)
+    assert bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.15) == {"FINISHED"}
+    center = np.array([face.center for face in mesh.polygons])
+    azimuth = np.arctan2(center[:, 1], center[:, 0])
+    is_near = (np.abs(center[:, 2]) < 0.03) & (azimuth > 0.1) & (azimuth < 0.9)
+    along = np.stack([-np.sin(azimuth), np.cos(azimuth), 0 * azimuth], axis=1)
+
+    def deviation():
+        vectors = member_vectors(mesh)
+        cosine = np.abs((vectors * along).sum(axis=1)) / np.linalg.norm(vectors, axis=1)
+        return np.degrees(np.arccos(np.clip(cosine, 0, 1)))[is_near].max()
+
+    assert deviation() < 3.0
+    combed = member_vectors(mesh)
+    guides = np.linalg.norm(member_vectors(mesh, "rosy_guides"), axis=1)
+    assert guides[is_near].min() > 0.9 and guides.max() <= 1.0
+    # The guides make the same field again, but for its magnitude.
+    assert bpy.ops.rosy.field_generate(kind="guided", guides={"ATTRIBUTE"}, degree=2) == {
+        "FINISHED"
+    }
+    again = member_vectors(mesh)
+    scale = np.linalg.norm(combed, axis=1)
+    cosine = np.abs((combed * again).sum(axis=1))[scale > 0.1] / scale[scale > 0.1]
+    assert cosine.min() > 0.9999
+    assert bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.15, exact=True) == {
+        "FINISHED"
+    }
+    assert deviation() < 0.5
+
+
+def test_combing_goes_on_where_something_else_has_changed_the_field(scene):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    mesh = bpy.context.object.data
+    bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.3)
+    bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    new = member_vectors(mesh)
+    # Far from the first stroke: its guides are of a field that was replaced.
+    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(3.0, 4.0)), radius=0.1, reach=0.02)
+    center = np.array([face.center for face in mesh.polygons])
+    is_first = (np.abs(center[:, 2]) < 0.1) & (
+        np.abs(np.arctan2(center[:, 1], center[:, 0]) - 0.5) < 0.3
+    )
+    assert is_first.any()
+    cosine = np.abs((new * member_vectors(mesh)).sum(axis=1)) / np.linalg.norm(new, axis=1) ** 2
+    assert cosine[is_first].min() > 0.999
+
+
+def test_combing_a_posed_object_stores_the_rest_shape(scene):
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    sphere = bpy.context.object
+    stroke = stroke_of(arc(0.0, 1.0))
+    bpy.ops.rosy.field_comb(stroke=stroke, radius=0.2)
+    expected = member_vectors(sphere.data, "rosy_guides")
+    bpy.ops.object.transform_apply()
+    sphere.rotation_euler = (0.3, 0.4, 0.5)
+    sphere.modifiers.new("Bend", "SIMPLE_DEFORM").angle = 1.0
+    sphere.data.attributes.remove(sphere.data.attributes["rosy_guides"])
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    bpy.ops.rosy.field_comb(stroke=stroke, radius=0.2)
+    assert member_vectors(sphere.data, "rosy_guides") == pytest.approx(expected, abs=1e-5)
+
+
+def test_errors_of_combing(suzanne):
+    stroke = stroke_of([(0.0, 0.0, 0.0)])
+    assert "has no field" in error_of(bpy.ops.rosy.field_comb, stroke=stroke)
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    assert "The stroke has no points" in error_of(bpy.ops.rosy.field_comb)
+    mesh = suzanne.data
+    mesh.attributes.new("rosy_guides", "FLOAT", "POINT")
+    before = contents()
+    message = error_of(bpy.ops.rosy.field_comb, stroke=stroke)
+    assert "already has an attribute 'rosy_guides' of another type" in message
+    assert contents() == before
+    mesh.attributes.remove(mesh.attributes["rosy_guides"])
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert "Object Mode or Sculpt Mode" in error_of(bpy.ops.rosy.field_comb, stroke=stroke)
+
+
 # --- singularities ---------------------------------------------------------------------------
 
 

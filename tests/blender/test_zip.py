@@ -22,7 +22,7 @@ PRESETS = "rosy_addon/presets/shipped/"
 SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt", "dat"}
 
 #: Modules that come with Blender.
-BLENDER_MODULES = {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
+BLENDER_MODULES = {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf", "numpy"}
 
 #: Modules of Python that are turned down: threads crash Blender, and RoSy uses no network, installs
 #: nothing and loads no code.
@@ -46,6 +46,7 @@ FILES_WITH_PATHS = {
     "presets/store.py": "presets",
     "rendering/band_workers.py": "the code of the workers",
     "scene/video.py": "the script that encodes videos",
+    "ui/comb_brush.py": "the icon of the tool",
     "ui/singularity_handles.py": "the icon of the tool",
 }
 

@@ -733,6 +733,77 @@ def singularities_dragged_with_the_tool():
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
 
 
+def field_combed_with_the_tool():
+    """Comb with modifiers, undo, redo, replay the stroke from a script; in Object Mode and in Sculpt Mode."""
+    for mode in ("OBJECT", "SCULPT"):
+        yield from fresh_scene()
+        with in_view():
+            bpy.ops.object.select_all(action="SELECT")
+            bpy.ops.object.delete()
+            bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+            bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+            bpy.context.object.modifiers.new("Wave", "CAST").factor = -0.2
+            bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+            bpy.ops.object.mode_set(mode=mode)
+            bpy.ops.view3d.view_axis(type="FRONT")
+            bpy.ops.view3d.view_selected()
+            name = "rosy.comb_tool" if mode == "OBJECT" else "rosy.comb_sculpt_tool"
+            bpy.ops.wm.tool_set_by_id(name=name)
+            bpy.ops.ed.undo_push(message="Before the stroke")
+        yield 1.0  # for a smooth view
+        before = field_bytes()
+        yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
+        yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)
+        combed = field_bytes()
+        assert combed != before
+        operator = bpy.context.window_manager.operators[-1]
+        assert operator.bl_idname == "ROSY_OT_field_comb", operator.bl_idname
+        stroke = [
+            {
+                "name": "",
+                "location": tuple(point.location),
+                "pressure": point.pressure,
+                "is_start": point.is_start,
+            }
+            for point in operator.stroke
+        ]
+        settings = {"radius": operator.radius, "strength": operator.strength}
+        with in_view():
+            bpy.ops.ed.undo()
+        yield 0.3
+        assert field_bytes() == before
+        assert "rosy_guides" not in bpy.context.object.data.attributes
+        with in_view():
+            bpy.ops.ed.redo()
+        yield 0.3
+        assert field_bytes() == combed
+        with in_view():
+            bpy.ops.ed.undo()
+            yield 0.3
+        with in_view():
+            bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, **settings)
+        assert field_bytes() == combed
+        # ESC takes a stroke back.
+        yield from move_mouse((-0.4, -0.9, -0.2), "LEFTMOUSE", "PRESS")
+        yield from move_mouse((0.3, -0.9, -0.3))
+        assert field_bytes() != combed
+        yield from move_mouse((0.3, -0.9, -0.3), "ESC", "PRESS")
+        assert field_bytes() == combed
+        with in_view():
+            bpy.ops.wm.tool_set_by_id(
+                name="builtin.select_box" if mode == "OBJECT" else "builtin.brush"
+            )
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def field_bytes():
+    """Return the vectors of the active object's field."""
+    attribute = bpy.context.object.data.attributes["rosy"]
+    vectors = np.empty(3 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("vector", vectors)
+    return vectors.tobytes()
+
+
 def shown_singularities():
     """Return the indices of the sphere's singularities that the overlay shows, by their vertices."""
     shown = rosy("rosy_addon.ui.overlay").shown("Sphere")
@@ -773,6 +844,7 @@ run_steps(
     singularities_as_dots,
     no_singularities_to_show,
     singularities_dragged_with_the_tool,
+    field_combed_with_the_tool,
     bake_with_progress,
     panel_with_picture,
     panel_out_of_date,

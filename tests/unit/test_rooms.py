@@ -60,6 +60,7 @@ MAY_IMPORT = {
         "presets",
     },
     "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
+    "comb_field": BASE_ROOMS | {"field", "scene", "cache"},
     "bake_texture": BASE_ROOMS | {"compositor", "surface_texture", "scene", "image_io", "cache"},
     "animation": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu", "cache"},
     "viewport": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu"},
@@ -141,7 +142,17 @@ NUMPY_ROOMS = (
 
 #: What may use Blender everywhere.
 BLENDER_ROOMS = (
-    *("scene", "ui", "bake", "bake_texture", "draw_strokes", "viewport", "cli", "animation"),
+    *(
+        "scene",
+        "ui",
+        "bake",
+        "bake_texture",
+        "comb_field",
+        "draw_strokes",
+        "viewport",
+        "cli",
+        "animation",
+    ),
 )
 
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
@@ -182,7 +193,7 @@ def test_imports_run_one_way(path):
     assert rooms <= MAY_IMPORT[room]
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in BLENDER_ROOMS:
-        allowed |= {"bpy", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
+        allowed |= {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room in ("external", "extras"):

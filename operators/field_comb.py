@@ -1,0 +1,235 @@
+"""Operator: comb a field along a stroke, with the mouse in the 3D view or from a script."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ..rosy_addon.comb_field import CombStroke, comb_stroke_task
+from ..rosy_addon.errors import REPORTED_ERRORS, RosyError
+from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
+from ..rosy_addon.progress import Task, run_to_completion, subtask
+from ..rosy_addon.ui import comb_brush, overlay
+from .modal_task import Job, ModalTaskMixin
+from .poll import poll_active_field, poll_idle, selected_mesh_objects
+from .reports import report_error
+
+#: Modes of the view in which the field can be combed.
+MODES = ("OBJECT", "SCULPT")
+
+
+class RosyStrokePoint(bpy.types.PropertyGroup):
+    """A point of a stroke."""
+
+    location: bpy.props.FloatVectorProperty(
+        name="Location",
+        description="Place on the mesh without modifiers, in object space",
+        subtype="XYZ",
+    )
+    pressure: bpy.props.FloatProperty(
+        name="Pressure", description="Pressure of the pen", min=0.0, max=1.0, default=1.0
+    )
+    is_start: bpy.props.BoolProperty(
+        name="Start",
+        description="Whether another line begins here, as after the pen has left the mesh",
+    )
+
+
+class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
+    """Turn the field of the active mesh along a stroke, and keep the stroke as guides on the mesh"""
+
+    bl_idname = "rosy.field_comb"
+    bl_label = "Comb Field"
+    bl_options = {"REGISTER", "UNDO"}
+
+    stroke: bpy.props.CollectionProperty(
+        type=RosyStrokePoint,
+        name="Stroke",
+        description="The points of the stroke",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    effect: bpy.props.EnumProperty(
+        name="Effect",
+        description="What the brush does",
+        items=[(name.upper(), name.capitalize(), text) for name, text in EFFECTS.items()],
+    )
+    radius: bpy.props.FloatProperty(
+        name="Radius",
+        description="Radius of the brush",
+        subtype="DISTANCE",
+        min=1e-6,
+        soft_max=10.0,
+        default=0.2,
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How much of its effect the brush has",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        default=1.0,
+    )
+    exact: bpy.props.BoolProperty(
+        name="Exact",
+        description="Let the field follow the stroke exactly, in the whole radius",
+    )
+    front_faces: bpy.props.BoolProperty(
+        name="Front Faces Only",
+        description="Leave out faces that are turned away from those under the brush",
+        default=True,
+    )
+    mirror: bpy.props.BoolVectorProperty(
+        name="Mirror",
+        description="Repeat the stroke on the other side along each axis of the object",
+        subtype="XYZ",
+    )
+    reach: bpy.props.FloatProperty(
+        name="Reach",
+        description="Distance from the stroke at which the field stays what it is, as a fraction of the size of the "
+        "mesh, when the mesh has no guides yet",
+        min=0.0,
+        max=10.0,
+        soft_max=0.5,
+        precision=3,
+        step=1,
+        default=0.1,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not poll_idle(cls):
+            return False
+        if context.mode not in MODES:
+            cls.poll_message_set("Switch to Object Mode or Sculpt Mode first")
+            return False
+        return poll_active_field(cls, context)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return [selected_mesh_objects(context)[0].data]
+
+    def make_task(self, context: bpy.types.Context) -> Task[None]:
+        """Draw the whole stroke."""
+        if not len(self.stroke):
+            raise RosyError("the stroke has no points: give some, or drag in the 3D view")
+        line = yield from subtask(self._stroke_task(context), 0.0, 0.4)
+        for point in self.stroke:
+            if point.is_start:
+                line.lift()
+            line.extend(np.array([point.location]), np.array([point.pressure]))
+        line.lift()
+        yield from subtask(self._settle_task(context, line), 0.4, 1.0)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if len(self.stroke) or context.region_data is None:
+            return super().invoke(context, event)
+        obj = selected_mesh_objects(context)[0]
+        mouse = event.mouse_region_x, event.mouse_region_y
+        try:
+            self._mouse = comb_brush.start_stroke(context, obj)
+            place = self._mouse.place(mouse)
+            if place is None:
+                comb_brush.end_stroke()
+                return {"CANCELLED", "PASS_THROUGH"}
+            comb = context.scene.rosy.comb
+            self.radius, self.strength = self._mouse.radius(place, comb.size), comb.strength
+            self._line: CombStroke = run_to_completion(self._stroke_task(context))
+        except REPORTED_ERRORS as error:
+            comb_brush.end_stroke()
+            return report_error(self, error)
+        self._is_away = False
+        self._add(mouse, event.pressure)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self._job is None:
+            result = self._drag(context, event)
+            if result != {"RUNNING_MODAL"} or self._job is not None:
+                comb_brush.end_stroke()
+            return result
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            # The next stroke begins: settle at once.
+            return self._settle_now(context) | {"PASS_THROUGH"}
+        result = super().modal(context, event)
+        if result == {"CANCELLED"} and self._job.stop_reason == "cancelled":
+            self._line.restore()
+        return result
+
+    def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Handle an event while the mouse button is down."""
+        try:
+            if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
+                has_changed = self._add(
+                    (event.mouse_region_x, event.mouse_region_y), event.pressure
+                )
+                if has_changed and event.type == "MOUSEMOVE":
+                    self._line.show()
+            elif event.type in {"ESC", "RIGHTMOUSE"}:
+                self._line.restore()
+                return {"CANCELLED"}
+            elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+                self._line.lift()
+                self._line.show()
+                self._job = Job(context, self._settle_task(context, self._line), [self._line.mesh])
+        except REPORTED_ERRORS as error:
+            self._line.restore()
+            return report_error(self, error)
+        except ReferenceError:
+            return {"CANCELLED"}
+        return {"RUNNING_MODAL"}
+
+    def _add(self, mouse: tuple[int, int], pressure: float) -> bool:
+        """Go on to a place under the mouse. Return whether the field has changed."""
+        place = self._mouse.place(mouse)
+        if place is None:
+            self._is_away = True
+            return self._line.lift()
+        point = self.stroke.add()
+        point.location, point.pressure = place, pressure
+        point.is_start = len(self.stroke) > 1 and self._is_away
+        self._is_away = False
+        return self._line.extend(np.array([point.location]), np.array([point.pressure]))
+
+    def _stroke_task(self, context: bpy.types.Context) -> Task[CombStroke]:
+        brush = GuideBrush(
+            self.radius,
+            self.strength,
+            self.effect.lower(),
+            self.exact,
+            self.front_faces,
+            self.mirror,
+        )
+        (mesh,) = self.required_data(context)
+        return comb_stroke_task(mesh, brush, self.reach)
+
+    def _settle_task(self, context: bpy.types.Context, line: CombStroke) -> Task[None]:
+        """Solve for the whole field, and store it."""
+        yield from line.settle_task()
+        field = line.store()
+        overlay.refresh(context, {line.mesh: field})
+
+    def _settle_now(self, context: bpy.types.Context) -> set[str]:
+        """Run the rest of the job. Return the result of the operator."""
+        try:
+            run_to_completion(self._job.task)
+            self._job.stop("done")
+        except REPORTED_ERRORS as error:
+            return report_error(self, error)
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Stop. Blender calls this if the window is closed or a file is opened."""
+        comb_brush.end_stroke()
+        super().cancel(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        comb_brush.draw_settings(layout, self)
+        layout.prop(self, "radius")
+
+
+CLASSES = (RosyStrokePoint, ROSY_OT_field_comb)

@@ -1,0 +1,125 @@
+"""The job of combing: read a mesh's field and guides, change them along a stroke, and store them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from .cache import BAKE_CACHE
+from .field.combing import Combing, start_combing
+from .field.guide_brush import BrushStroke, GuideBrush
+from .field.guided_system import GuidedSystem, guided_system_task
+from .field.rosy_field import RosyField
+from .field.surface import Surface
+from .progress import Progress, Task, subtask
+from .scene.brush_surface import closest_faces
+from .scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
+from .scene.field_attributes import is_face_vector_field
+from .scene.meshes import mesh_surface_task
+from .scene.read_field import read_mesh_field
+from .scene.write_field import assign_fields, check_writable, overwrite_vectors
+
+
+class CombStroke:
+    """A stroke that is being drawn; made by `comb_stroke_task`.
+
+    Attributes
+    ----------
+    mesh : bpy.types.Mesh
+    surface : Surface
+    field : RosyField
+        Before the stroke.
+    """
+
+    def __init__(
+        self,
+        mesh: bpy.types.Mesh,
+        surface: Surface,
+        field: RosyField,
+        combing: Combing,
+        stroke: BrushStroke,
+    ) -> None:
+        self.mesh = mesh
+        self.surface = surface
+        self.field = field
+        self._combing = combing
+        self._stroke = stroke
+        self._vectors_before: np.ndarray | None = None
+
+    def extend(self, points: np.ndarray, pressure: np.ndarray) -> bool:
+        """Go on to (n, 3) places on the surface at rest, with (n,) pressures. Return whether the field has changed."""
+        return self._follow(self._stroke.extend(points, pressure))
+
+    def lift(self) -> bool:
+        """End the line, so that the next point begins another one. Return whether the field has changed."""
+        return self._follow(self._stroke.finish())
+
+    def _follow(self, face: np.ndarray) -> bool:
+        self._combing.follow(face)
+        return len(face) > 0
+
+    def show(self) -> None:
+        """Write the present field to the mesh, without its guides.
+
+        Fields that are not stored as one vector on each face are shown when they are stored.
+        """
+        if not is_face_vector_field(self.mesh):
+            return
+        before = overwrite_vectors(self.mesh, self._combing.vectors)
+        if self._vectors_before is None:
+            self._vectors_before = before
+
+    def settle_task(self) -> Task[None]:
+        """Solve for the whole field."""
+        return self._combing.settle_task()
+
+    def store(self) -> RosyField:
+        """Store the field and its guides. Return the field."""
+        field = RosyField(self.field.degree, self._combing.vectors)
+        assign_fields({self.mesh: field})
+        store_combed_guides(self.mesh, self._combing.guide_vectors)
+        return field
+
+    def restore(self) -> None:
+        """Take back what `show` has changed."""
+        if self._vectors_before is not None:
+            overwrite_vectors(self.mesh, self._vectors_before)
+
+
+def comb_stroke_task(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> Task[CombStroke]:
+    """Prepare a stroke.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    brush : GuideBrush
+    reach : float
+        Distance from the strokes at which the field stays what it is, relative to `Surface.extent`.
+
+    Raises
+    ------
+    RosyError
+        If the mesh cannot be changed, its field cannot be read or is not a RoSy, or an attribute with the name
+        of the guides has another type.
+    """
+    check_writable(mesh)
+    check_guides_storable(mesh)
+    surface = yield from subtask(mesh_surface_task(mesh, cache=BAKE_CACHE), 0.0, 0.3)
+    yield Progress(0.3, "reading the field")
+    field = read_mesh_field(mesh, surface=surface, cache=BAKE_CACHE)
+    degree = field.degree
+
+    def create_task() -> Task[GuidedSystem]:
+        return guided_system_task(surface, degree)
+
+    key = "guided system", surface, degree
+    system = yield from subtask(BAKE_CACHE.get_or_create_task(key, create_task), 0.3, 0.9)
+    yield Progress(0.9, "reading the guides")
+    guides = read_combed_guides(mesh, surface)
+    combing = start_combing(system, field, guides, reach * surface.extent)
+    locate = closest_faces(mesh, surface, BAKE_CACHE)
+    stroke = BrushStroke(system, combing.guides, brush, locate)
+    BAKE_CACHE.evict_over_limit()
+    return CombStroke(mesh, surface, replace(field, source_directions=None), combing, stroke)

@@ -1,0 +1,144 @@
+"""A field that follows its guides while a brush changes them.
+
+The field is at all times a solution of the system of its guides: near the brush at once, and everywhere
+after `Combing.settle_task`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task, run_to_completion, subtask
+from .conjugate_gradient import RELATIVE_TOLERANCE
+from .convert import check_rosy
+from .guided import unit_representations
+from .guided_system import EXACT_FIRMNESS, GuidedSystem, NodeGuides, firmness_weights
+from .representation import from_representation, to_representation
+from .rosy_field import RosyField
+
+#: Nodes around changed guides that are solved at once, and the iterations of the solver.
+NEAR_NODES, NEAR_ITERATIONS = 3000, 30
+
+
+class Combing:
+    """A field and its guides; made by `start_combing`.
+
+    Attributes
+    ----------
+    system : GuidedSystem
+    guides : (F,) complex128 ndarray
+        Representations of the guides, whose moduli are their firmness. Call `follow` after a change.
+    magnitude : (F,) float64 ndarray
+        Of the field.
+    """
+
+    def __init__(
+        self, system: GuidedSystem, guides: np.ndarray, start: np.ndarray, magnitude: np.ndarray
+    ) -> None:
+        self.system = system
+        self.guides = guides
+        self.magnitude = magnitude
+        self._node_guides: NodeGuides | None = None
+        self._z = start
+        self._face_z = unit_representations(system.face_representations(start))
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """(F, 3) float64: the field."""
+        return from_representation(
+            self.magnitude * self._face_z, self.system.x, self.system.y, self.system.degree
+        )
+
+    @property
+    def guide_vectors(self) -> np.ndarray:
+        """(F, 3) float64: member vectors of the guides, whose lengths are their firmness."""
+        return from_representation(self.guides, self.system.x, self.system.y, self.system.degree)
+
+    def follow(self, face: np.ndarray) -> None:
+        """Let the field follow changed guides on (m,) faces, near them."""
+        if not len(face):
+            return
+        node = self.system.nodes_of_faces(face)
+        self._update_node_guides(node)
+        near = self.system.nodes_near(node, NEAR_NODES)
+        self._z[near] = self.system.solve_near(self._node_guides, self._z, near, NEAR_ITERATIONS)
+        corner = self.system.corners_of_nodes(near)
+        changed = np.unique(self.system.surface.triangle_face[corner // 3])
+        self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
+
+    def settle_task(self, tolerance: float = RELATIVE_TOLERANCE) -> Task[None]:
+        """Solve the whole system. Without any guide, the field stays."""
+        if not self.guides.any():
+            return
+        task = self._node_guides_task()
+        self._node_guides = yield from subtask(task, 0.0, 0.1)
+        task = self.system.solve_task(self._node_guides, self._z, tolerance)
+        self._z = yield from subtask(task, 0.1, 0.95)
+        yield Progress(0.95, "averaging the field on the faces")
+        self._set_face_z(self.system.face_representations(self._z), np.arange(len(self.guides)))
+
+    def _update_node_guides(self, node: np.ndarray) -> None:
+        """Bring the guides at nodes up to date."""
+        if self._node_guides is None:
+            self._node_guides = run_to_completion(self._node_guides_task())
+            return
+        corner = self.system.corners_of_nodes(node)
+        new = run_to_completion(self._node_guides_task(corner))
+        for name, values in vars(new).items():
+            getattr(self._node_guides, name)[node] = values[node]
+
+    def _node_guides_task(self, corner: np.ndarray | slice = slice(None)) -> Task[NodeGuides]:
+        firmness = np.abs(self.guides)
+        target = np.divide(
+            self.guides, firmness, out=np.zeros_like(self.guides), where=firmness > 0
+        )
+        edge_length = self.system.surface.mean_edge_length
+        weight, is_exact = firmness_weights(firmness, edge_length)
+        return self.system.node_guides_task(target, weight, is_exact, corner)
+
+    def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
+        """Set the field from its representations on (m,) faces."""
+        z = unit_representations(z)
+        guides = self.guides[face]
+        is_exact = np.abs(guides) >= EXACT_FIRMNESS
+        z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
+        self._face_z[face] = z
+
+
+def start_combing(
+    system: GuidedSystem, field: RosyField, guide_vectors: np.ndarray, reach: float
+) -> Combing:
+    """Prepare a field for combing.
+
+    Parameters
+    ----------
+    system : GuidedSystem
+        Of the surface and the degree of the field.
+    field : RosyField
+        A RoSy.
+    guide_vectors : (F, 3) ndarray
+        Member vectors whose lengths are the firmness of guides. On faces without a guide, the field itself
+        becomes a weak one, so that it stays what it is away from the strokes.
+    reach : float
+        Distance from the strokes at which a field that had no guides is what it was. Object space.
+
+    Raises
+    ------
+    RosyError
+        If the directions are not a RoSy, or the field is undefined everywhere.
+    """
+    surface, degree = system.surface, system.degree
+    check_rosy(surface, field)
+    z = to_representation(field.vectors, system.x, system.y, degree)
+    magnitude = np.abs(z)
+    if not magnitude.any():
+        raise RosyError(f"{surface.name}: its field is undefined everywhere: make a field first")
+    unit_z = np.divide(z, magnitude, out=np.zeros_like(z), where=magnitude > 0)
+    guides = to_representation(guide_vectors, system.x, system.y, degree)
+    guides /= np.maximum(np.abs(guides), 1)
+    weak_guides = unit_z / (1 + (reach / surface.mean_edge_length) ** 2)
+    guides = np.where(guides == 0, weak_guides, guides)
+    return Combing(
+        system, guides, system.node_means(unit_z), np.where(magnitude > 0, magnitude, 1.0)
+    )

@@ -1,0 +1,100 @@
+"""Conjugate gradients for sparse Hermitian matrices, preconditioned by multigrid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from ..progress import Progress, Task, subtask
+from .sparse_multigrid import CSRMatrix, hierarchy_task, w_cycle
+
+#: Residual norm relative to that of the right-hand side at which the iteration stops, by default.
+RELATIVE_TOLERANCE = 1e-9
+MAX_ITERATIONS = 400
+
+
+def conjugate_gradient_task(
+    matrix: CSRMatrix,
+    rhs: np.ndarray,
+    tolerance: float = RELATIVE_TOLERANCE,
+    precondition: Callable[[np.ndarray], np.ndarray] | None = None,
+    label: str = "solving a linear system",
+    start: np.ndarray | None = None,
+    is_fixed: np.ndarray | None = None,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Task[np.ndarray]:
+    """Solve ``matrix @ solution = rhs`` by preconditioned conjugate gradients.
+
+    Parameters
+    ----------
+    matrix : CSRMatrix
+        (n, n), Hermitian and positive definite.
+    rhs : (n,) complex ndarray
+    tolerance : float
+        Residual norm relative to that of `rhs` at which the iteration stops.
+    precondition : callable, optional
+        Applies an approximate inverse of the matrix, Hermitian and positive definite, to a vector. A W-cycle
+        of multigrid by default.
+    label : str
+        Of the progress.
+    start : (n,) complex ndarray, optional
+        First approximation; 0 by default.
+    is_fixed : (n,) bool ndarray, optional
+        Unknowns that keep the values of `start`. Their equations are left out.
+    max_iterations : int
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    (n,) complex ndarray
+        The last iterate.
+    """
+    if precondition is None:
+        levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
+        precondition = partial(w_cycle, levels)
+    if start is None:
+        solution, residual = np.zeros_like(rhs), rhs.copy()
+    else:
+        solution, residual = start.copy(), rhs - matrix @ start
+    norm = _norm(rhs)
+    if is_fixed is not None and is_fixed.any():
+        residual[is_fixed] = 0
+        known_terms = rhs - matrix @ np.where(is_fixed, solution, 0)
+        norm = _norm(known_terms[~is_fixed])
+    else:
+        is_fixed = None
+    direction, previous = None, 1.0
+    for iteration in range(max_iterations):
+        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), label)
+        if _norm(residual) <= tolerance * norm:
+            break
+        preconditioned = precondition(residual)
+        if is_fixed is not None:
+            preconditioned[is_fixed] = 0
+        current = _real_inner_product(residual, preconditioned)
+        direction = (
+            preconditioned if direction is None else preconditioned + current / previous * direction
+        )
+        image = matrix @ direction
+        if is_fixed is not None:
+            image[is_fixed] = 0
+        step = current / _real_inner_product(direction, image)
+        solution += step * direction
+        residual -= step * image
+        previous = current
+    return solution
+
+
+def _norm(vector: np.ndarray) -> float:
+    """The Euclidean norm."""
+    return float(np.sqrt(_real_inner_product(vector, vector)))
+
+
+def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
+    """The real part of the inner product a* b."""
+    return float(np.sum(a.real * b.real) + np.sum(a.imag * b.imag))

@@ -1,0 +1,318 @@
+"""The linear system of a smooth field that follows guides.
+
+The field minimizes its Dirichlet energy plus a penalty for the difference from the guides, as by
+Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013, section 4. The weight of the penalty may vary
+between faces. Hard guides are constraints instead of penalties.
+
+The system of a surface is kept while its guides change: they only add to the diagonal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+
+import numpy as np
+
+from ..progress import Progress, Task, run_to_completion, subtask
+from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient_task
+from .connection import Connection, connection_task, laplacian_task
+from .representation import complex_bincount, face_frames
+from .smoothest import corner_frame_angles, node_sum_per_face
+from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy_task, w_cycle
+from .surface import Surface
+
+#: Residual norm, relative to that of the right-hand side, at which a solution near some nodes stops.
+NEAR_TOLERANCE = 1e-4
+
+#: Guides of at least this firmness are followed exactly; less than 1, for rounding errors of stored ones.
+EXACT_FIRMNESS = 1 - 1e-4
+
+#: Added to the diagonal of the Laplacian, relative to it, so that the system is regular on connected
+#: components without a guide.
+REGULAR_SHIFT = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class NodeGuides:
+    """Guides at the n nodes.
+
+    Attributes
+    ----------
+    penalty : (n,) float64 ndarray
+        Weights of the guides.
+    rhs : (n,) complex128 ndarray
+        Representations of the guides times their weights.
+    is_fixed : (n,) bool ndarray
+        Nodes of faces with hard guides.
+    fixed : (n,) complex128 ndarray
+        Representations of modulus 1 at these nodes; 0 at the other ones.
+    """
+
+    penalty: np.ndarray
+    rhs: np.ndarray
+    is_fixed: np.ndarray
+    fixed: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class GuidedSystem:
+    """What the guides of a surface do not change.
+
+    Attributes
+    ----------
+    surface : Surface
+    degree : int
+    x, y : (F, 3) float64 ndarray
+        `face_frames` of the surface.
+    connection : Connection
+    frame_angle : (3 T,) float64 ndarray
+        `corner_frame_angles`.
+    laplacian : (n, n) CSRMatrix
+    levels : list of Level
+        Of `laplacian`. Empty until a first solution.
+    """
+
+    surface: Surface
+    degree: int
+    x: np.ndarray
+    y: np.ndarray
+    connection: Connection
+    frame_angle: np.ndarray
+    laplacian: CSRMatrix
+    levels: list[Level] = field(default_factory=list)
+
+    def node_guides_task(
+        self,
+        target: np.ndarray,
+        weight: np.ndarray,
+        is_hard: np.ndarray,
+        corner: np.ndarray | slice = slice(None),
+    ) -> Task[NodeGuides]:
+        """Average guides on the faces at the nodes.
+
+        Parameters
+        ----------
+        target : (F,) complex128 ndarray
+            Representations in the frames x, y.
+        weight : (F,) float64 ndarray
+            Units of 1 / area.
+        is_hard : (F,) bool ndarray
+        corner : (m,) int ndarray or slice
+            Corners of triangles that are taken into account.
+        """
+        label = "averaging the guides at the vertices"
+        yield Progress(0.0, label)
+        node, count = self.connection.corner_node[corner], self.connection.node_count
+        to_node = np.exp(-1j * self.degree * self.frame_angle[corner])
+        yield Progress(0.3, label)
+        face, area = self._corner_face[corner], self._corner_area[corner]
+        penalty = np.bincount(node, area * weight[face], count)
+        yield Progress(0.5, label)
+        rhs = complex_bincount(node, area * (weight * target)[face] * to_node, count)
+        yield Progress(0.7, label)
+        # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
+        fixed = complex_bincount(node, area * (is_hard * target)[face] * to_node, count)
+        max_modulus = np.bincount(node, area * (is_hard * np.abs(target))[face], count)
+        is_fixed = np.abs(fixed) > 1e-6 * max_modulus
+        fixed[~is_fixed] = 0
+        fixed[is_fixed] /= np.abs(fixed[is_fixed])
+        return NodeGuides(penalty, rhs, is_fixed, fixed)
+
+    def solve_task(
+        self,
+        guides: NodeGuides,
+        start: np.ndarray | None = None,
+        tolerance: float = RELATIVE_TOLERANCE,
+    ) -> Task[np.ndarray]:
+        """Solve for the representations at the nodes.
+
+        Parameters
+        ----------
+        guides : NodeGuides
+        start : (n,) complex128 ndarray, optional
+            First approximation; 0 by default.
+        tolerance : float
+            Residual norm relative to that of the right-hand side at which the solver stops.
+
+        Returns
+        -------
+        (n,) complex128 ndarray
+        """
+        label = "interpolating between the guides"
+        if not self.levels:
+            self.levels.extend(
+                (yield from subtask(hierarchy_task(self.laplacian), 0.0, 0.5, label))
+            )
+        # Fixed nodes are stiff in the preconditioner, so that it hardly changes them.
+        diagonal = np.where(guides.is_fixed, self.laplacian.diagonal, guides.penalty)
+        yield Progress(0.5, label)
+        levels = add_diagonal(self.levels, diagonal)
+        start = guides.fixed if start is None else np.where(guides.is_fixed, guides.fixed, start)
+        task = conjugate_gradient_task(
+            levels[0].matrix,
+            guides.rhs,
+            tolerance,
+            partial(w_cycle, levels),
+            label,
+            start,
+            guides.is_fixed,
+        )
+        return (yield from subtask(task, 0.5, 1.0, label))
+
+    def solve_near(
+        self, guides: NodeGuides, z: np.ndarray, nodes: np.ndarray, max_iterations: int
+    ) -> np.ndarray:
+        """Improve a solution at some nodes, and keep it at the other ones.
+
+        Parameters
+        ----------
+        guides : NodeGuides
+        z : (n,) complex128 ndarray
+            At all nodes.
+        nodes : (m,) int ndarray
+            Different ones.
+        max_iterations : int
+
+        Returns
+        -------
+        (m,) complex128 ndarray
+        """
+        z = np.where(guides.is_fixed, guides.fixed, z)
+        start = z[nodes]
+        z[nodes] = 0
+        rows = self.laplacian.rows(nodes)
+        matrix = rows.columns(nodes).plus_diagonal(guides.penalty[nodes])
+        task = conjugate_gradient_task(
+            matrix,
+            guides.rhs[nodes] - rows @ z,
+            NEAR_TOLERANCE,
+            partial(np.multiply, 1 / matrix.diagonal),
+            start=start,
+            is_fixed=guides.is_fixed[nodes],
+            max_iterations=max_iterations,
+        )
+        return run_to_completion(task)
+
+    def face_representations(self, z: np.ndarray) -> np.ndarray:
+        """(F,) complex128 means of (n,) representations at the nodes, in the frames x, y."""
+        return node_sum_per_face(self.surface, self.connection, z, self.frame_angle, self.degree)
+
+    def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
+        """(m,) complex128: those of `face_representations` on (m,) faces."""
+        is_chosen = np.zeros(self.surface.face_count, dtype=bool)
+        is_chosen[face] = True
+        corner = np.flatnonzero(is_chosen[self._corner_face])
+        value = z[self.connection.corner_node[corner]] * self._corner_area[corner]
+        value *= np.exp(1j * self.degree * self.frame_angle[corner])
+        return complex_bincount(self._corner_face[corner], value, self.surface.face_count)[face]
+
+    def node_means(self, values: np.ndarray) -> np.ndarray:
+        """(n,) complex128 means at the nodes of (F,) representations."""
+        node, count = self.connection.corner_node, self.connection.node_count
+        term = self._corner_area * values[self._corner_face]
+        term *= np.exp(-1j * self.degree * self.frame_angle)
+        return complex_bincount(node, term, count) / self.connection.positive_mass
+
+    def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
+        """(m,) complex128 means of (F,) representations around each of (m,) faces."""
+        corner = self.corners_of_nodes(self.nodes_of_faces(face))
+        node, count = self.connection.corner_node[corner], self.connection.node_count
+        area = self._corner_area[corner]
+        term = area * values[self._corner_face[corner]]
+        term *= np.exp(-1j * self.degree * self.frame_angle[corner])
+        total = complex_bincount(node, term, count)
+        mean = total / np.maximum(np.bincount(node, area, count), 1e-300)
+        face_area = np.bincount(self._corner_face[corner], area, self.surface.face_count)[face]
+        return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
+
+    def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
+        """(k,) intp: the nodes of (m,) faces, in ascending order."""
+        is_chosen = np.zeros(self.surface.face_count, dtype=bool)
+        is_chosen[face] = True
+        is_node = np.zeros(self.connection.node_count, dtype=bool)
+        is_node[self.connection.corner_node[is_chosen[self._corner_face]]] = True
+        return np.flatnonzero(is_node)
+
+    def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
+        """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
+        is_chosen = np.zeros(self.connection.node_count, dtype=bool)
+        is_chosen[node] = True
+        return np.flatnonzero(is_chosen[self.connection.corner_node])
+
+    def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
+        """Grow a set of nodes ring by ring, until it has at least a number of nodes or is closed.
+
+        Parameters
+        ----------
+        node : (m,) int ndarray
+        count : int
+
+        Returns
+        -------
+        (k,) intp ndarray
+            In ascending order.
+        """
+        is_near = np.zeros(self.connection.node_count, dtype=bool)
+        is_near[node] = True
+        total, ring = len(node), node
+        while len(ring) and total < count:
+            neighbor = self.laplacian.indices[self.laplacian.entries_of_rows(ring)]
+            ring = np.unique(neighbor[~is_near[neighbor]])
+            is_near[ring] = True
+            total += len(ring)
+        return np.flatnonzero(is_near)
+
+    @cached_property
+    def _corner_face(self) -> np.ndarray:
+        """(3 T,) int32: the face of each corner of the triangles."""
+        return np.repeat(self.surface.triangle_face, 3)
+
+    @cached_property
+    def _corner_area(self) -> np.ndarray:
+        """(3 T,) float64: a third of the area of the triangle of each corner."""
+        return np.repeat(self.connection.area / 3, 3)
+
+
+def firmness_weights(
+    firmness: np.ndarray, edge_length: float, reach: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Convert the firmness of guides to their weights.
+
+    A guide of firmness 1/2 has an influence that falls off over an edge. A guide of firmness 1 is followed
+    exactly, unless guides are smoothed over a reach.
+
+    Parameters
+    ----------
+    firmness : (F,) ndarray
+        From 0 to 1.
+    edge_length : float
+        Mean length of the edges.
+    reach : float
+        Distance over which guides are smoothed in addition.
+
+    Returns
+    -------
+    weight : (F,) float64 ndarray
+        Units of 1 / area; 0 where a guide is followed exactly.
+    is_exact : (F,) bool ndarray
+    """
+    is_exact = (firmness >= EXACT_FIRMNESS) & (reach == 0)
+    firmness = np.where(is_exact, 0.0, np.minimum(firmness, 1.0))
+    weight = firmness / np.maximum(
+        reach**2 * firmness + edge_length**2 * (1 - firmness), np.finfo(np.float64).tiny
+    )
+    return weight, is_exact
+
+
+def guided_system_task(surface: Surface, degree: int) -> Task[GuidedSystem]:
+    """Build the system of a surface."""
+    label = "building the connection Laplacian"
+    yield Progress(0.0, label)
+    x, y = face_frames(surface)
+    connection = yield from subtask(connection_task(surface), 0.0, 0.5)
+    yield Progress(0.5, label)
+    frame_angle = corner_frame_angles(surface, connection, x, y)
+    laplacian = yield from subtask(laplacian_task(connection, degree), 0.6, 1.0)
+    laplacian = laplacian.plus_diagonal(REGULAR_SHIFT * laplacian.diagonal)
+    return GuidedSystem(surface, degree, x, y, connection, frame_angle, laplacian)

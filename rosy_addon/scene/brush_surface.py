@@ -1,0 +1,179 @@
+"""The surface under a brush: places on an object as it is seen, on its own mesh at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+from ..cache import Cache
+from ..field.frames import dot, normalize
+from ..field.surface import Surface, mean_per_face
+from .meshes import evaluated_mesh, vertex_positions
+from .singularity_points import mesh_of_own_vertices
+
+#: Largest number of faces that get dashes, and the length of a dash, relative to the size of its face.
+MAX_DASH_FACES, DASH_LENGTH = 1500, 0.7
+
+#: Finds the (n,) faces closest to (n, 3) points.
+FaceLocator = Callable[[np.ndarray], np.ndarray]
+
+
+class BrushSurface:
+    """Places on an object's own mesh, at rest and as it is seen.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    depsgraph : bpy.types.Depsgraph
+    surface : Surface
+        Of the object's own mesh.
+    """
+
+    def __init__(
+        self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, surface: Surface
+    ) -> None:
+        self._obj = obj
+        self._surface = surface
+        self._evaluated = obj.evaluated_get(depsgraph)
+        with evaluated_mesh(self._evaluated) as mesh:
+            source = mesh_of_own_vertices(obj, mesh)
+            self._shown = vertex_positions(source)[: len(surface.vertices)].astype(np.float64)
+            self._keeps_faces = len(source.polygons) == surface.face_count and len(
+                source.vertices
+            ) == len(surface.vertices)
+        self._shown_tree: BVHTree | None = None
+
+    def cast_ray(self, origin: Vector, direction: Vector) -> np.ndarray | None:
+        """Return the place at rest, (3,) float32 in object space, where a ray in world space meets the object.
+
+        None if it does not meet it. The ray meets the surface with all modifiers; the closest place of the own
+        mesh is taken.
+        """
+        to_object = self._obj.matrix_world.inverted_safe()
+        is_hit, location, _, face = self._evaluated.ray_cast(
+            to_object @ origin, (to_object.to_3x3() @ direction).normalized()
+        )
+        if not is_hit:
+            return None
+        vertex = self._surface.triangle_vertex
+        if self._keeps_faces:
+            triangle = np.flatnonzero(self._surface.triangle_face == face)
+        else:
+            if self._shown_tree is None:
+                self._shown_tree = BVHTree.FromPolygons(
+                    self._shown.tolist(), vertex.tolist(), all_triangles=True
+                )
+            location, _, index, _ = self._shown_tree.find_nearest(location)
+            triangle = np.array([index])
+        # Of several triangles, the one whose barycentric coordinates are least negative has the place.
+        weights = [
+            _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
+        ]
+        best = int(np.argmax([weight.min() for weight in weights]))
+        return (weights[best] @ self._surface.vertices[vertex[triangle[best]]]).astype(np.float32)
+
+    def dashes(
+        self, vectors: np.ndarray, degree: int, place: np.ndarray, radius: float
+    ) -> np.ndarray:
+        """Return short lines along a field around a place, as they are seen.
+
+        Parameters
+        ----------
+        vectors : (F, 3) ndarray
+            One member of each face, at rest.
+        degree : int
+        place : (3,) ndarray
+            At rest, object space.
+        radius : float
+
+        Returns
+        -------
+        (K, 2, 3) float64 ndarray
+            Ends in object space.
+        """
+        surface = self._surface
+        offset = surface.face_center - place
+        square = dot(offset, offset)
+        near = np.flatnonzero(square < radius**2)
+        normal = surface.face_normal[near]
+        near = near[normal @ surface.face_normal[square.argmin()] > 0]
+        near = near[:: -(-len(near) // MAX_DASH_FACES) or 1]
+        normal, member = surface.face_normal[near], normalize(vectors[near])
+        angles = 2 * np.pi / degree * np.arange(degree if degree % 2 else degree // 2)
+        directions = [
+            np.cos(angle) * member + np.sin(angle) * np.cross(normal, member) for angle in angles
+        ]
+        # The first triangle of a face tells how the face is deformed.
+        vertex = surface.triangle_vertex[np.searchsorted(surface.triangle_face, near)]
+        half_length = DASH_LENGTH / 2 * np.sqrt(np.abs(_edge_cross(surface.vertices, vertex)))
+        center = self._shown_center[near]
+        dashes = []
+        for direction in directions:
+            along = half_length[:, None] * _deformed(
+                direction, vertex, surface.vertices, self._shown
+            )
+            start = center if degree % 2 else center - along
+            dashes.append(np.stack([start, center + along], axis=1))
+        return np.concatenate(dashes)
+
+    @cached_property
+    def _shown_center(self) -> np.ndarray:
+        """(F, 3) float64: centers of the faces as they are seen."""
+        return mean_per_face(self._shown[self._surface.corner_vertex], self._surface.face_start)
+
+
+def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
+    """(n,) twice the areas of (n, 3) triangles."""
+    a, b, c = (points[column] for column in vertex.T)
+    cross = np.cross(b - a, c - a)
+    return np.sqrt(dot(cross, cross))
+
+
+def _deformed(
+    direction: np.ndarray, vertex: np.ndarray, rest: np.ndarray, shown: np.ndarray
+) -> np.ndarray:
+    """(n, 3) directions in the planes of (n, 3) triangles at rest, after the triangles were deformed."""
+    (a, b), (shown_a, shown_b) = (
+        (points[vertex[:, 1]] - points[vertex[:, 0]], points[vertex[:, 2]] - points[vertex[:, 0]])
+        for points in (rest, shown)
+    )
+    aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
+    da, db = dot(direction, a), dot(direction, b)
+    determinant = np.maximum(aa * bb - ab * ab, 1e-300)
+    u, v = (bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant
+    return u[:, None] * shown_a + v[:, None] * shown_b
+
+
+def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceLocator:
+    """Return a function that finds the (n,) faces of a mesh that are closest to (n, 3) points at rest."""
+
+    def create() -> BVHTree:
+        copy = bmesh.new()
+        try:
+            copy.from_mesh(mesh, face_normals=False, vertex_normals=False)
+            return BVHTree.FromBMesh(copy)
+        finally:
+            copy.free()
+
+    tree = cache.get_or_create(("tree", surface), create)
+
+    def locate(points: np.ndarray) -> np.ndarray:
+        found = [tree.find_nearest(point)[2] for point in points.tolist()]
+        return np.array([-1 if face is None else face for face in found], dtype=np.intp)
+
+    return locate
+
+
+def _barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """(3,) barycentric coordinates of a point of the triangle with (3, 3) corners."""
+    a, b = corners[1] - corners[0], corners[2] - corners[0]
+    matrix = np.array([[a @ a, a @ b], [a @ b, b @ b]])
+    right = np.array([a @ (point - corners[0]), b @ (point - corners[0])])
+    u, v = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    return np.array([1 - u - v, u, v])

@@ -1,0 +1,231 @@
+"""The tool *Comb Field* of the 3D view: its cursor, its settings, and places under the mouse."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from bpy_extras.view3d_utils import (
+    region_2d_to_location_3d,
+    region_2d_to_origin_3d,
+    region_2d_to_vector_3d,
+)
+from gpu_extras.batch import batch_for_shader
+from gpu_extras.presets import draw_circle_2d
+from mathutils import Vector
+
+from ..cache import BAKE_CACHE
+from ..errors import RosyError
+from ..scene.brush_surface import BrushSurface
+from ..scene.field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
+from ..scene.meshes import mesh_surface, read_attribute
+from ..viewport import session
+
+#: Colors of the cursor and of the dashes.
+CURSOR_COLOR, DASH_COLOR = (1.0, 1.0, 1.0, 0.8), (1.0, 0.55, 0.15, 1.0)
+
+#: Width of the dashes in pixels.
+DASH_WIDTH = 1.5
+
+
+class BrushMouse:
+    """Finds places on an object under the mouse, in a region of a 3D view."""
+
+    def __init__(self, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+        self._region, self._view = context.region, context.region_data
+        self._obj = obj
+        surface = mesh_surface(obj.data, cache=BAKE_CACHE)
+        self._surface = BrushSurface(obj, context.evaluated_depsgraph_get(), surface)
+
+    def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
+        """Return the place at rest, (3,) float32 in object space; None beside the object."""
+        origin = region_2d_to_origin_3d(self._region, self._view, mouse)
+        direction = region_2d_to_vector_3d(self._region, self._view, mouse)
+        return self._surface.cast_ray(origin, direction)
+
+    def radius(self, place: np.ndarray, pixels: float) -> float:
+        """Return a length of pixels at a place, in object space."""
+        world = self._obj.matrix_world @ Vector(place.tolist())
+        center = self._region.width / 2, self._region.height / 2
+        beside = center[0] + 1, center[1]
+        ends = [
+            region_2d_to_location_3d(self._region, self._view, end, world)
+            for end in (center, beside)
+        ]
+        scale = self._obj.matrix_world.median_scale or 1.0
+        return pixels * (ends[1] - ends[0]).length / scale
+
+    def dashes(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """Return (n, 2) positions in the region: the ends of short lines along the field around a place."""
+        mesh = self._obj.data
+        if not is_face_vector_field(mesh):
+            return np.empty((0, 2))
+        vectors = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
+        ends = self._surface.dashes(vectors, field_degree(mesh), place, radius).reshape(-1, 3)
+        matrix = np.array(self._view.perspective_matrix @ self._obj.matrix_world)
+        clip = ends @ matrix[:, :3].T + matrix[:, 3]
+        size = np.array([self._region.width, self._region.height])
+        return (clip[:, :2] / np.maximum(clip[:, 3:], 1e-6) + 1) / 2 * size
+
+
+class _Cursor:
+    """What the cursor of the tool keeps between redraws."""
+
+    def __init__(self) -> None:
+        self.mouse: BrushMouse | None = None
+        self.key: tuple[Any, ...] = ()
+        self.is_held = False
+
+    def mouse_of(self, context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+        """Return the places on an object in the region of the context, read again after each change."""
+        key = obj.name, context.region.as_pointer()
+        if self.mouse is None or (self.key != key and not self.is_held):
+            self.hold(context, obj, False)
+        return self.mouse
+
+    def hold(
+        self, context: bpy.types.Context, obj: bpy.types.Object, is_held: bool = True
+    ) -> BrushMouse:
+        """Read the places on an object. If they are held, they stay until `release`."""
+        self.mouse, self.is_held = BrushMouse(context, obj), is_held
+        self.key = obj.name, context.region.as_pointer()
+        handlers = bpy.app.handlers.depsgraph_update_post
+        if _forget_places not in handlers:
+            handlers.append(_forget_places)
+        return self.mouse
+
+    def release(self) -> None:
+        """Forget the places on the object."""
+        self.mouse, self.is_held = None, False
+
+
+#: Emptied by `unregister`.
+_CURSOR = _Cursor()
+
+
+def start_stroke(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+    """Return the places on an object, which stay until `end_stroke`."""
+    return _CURSOR.hold(context, obj)
+
+
+def end_stroke() -> None:
+    """Let the cursor read the object again."""
+    _CURSOR.release()
+
+
+def unregister() -> None:
+    """Forget the object, and stop watching for changes."""
+    _CURSOR.release()
+    handlers = bpy.app.handlers.depsgraph_update_post
+    if _forget_places in handlers:
+        handlers.remove(_forget_places)
+
+
+def _forget_places(*_: Any) -> None:
+    """Read the object again at the next redraw of the cursor, as something has changed."""
+    if not _CURSOR.is_held:
+        _CURSOR.release()
+
+
+def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
+    """Draw the settings that the operator and the tool share."""
+    layout.prop(settings, "exact")
+    layout.prop(settings, "reach")
+    layout.prop(settings, "front_faces")
+    layout.row(heading="Mirror").prop(settings, "mirror", toggle=True, text="")
+
+
+def _draw_dashes(points: np.ndarray, offset: tuple[int, int], scale: float) -> None:
+    """Draw lines between pairs of (n, 2) positions in the region."""
+    if not len(points):
+        return
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    shader.bind()
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    shader.uniform_float("lineWidth", DASH_WIDTH * scale)
+    shader.uniform_float("color", DASH_COLOR)
+    points_3d = np.column_stack([points + np.array(offset), np.zeros(len(points))])
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "LINES", {"pos": points_3d.astype(np.float32)}).draw(shader)
+    gpu.state.blend_set("NONE")
+
+
+class CombTool:
+    """The tool in all modes."""
+
+    bl_space_type = "VIEW_3D"
+    bl_label = "Comb Field"
+    bl_description = (
+        "Drag along the surface to turn the field.\nCtrl: erase guides. Shift: smooth them. F, Shift F: radius and "
+        "strength"
+    )
+    bl_icon = str(Path(__file__).parent / "icons" / "comb")  # Blender adds .dat
+    bl_keymap = (
+        ("rosy.field_comb", {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+        (
+            "rosy.field_comb",
+            {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
+            {"properties": [("effect", "ERASE")]},
+        ),
+        (
+            "rosy.field_comb",
+            {"type": "LEFTMOUSE", "value": "PRESS", "shift": True},
+            {"properties": [("effect", "SMOOTH")]},
+        ),
+        (
+            "wm.radial_control",
+            {"type": "F", "value": "PRESS"},
+            {"properties": [("data_path_primary", "scene.rosy.comb.size")]},
+        ),
+        (
+            "wm.radial_control",
+            {"type": "F", "value": "PRESS", "shift": True},
+            {"properties": [("data_path_primary", "scene.rosy.comb.strength")]},
+        ),
+    )
+
+    # Blender calls both without an instance.
+    @staticmethod
+    def draw_settings(
+        context: bpy.types.Context, layout: bpy.types.UILayout, tool: bpy.types.WorkSpaceTool
+    ) -> None:
+        comb = context.scene.rosy.comb
+        layout.prop(comb, "size")
+        layout.prop(comb, "strength", slider=True)
+        draw_settings(layout, tool.operator_properties("rosy.field_comb"))
+
+    @staticmethod
+    def draw_cursor(
+        context: bpy.types.Context, tool: bpy.types.WorkSpaceTool, mouse: tuple[int, int]
+    ) -> None:
+        """Draw the circle of the brush and, without a live view, the field around it."""
+        comb = context.scene.rosy.comb
+        draw_circle_2d(mouse, CURSOR_COLOR, comb.size, segments=64)
+        obj, region = context.view_layer.objects.active, context.region
+        if obj is None or not has_field(obj) or session.is_live(context.space_data):
+            return
+        with suppress(RosyError):  # combing reports it
+            places = _CURSOR.mouse_of(context, obj)
+            place = places.place((mouse[0] - region.x, mouse[1] - region.y))
+            if place is not None:
+                radius = places.radius(place, comb.size)
+                scale = context.preferences.system.ui_scale
+                _draw_dashes(places.dashes(place, 1.5 * radius), (region.x, region.y), scale)
+
+
+class VIEW3D_TOOL_rosy_comb(CombTool, bpy.types.WorkSpaceTool):
+    """Comb a field in Object Mode"""
+
+    bl_context_mode = "OBJECT"
+    bl_idname = "rosy.comb_tool"
+
+
+class VIEW3D_TOOL_rosy_comb_sculpt(CombTool, bpy.types.WorkSpaceTool):
+    """Comb a field in Sculpt Mode"""
+
+    bl_context_mode = "SCULPT"
+    bl_idname = "rosy.comb_sculpt_tool"

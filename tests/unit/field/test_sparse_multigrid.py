@@ -1,0 +1,65 @@
+"""Parts of sparse matrices, and multigrid levels for matrices that differ by their diagonals."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
+from shapes import torus
+
+from rosy_addon.field.conjugate_gradient import conjugate_gradient_task
+from rosy_addon.field.connection import build_connection, laplacian_task
+from rosy_addon.field.sparse_multigrid import add_diagonal, hierarchy_task, w_cycle
+from rosy_addon.progress import run_to_completion
+
+
+@pytest.fixture(scope="module")
+def laplacian():
+    connection = build_connection(torus(60, 30))
+    matrix = run_to_completion(laplacian_task(connection, 4))
+    return matrix.plus_diagonal(1e-3 * matrix.diagonal)
+
+
+def to_scipy(matrix):
+    shape = len(matrix), matrix.column_count
+    return sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
+
+
+def test_rows_and_columns(laplacian):
+    chosen = np.random.default_rng(0).permutation(len(laplacian))[:200]
+    expected = to_scipy(laplacian)[chosen]
+    rows = laplacian.rows(chosen)
+    assert abs(to_scipy(rows) - expected).max() == 0
+    assert abs(to_scipy(rows.columns(chosen)) - expected[:, chosen]).max() == 0
+
+
+def test_levels_with_another_diagonal(laplacian):
+    levels = run_to_completion(hierarchy_task(laplacian))
+    random = np.random.default_rng(1)
+    diagonal = np.where(random.random(len(laplacian)) < 0.2, 10.0, 0.0)
+    rhs = random.standard_normal(len(laplacian)) + 0j
+    new_levels = add_diagonal(levels, diagonal)
+    # 15 iterations would not be enough without a suitable preconditioner.
+    task = conjugate_gradient_task(
+        new_levels[0].matrix, rhs, 1e-12, partial(w_cycle, new_levels), max_iterations=20
+    )
+    solution = run_to_completion(task)
+    expected = spsolve(to_scipy(laplacian) + sparse.diags(diagonal), rhs)
+    assert np.abs(solution - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_fixed_unknowns_keep_their_values(laplacian):
+    random = np.random.default_rng(2)
+    is_fixed = random.random(len(laplacian)) < 0.1
+    start = random.standard_normal(len(laplacian)) + 1j * random.standard_normal(len(laplacian))
+    rhs = random.standard_normal(len(laplacian)) + 0j
+    task = conjugate_gradient_task(laplacian, rhs, 1e-11, start=start, is_fixed=is_fixed)
+    solution = run_to_completion(task)
+    assert np.array_equal(solution[is_fixed], start[is_fixed])
+    matrix, free = to_scipy(laplacian), ~is_fixed
+    known = rhs - matrix[:, is_fixed] @ start[is_fixed]
+    expected = spsolve(matrix[free][:, free].tocsc(), known[free])
+    assert np.abs(solution[free] - expected).max() < 1e-6

@@ -30,6 +30,7 @@ OTHERS = (
     "strokes-page",
     "textures-page",
     "fields-page",
+    "editing-page",
     "turntable",
     "listing",
     "simulations-page",

@@ -18,7 +18,7 @@ from rosy_addon.projection.project import project
 from .page import ROOT
 from .shapes import sphere, suzanne, torus
 from .sheet import Panel, display, dotted, save, sheet
-from .solid import compose_view, view
+from .solid import compose_view, curve_through, points_on_surface, view
 
 IMAGES = ROOT / "docs" / "images"
 
@@ -92,18 +92,8 @@ def _form(monkey: Surface) -> list[list[Panel]]:
 def _strokes(monkey: Surface) -> list[Panel]:
     """Draw the smoothest field of Suzanne, and a field that follows strokes."""
     camera = view(monkey, (-26, 8), (WIDE, WIDE), LOOK.supersampling)
-    buffer = project([MeshInstance(monkey, np.eye(4), generate(monkey, "axis", 2))], camera)
-    position = np.full((camera.height * camera.width, 3), np.nan)
-    position[buffer.pixel] = (
-        buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
-    )
-    position = position.reshape(camera.height, camera.width, 3)
-    curves = [_curve(*ends) for ends in STROKES]
-    strokes = []
-    for stroke in curves:
-        column, row = (stroke * (camera.width, camera.height)).astype(int).T
-        points = position[camera.height - 1 - row, column]
-        strokes.append(points[np.isfinite(points).all(axis=1)])
+    curves = [curve_through(*ends) for ends in STROKES]
+    strokes = [points_on_surface(monkey, camera, curve) for curve in curves]
     panels = [_panel(monkey, "smoothest", 2, (-26, 8), "Smoothest, N = 2", WIDE)]
     guided = _panel(
         monkey,
@@ -120,16 +110,6 @@ def _strokes(monkey: Surface) -> list[Panel]:
         pen.line(line, fill=(255, 255, 255), width=8, joint="curve")
         pen.line(line, fill=INK, width=4, joint="curve")
     return [*panels, Panel(np.asarray(picture), guided.label)]
-
-
-def _curve(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
-    """Return (n, 2) points of a parabola through three points, in picture coordinates.
-
-    These are fractions of the picture from the top left.
-    """
-    t = np.linspace(0, 1, 60)[:, None]
-    a, b, c = (np.array(point) for point in (start, middle, stop))
-    return (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
 
 
 def _free() -> list[Panel]:

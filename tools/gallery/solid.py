@@ -80,6 +80,29 @@ def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera)
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
+def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
+    """Return (n, 2) points of a parabola through three points, in picture coordinates.
+
+    These are fractions of the picture from the top left.
+    """
+    t = np.linspace(0, 1, 60)[:, None]
+    a, b, c = (np.array(point) for point in (start, middle, stop))
+    return (1 - t) * (1 - 2 * t) * a + 4 * t * (1 - t) * b + t * (2 * t - 1) * c
+
+
+def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np.ndarray:
+    """Return the points of a surface that a camera sees at (n, 2) places of the picture, without misses."""
+    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
+    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    position = np.full((camera.height * camera.width, 3), np.nan)
+    position[buffer.pixel] = (
+        buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
+    )
+    column, row = (curve * (camera.width, camera.height)).astype(int).T
+    points = position.reshape(camera.height, camera.width, 3)[camera.height - 1 - row, column]
+    return points[np.isfinite(points).all(axis=1)]
+
+
 def visible_points(
     points: np.ndarray, normals: np.ndarray, camera: Camera, supersampling: int
 ) -> list[tuple[float, float]]:

@@ -1,0 +1,113 @@
+"""The pictures of docs/editing.md: a head whose field is combed, and the film of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.closest_point import closest_triangles
+from rosy_addon.field.combing import Combing, start_combing
+from rosy_addon.field.generate import generate
+from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
+from rosy_addon.field.guided_system import guided_system_task
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface
+from rosy_addon.presets.store import load_preset
+from rosy_addon.progress import run_to_completion
+
+from .page import ROOT
+from .shapes import suzanne
+from .sheet import Panel, display, save, sheet
+from .solid import compose_view, curve_through, points_on_surface, view
+
+IMAGES = ROOT / "docs" / "images"
+
+DEGREE, WIDE, FILM = 2, 394, 320
+ANGLES = (-26, 8)
+
+#: Strokes on Suzanne: start, middle and end of each, as fractions of the picture from the top left.
+STROKES = (
+    ((0.34, 0.37), (0.50, 0.26), (0.67, 0.17)),
+    ((0.48, 0.36), (0.58, 0.285), (0.685, 0.35)),
+    ((0.475, 0.38), (0.58, 0.485), (0.69, 0.39)),
+    ((0.36, 0.45), (0.50, 0.54), (0.64, 0.59)),
+    ((0.66, 0.62), (0.665, 0.75), (0.64, 0.88)),
+)
+INK, RADIUS = (214, 84, 20), 0.14
+
+#: Pieces of each stroke in the film, and milliseconds a frame.
+PIECES, MILLISECONDS = 5, 150
+
+
+def write() -> None:
+    """Draw and save all pictures."""
+    head = suzanne()
+    look = load_preset("engraving").look
+    frames = list(_combed(head))
+    first, last = frames[0][0], frames[-1][0]
+    panels = [
+        Panel(_picture(head, first, look, WIDE), "Smoothest"),
+        Panel(_picture(head, last, look, WIDE), "Combed with five strokes"),
+    ]
+    save(sheet([panels]), IMAGES / "editing-comb.png")
+    pictures = [_with_strokes(_picture(head, field, look, FILM), lines) for field, lines in frames]
+    film = [Image.fromarray(picture).quantize(16, dither=Image.Dither.NONE) for picture in pictures]
+    film[0].save(
+        IMAGES / "editing-comb.gif",
+        save_all=True,
+        append_images=film[1:],
+        duration=[8 * MILLISECONDS, *[MILLISECONDS] * (len(film) - 2), 15 * MILLISECONDS],
+        loop=0,
+    )
+
+
+def _combed(head: Surface) -> Iterator[tuple[RosyField, list[np.ndarray]]]:
+    """Yield the field and the strokes so far, piece by piece."""
+    field = generate(head, "smoothest", DEGREE)
+    yield field, []
+    system = run_to_completion(guided_system_task(head, DEGREE))
+    no_guides = np.zeros((head.face_count, 3))
+    combing = start_combing(system, field, no_guides, 0.1 * head.extent)
+    lines: list[np.ndarray] = []
+    for ends in STROKES:
+        curve = curve_through(*ends)
+        stroke = BrushStroke(
+            system,
+            combing.guides,
+            GuideBrush(RADIUS),
+            lambda places: head.triangle_face[closest_triangles(head, places)[0]],
+        )
+        lines.append(curve[:0])
+        for piece in np.array_split(np.arange(len(curve)), PIECES):
+            points = points_on_surface(head, view(head, ANGLES, (WIDE, WIDE), 2), curve[piece])
+            combing.follow(stroke.extend(points, np.ones(len(points))))
+            lines[-1] = curve[: piece[-1] + 1]
+            yield _field(combing), list(lines)
+        combing.follow(stroke.finish())
+        run_to_completion(combing.settle_task())
+        yield _field(combing), list(lines)
+    yield _field(combing), []
+
+
+def _field(combing: Combing) -> RosyField:
+    return RosyField(DEGREE, combing.vectors)
+
+
+def _picture(head: Surface, field: RosyField, look: Look, side: int) -> np.ndarray:
+    camera = view(head, ANGLES, (side, side), look.supersampling)
+    return display(compose_view(head, field, look, camera).rgba)
+
+
+def _with_strokes(picture: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
+    """Draw strokes, in fractions of the picture."""
+    image = Image.fromarray(picture)
+    pen = ImageDraw.Draw(image)
+    for line in lines:
+        if len(line) > 1:
+            pen.line(
+                [tuple(point) for point in (line * FILM).tolist()], fill=INK, width=4, joint="curve"
+            )
+    return np.asarray(image)

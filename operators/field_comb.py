@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -153,8 +154,8 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
             # The next stroke begins: settle at once.
             return self._settle_now(context) | {"PASS_THROUGH"}
         result = super().modal(context, event)
-        if result == {"CANCELLED"} and self._job.stop_reason == "cancelled":
-            self._line.restore()
+        if result == {"CANCELLED"}:
+            self._take_back()
         return result
 
     def _drag(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -167,18 +168,23 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
                 if has_changed and event.type == "MOUSEMOVE":
                     self._line.show()
             elif event.type in {"ESC", "RIGHTMOUSE"}:
-                self._line.restore()
+                self._take_back()
                 return {"CANCELLED"}
             elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
                 self._line.lift()
                 self._line.show()
                 self._job = Job(context, self._settle_task(context, self._line), [self._line.mesh])
         except REPORTED_ERRORS as error:
-            self._line.restore()
+            self._take_back()
             return report_error(self, error)
-        except ReferenceError:
+        except ReferenceError:  # the mesh was deleted
             return {"CANCELLED"}
         return {"RUNNING_MODAL"}
+
+    def _take_back(self) -> None:
+        """Restore the field, if the mesh still exists."""
+        with suppress(ReferenceError):
+            self._line.restore()
 
     def _add(self, mouse: tuple[int, int], pressure: float) -> bool:
         """Go on to a place under the mouse. Return whether the field has changed."""
@@ -216,6 +222,7 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
             run_to_completion(self._job.task)
             self._job.stop("done")
         except REPORTED_ERRORS as error:
+            self._take_back()
             return report_error(self, error)
         return {"FINISHED"}
 
@@ -223,6 +230,7 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
         """Stop. Blender calls this if the window is closed or a file is opened."""
         comb_brush.end_stroke()
         super().cancel(context)
+        self._take_back()
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -8,6 +8,7 @@ from math import pi
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
@@ -16,7 +17,7 @@ from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
 from ..rosy_addon.field.singularities import description_task
 from ..rosy_addon.field.surface import Surface, orientation_warning
 from ..rosy_addon.progress import Progress, Task, subtask
-from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE
+from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..rosy_addon.scene.guides import (
     annotation_strokes,
     corner_uvs,
@@ -149,8 +150,8 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     )
     vectors: bpy.props.StringProperty(
         name="Vectors",
-        description="Vector attribute on faces, points or corners that the field follows. Empty: the guides that "
-        "you have combed",
+        description="Vector attribute on faces, points or corners that the field follows. Empty: for Guided, the "
+        "guides that you have combed; for Prescribed, none",
         search=_search_attributes,
     )
     axis: bpy.props.FloatVectorProperty(
@@ -246,7 +247,12 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         if self.kind == "prescribed":
             target = self._first_object(context, mesh)
             points = read_singularity_points(context.scene, target, self.degree, self.singularities)
-            return replace(settings, singularities=points, add_missing=self.add_missing)
+            vectors = guide_vectors(mesh, self.vectors) if self.vectors else None
+            if self.vectors == GUIDE_ATTRIBUTE:
+                vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
+            return replace(
+                settings, singularities=points, add_missing=self.add_missing, vectors=vectors
+            )
         if self.kind == "features" and self.edges != "FEATURES":
             return replace(settings, edges=marked_edges(mesh, self.edges))
         if self.kind != "guided":

@@ -20,6 +20,9 @@ from .rosy_field import RosyField
 #: Nodes around changed guides that are solved at once, and the iterations of the solver.
 NEAR_NODES, NEAR_ITERATIONS = 3000, 30
 
+#: Least reach in lengths of edges: the guides that keep the rest of the field stay weak.
+MIN_REACH_EDGES = 2.0
+
 
 class Combing:
     """A field and its guides; made by `start_combing`.
@@ -137,7 +140,8 @@ def start_combing(
     unit_z = np.divide(z, magnitude, out=np.zeros_like(z), where=magnitude > 0)
     guides = to_representation(guide_vectors, system.x, system.y, degree)
     guides /= np.maximum(np.abs(guides), 1)
-    weak_guides = unit_z / (1 + (reach / surface.mean_edge_length) ** 2)
+    edges = max(reach / surface.mean_edge_length, MIN_REACH_EDGES)
+    weak_guides = unit_z / (1 + edges**2)
     guides = np.where(guides == 0, weak_guides, guides)
     return Combing(
         system, guides, system.node_means(unit_z), np.where(magnitude > 0, magnitude, 1.0)

@@ -11,12 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import RosyError
 from .frames import dot, normalize
 from .guided_system import GuidedSystem
 from .representation import to_representation
 
 #: Distance between dabs along a stroke, relative to the radius of the brush.
 DAB_SPACING = 1 / 6
+
+#: Least distance between dabs, relative to `Surface.extent`, and largest number of dabs between two points.
+MIN_SPACING, MAX_DABS = 2.0**-12, 100_000
 
 #: A face that a stroke reaches again is combed anew if the stroke has been elsewhere for this length,
 #: relative to the radius.
@@ -110,7 +114,7 @@ class BrushStroke:
         self._surface = system.surface
         self._brush = brush
         self._locate = locate
-        self._spacing = DAB_SPACING * brush.radius
+        self._spacing = max(DAB_SPACING * brush.radius, MIN_SPACING * self._surface.extent)
         signs = np.array([[1.0, 1.0, 1.0]])
         for axis in np.flatnonzero(brush.mirror):
             mirrored = signs.copy()
@@ -134,6 +138,11 @@ class BrushStroke:
         -------
         (m,) intp ndarray
             Faces whose guides may have changed. The last piece, up to two dabs long, waits for later points.
+
+        Raises
+        ------
+        RosyError
+            If a point is not finite, or so far away that there would be more than `MAX_DABS` up to it.
         """
         for point, value in zip(points, pressure, strict=True):
             self._add_dabs_to(np.asarray(point, dtype=np.float64), float(value))
@@ -160,7 +169,12 @@ class BrushStroke:
             self._dabs = [self._end, self._end]  # the start has no earlier dab
             return
         start = self._end
-        length = float(np.sqrt(dot(point - start.position, point - start.position)))
+        length = float(np.linalg.norm(point - start.position))
+        if not length <= MAX_DABS * self._spacing:
+            raise RosyError(
+                f"{self._surface.name}: the stroke has a point far away from the surface, at "
+                f"({', '.join(f'{value:.4g}' for value in point)}): remove it"
+            )
         arc_length = self._dabs[-1].arc_length + self._spacing
         while arc_length <= start.arc_length + length:
             t = (arc_length - start.arc_length) / max(length, 1e-300)

@@ -5,7 +5,7 @@ Tests and benchmarks implement the protocol `Device` without Blender.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -116,12 +116,12 @@ class BlenderDevice:
                 "later"
             )
         self._gpu = gpu
-        self._shaders: dict[str, Any] = {}
+        self._shaders: dict[Hashable, Any] = {}
         self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
 
     def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
         """As `Device.compile_task`."""
-        missing = [shader for shader in shaders if shader.name not in self._shaders]
+        missing = [shader for shader in shaders if shader.key not in self._shaders]
         for index, shader in enumerate(missing):
             yield Progress(index / len(missing), "compiling shaders")
             with suppress(DeviceError):
@@ -243,6 +243,8 @@ class BlenderDevice:
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> tuple[Any, Any]:
         """Return the bound program and its uniform block, which must outlive the run."""
+        if isinstance(shader, ComputePass):
+            shader = shader.variant(uniforms)
         program = self._program(shader)
         program.bind()
         for name in shader.textures:
@@ -260,16 +262,16 @@ class BlenderDevice:
         DeviceError
             If the driver rejects it.
         """
-        if shader.name not in self._shaders:
+        if shader.key not in self._shaders:
             try:
-                self._shaders[shader.name] = self._gpu.shader.create_from_info(
+                self._shaders[shader.key] = self._gpu.shader.create_from_info(
                     self._shader_info(shader)
                 )
             except Exception as error:
                 raise DeviceError(
                     f"the graphics driver cannot compile the shader '{shader.name}': {error}"
                 ) from error
-        return self._shaders[shader.name]
+        return self._shaders[shader.key]
 
     def _shader_info(self, shader: ComputePass | RasterPass) -> Any:
         info = self._gpu.types.GPUShaderCreateInfo()

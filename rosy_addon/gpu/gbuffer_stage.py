@@ -28,7 +28,7 @@ def render_gbuffer(frame: Frame) -> None:
     ]
     is_clipped = not np.array_equal(frame.clip_planes, NO_CLIP_PLANES)
     shader = passes.VISIBILITY_CLIPPED if is_clipped else passes.VISIBILITY
-    visibility = image("visibility", *size)
+    visibility = image("visibility", *size, "RG32F")
     frame.resources.device.draw(
         shader, batches, (visibility, frame.resources.depth_image(*size)), {}
     )

@@ -55,6 +55,7 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         )
     yield Progress(0.0, "measuring streaks")
     uniforms = {**covering, **look_uniforms(kind, look)}
+    yield from frame.resources.device.compile_task([passes.LIC.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
     row_steps = (right - left) * kind.line_count * 2 * uniforms["half_length"]

@@ -6,8 +6,11 @@ declarations in its own form from the lists here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from ..compositor.look import Look
 from ..settings import Number, settings_of
@@ -69,6 +72,10 @@ class ComputePass:
         Names and GLSL types.
     includes : tuple of str
         Names of source files that precede it, besides ``common``.
+    switches : tuple of str
+        Integer uniforms whose values are compiled in; see `variant`.
+    constants : tuple of (str, int)
+        Names and values that are compiled in.
     """
 
     name: str
@@ -76,6 +83,21 @@ class ComputePass:
     images: tuple[tuple[str, str], ...]
     uniforms: Uniforms
     includes: tuple[str, ...] = ()
+    switches: tuple[str, ...] = ()
+    constants: tuple[tuple[str, int], ...] = ()
+
+    def variant(self, values: Mapping[str, Any]) -> ComputePass:
+        """Return the shader for some values of its uniforms.
+
+        The values of its switches become constants. What they switch off then costs nothing: its registers
+        would let fewer threads run at once.
+        """
+        return _with_constants(self, tuple((name, int(values[name])) for name in self.switches))
+
+    @property
+    def key(self) -> Hashable:
+        """What tells compiled shaders apart."""
+        return self.name, self.constants
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -86,7 +108,17 @@ class ComputePass:
     @property
     def source(self) -> str:
         """GLSL without declarations."""
-        return shader_defines() + "".join(map(read_source, self.files))
+        constants = "".join(f"#define {name} {value}\n" for name, value in self.constants)
+        return shader_defines() + constants + "".join(map(read_source, self.files))
+
+
+@lru_cache(maxsize=256)
+def _with_constants(shader: ComputePass, constants: tuple[tuple[str, int], ...]) -> ComputePass:
+    """Return a shader with the values of all its switches compiled in."""
+    if not shader.switches:
+        return shader
+    uniforms = tuple(uniform for uniform in shader.uniforms if uniform[0] not in shader.switches)
+    return replace(shader, uniforms=uniforms, switches=(), constants=constants)
 
 
 @dataclass(frozen=True)
@@ -110,6 +142,12 @@ class RasterPass:
     varyings: Uniforms
     output: str
     uniforms: Uniforms
+    switches = ()
+
+    @property
+    def key(self) -> Hashable:
+        """What tells compiled shaders apart."""
+        return self.name
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -462,6 +500,10 @@ LIC = ComputePass(
         ("crowded_pixels", "vec2"),
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
+    switches=(
+        *("taper", "magnitude_mode", "noise_channels", "family_count"),
+        *("is_hatched", "is_light_ink", "even_lines", "ink_count"),
+    ),
 )
 
 MAX_REDUCE = ComputePass(

@@ -80,7 +80,9 @@ class GpuRenderer:
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """As `ViewportRenderer.prepare_task`."""
-        yield from self.device.compile_task(passes.ALL_PASSES)
+        # Those with switches are compiled when their values are known.
+        shaders = [shader for shader in passes.ALL_PASSES if not shader.switches]
+        yield from self.device.compile_task(shaders)
         yield from self.resources.upload_task(instances, display)
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:

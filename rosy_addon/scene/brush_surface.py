@@ -80,7 +80,7 @@ class BrushSurface:
 
     def dashes(
         self, vectors: np.ndarray, degree: int, place: np.ndarray, radius: float
-    ) -> np.ndarray:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return short lines along a field around a place, as they are seen.
 
         Parameters
@@ -94,8 +94,10 @@ class BrushSurface:
 
         Returns
         -------
-        (K, 2, 3) float64 ndarray
-            Ends in object space.
+        ends : (K, 2, 3) float64 ndarray
+            Object space.
+        face : (K,) intp ndarray
+            Face of each line.
         """
         surface = self._surface
         offset = surface.face_center - place
@@ -120,7 +122,7 @@ class BrushSurface:
             )
             start = center if degree % 2 else center - along
             dashes.append(np.stack([start, center + along], axis=1))
-        return np.concatenate(dashes)
+        return np.concatenate(dashes), np.tile(near, len(dashes))
 
     @cached_property
     def _shown_center(self) -> np.ndarray:

@@ -31,6 +31,9 @@ from .rest_shape import (
 #: Name of the attribute, and of that of the checks of the field.
 GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
 
+#: Guides of strokes have at least this firmness. Those that only keep the rest of the field have less.
+STROKE_FIRMNESS = 0.25
+
 
 def has_combed_guides(mesh: bpy.types.Mesh) -> bool:
     """Whether a mesh has combed guides."""

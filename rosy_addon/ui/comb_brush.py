@@ -21,12 +21,14 @@ from mathutils import Vector
 from ..cache import BAKE_CACHE
 from ..errors import RosyError
 from ..scene.brush_surface import BrushSurface
+from ..scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from ..scene.meshes import mesh_surface, read_attribute
 from ..viewport import session
 
-#: Colors of the cursor and of the dashes.
-CURSOR_COLOR, DASH_COLOR = (1.0, 1.0, 1.0, 0.8), (1.0, 0.55, 0.15, 1.0)
+#: Color of the cursor, and those of dashes on faces without and with a firm guide.
+CURSOR_COLOR = (1.0, 1.0, 1.0, 0.8)
+FREE_COLOR, GUIDED_COLOR = (0.85, 0.85, 0.85, 0.9), (1.0, 0.55, 0.15, 1.0)
 
 #: Width of the dashes in pixels.
 DASH_WIDTH = 1.5
@@ -59,17 +61,29 @@ class BrushMouse:
         scale = self._obj.matrix_world.median_scale or 1.0
         return pixels * (ends[1] - ends[0]).length / scale
 
-    def dashes(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """Return (n, 2) positions in the region: the ends of short lines along the field around a place."""
+    def dashes(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return short lines along the field around a place.
+
+        Returns
+        -------
+        ends : (K, 2, 2) float64 ndarray
+            Positions in the region.
+        is_guided : (K,) bool ndarray
+            Whether there is a firm guide.
+        """
         mesh = self._obj.data
         if not is_face_vector_field(mesh):
-            return np.empty((0, 2))
+            return np.empty((0, 2, 2)), np.empty(0, dtype=bool)
         vectors = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
-        ends = self._surface.dashes(vectors, field_degree(mesh), place, radius).reshape(-1, 3)
+        ends, face = self._surface.dashes(vectors, field_degree(mesh), place, radius)
+        is_guided = np.zeros(len(face), dtype=bool)
+        if is_face_vector_field(mesh, GUIDE_ATTRIBUTE):
+            guides = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
+            is_guided = np.linalg.norm(guides[face], axis=1) > STROKE_FIRMNESS
         matrix = np.array(self._view.perspective_matrix @ self._obj.matrix_world)
         clip = ends @ matrix[:, :3].T + matrix[:, 3]
         size = np.array([self._region.width, self._region.height])
-        return (clip[:, :2] / np.maximum(clip[:, 3:], 1e-6) + 1) / 2 * size
+        return (clip[..., :2] / np.maximum(clip[..., 3:], 1e-6) + 1) / 2 * size, is_guided
 
 
 class _Cursor:
@@ -93,9 +107,9 @@ class _Cursor:
         """Read the places on an object. If they are held, they stay until `release`."""
         self.mouse, self.is_held = BrushMouse(context, obj), is_held
         self.key = obj.name, context.region.as_pointer()
-        handlers = bpy.app.handlers.depsgraph_update_post
-        if _forget_places not in handlers:
-            handlers.append(_forget_places)
+        for handlers, handler in _app_handlers():
+            if handler not in handlers:
+                handlers.append(handler)
         return self.mouse
 
     def release(self) -> None:
@@ -120,15 +134,31 @@ def end_stroke() -> None:
 def unregister() -> None:
     """Forget the object, and stop watching for changes."""
     _CURSOR.release()
-    handlers = bpy.app.handlers.depsgraph_update_post
-    if _forget_places in handlers:
-        handlers.remove(_forget_places)
+    for handlers, handler in _app_handlers():
+        if handler in handlers:
+            handlers.remove(handler)
 
 
-def _forget_places(*_: Any) -> None:
-    """Read the object again at the next redraw of the cursor, as something has changed."""
+def _app_handlers() -> list[tuple[Any, Any]]:
+    """Return the lists of application handlers, and the handler that belongs in each."""
+    handlers = bpy.app.handlers
+    return [
+        (handlers.depsgraph_update_post, _after_change),
+        (handlers.load_pre, _before_other_data),
+        (handlers.undo_pre, _before_other_data),
+        (handlers.redo_pre, _before_other_data),
+    ]
+
+
+def _after_change(*_: Any) -> None:
+    """Read the object again at the next redraw of the cursor."""
     if not _CURSOR.is_held:
         _CURSOR.release()
+
+
+def _before_other_data(*_: Any) -> None:
+    """Forget the object, which will not exist any more."""
+    _CURSOR.release()
 
 
 def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
@@ -139,18 +169,21 @@ def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
     layout.row(heading="Mirror").prop(settings, "mirror", toggle=True, text="")
 
 
-def _draw_dashes(points: np.ndarray, offset: tuple[int, int], scale: float) -> None:
-    """Draw lines between pairs of (n, 2) positions in the region."""
-    if not len(points):
+def _draw_dashes(
+    ends: np.ndarray, color: tuple[float, ...], offset: tuple[int, int], scale: float
+) -> None:
+    """Draw lines between (K, 2, 2) positions in the region."""
+    if not len(ends):
         return
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     shader.bind()
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     shader.uniform_float("lineWidth", DASH_WIDTH * scale)
-    shader.uniform_float("color", DASH_COLOR)
-    points_3d = np.column_stack([points + np.array(offset), np.zeros(len(points))])
+    shader.uniform_float("color", color)
+    points = ends.reshape(-1, 2) + np.array(offset)
+    points_3d = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
     gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, "LINES", {"pos": points_3d.astype(np.float32)}).draw(shader)
+    batch_for_shader(shader, "LINES", {"pos": points_3d}).draw(shader)
     gpu.state.blend_set("NONE")
 
 
@@ -212,9 +245,10 @@ class CombTool:
             places = _CURSOR.mouse_of(context, obj)
             place = places.place((mouse[0] - region.x, mouse[1] - region.y))
             if place is not None:
-                radius = places.radius(place, comb.size)
+                ends, is_guided = places.dashes(place, 1.5 * places.radius(place, comb.size))
                 scale = context.preferences.system.ui_scale
-                _draw_dashes(places.dashes(place, 1.5 * radius), (region.x, region.y), scale)
+                for chosen, color in ((~is_guided, FREE_COLOR), (is_guided, GUIDED_COLOR)):
+                    _draw_dashes(ends[chosen], color, (region.x, region.y), scale)
 
 
 class VIEW3D_TOOL_rosy_comb(CombTool, bpy.types.WorkSpaceTool):

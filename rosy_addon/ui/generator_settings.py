@@ -9,7 +9,7 @@ _SETTINGS_BY_KIND = {
     "curvature": ("reach",),
     "features": ("edges", "sharp_angle"),
     "guided": ("guides", "guide", "edges", "sharp_angle", "uv_map", "vectors", "reach"),
-    "prescribed": ("singularities", "add_missing"),
+    "prescribed": ("singularities", "add_missing", "vectors", "reach"),
     "uv": ("uv_map",),
 }
 

@@ -5,7 +5,7 @@ It has the same interface as `rosy_addon.gpu.device.BlenderDevice`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from typing import Any
 
 import moderngl
@@ -15,7 +15,8 @@ from rosy_addon.gpu.device import NamedValues
 from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 from rosy_addon.progress import Progress, Task
 
-FORMATS = {"RGBA32F": "f4", "RGBA16F": "f2"}
+#: Components and data type of each texel format.
+FORMATS = {"RGBA32F": (4, "f4"), "RGBA16F": (4, "f2"), "RG32F": (2, "f4")}
 
 #: A function that Blender defines for shaders that draw into its views.
 BLENDER_DEFINES = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
@@ -26,7 +27,7 @@ class EglDevice:
 
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
-        self._programs: dict[str, Any] = {}
+        self._programs: dict[Hashable, Any] = {}
         self.max_texture_size: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
 
     @property
@@ -37,9 +38,9 @@ class EglDevice:
     def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
         """As `Device.compile_task`."""
         for shader in shaders:
-            if shader.name not in self._programs:
+            if shader.key not in self._programs:
                 yield Progress(0.0, "compiling shaders")
-                self._programs[shader.name] = self._compile(shader)
+                self._programs[shader.key] = self._compile(shader)
 
     def texture(
         self,
@@ -50,13 +51,13 @@ class EglDevice:
         data: np.ndarray | None = None,
     ) -> Any:
         """As `Device.texture`."""
+        components, dtype = FORMATS[texel_format]
         if data is not None:
-            data = np.ascontiguousarray(data, dtype=FORMATS[texel_format])
+            data = np.ascontiguousarray(data, dtype=dtype)
         if layers:
-            return self.context.texture_array(
-                (width, height, layers), 4, data, dtype=FORMATS[texel_format]
-            )
-        return self.context.texture((width, height), 4, data, dtype=FORMATS[texel_format])
+            size = width, height, layers
+            return self.context.texture_array(size, components, data, dtype=dtype)
+        return self.context.texture((width, height), components, data, dtype=dtype)
 
     def depth_texture(self, width: int, height: int) -> Any:
         """As `Device.depth_texture`."""
@@ -114,9 +115,11 @@ class EglDevice:
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> Any:
-        if shader.name not in self._programs:
-            self._programs[shader.name] = self._compile(shader)
-        program = self._programs[shader.name]
+        if isinstance(shader, ComputePass):
+            shader = shader.variant(uniforms)
+        if shader.key not in self._programs:
+            self._programs[shader.key] = self._compile(shader)
+        program = self._programs[shader.key]
         for slot, name in enumerate(shader.textures):
             textures[_base_name(name)].use(slot)
             if _base_name(name) in program:

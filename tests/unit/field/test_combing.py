@@ -197,6 +197,15 @@ def test_magnitude_stays():
     assert np.linalg.norm(combing.vectors, axis=1) == pytest.approx(field.magnitude)
 
 
+@pytest.mark.parametrize("far", [1e9, np.inf, np.nan])
+def test_points_far_away_are_refused(far):
+    combing = start(icosphere(2), 4)
+    with pytest.raises(RosyError, match="far away from the surface"):
+        draw(combing, np.array([[1.0, 0, 0], [far, 0, 0]]))
+    # A tiny brush makes no more dabs than the size of the surface asks for.
+    draw(combing, np.array([[1.0, 0, 0], [-1.0, 0, 0]]), radius=1e-12)
+
+
 def test_undefined_field_is_refused():
     surface = plane()
     system = run_to_completion(guided_system_task(surface, 4))

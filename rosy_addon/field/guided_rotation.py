@@ -145,8 +145,9 @@ def _initial_angle_task(
 
 def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> Task[np.ndarray]:
     """Solve a system; see `conjugate_gradient_task`."""
+    precondition = None if levels is None else partial(w_cycle, levels)
     return (
         yield from conjugate_gradient_task(
-            matrix, rhs.astype(np.complex128), TOLERANCE, partial(w_cycle, levels), LABEL
+            matrix, rhs.astype(np.complex128), TOLERANCE, precondition, LABEL
         )
     )

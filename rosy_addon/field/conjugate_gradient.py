@@ -13,6 +13,8 @@ from .sparse_multigrid import CSRMatrix, hierarchy_task, w_cycle
 #: Residual norm relative to that of the right-hand side at which the iteration stops, by default.
 RELATIVE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 400
+#: The least residual norm relative to the first one.
+ROUNDING_ERROR = float(np.finfo(float).eps)
 
 
 def conjugate_gradient_task(
@@ -33,7 +35,8 @@ def conjugate_gradient_task(
         (n, n), Hermitian and positive definite.
     rhs : (n,) complex ndarray
     tolerance : float
-        Residual norm relative to that of `rhs` at which the iteration stops.
+        Residual norm relative to that of `rhs` at which the iteration stops, unless rounding errors stop it
+        before.
     precondition : callable, optional
         Applies an approximate inverse of the matrix, Hermitian and positive definite, to a vector. A W-cycle
         of multigrid by default.
@@ -57,9 +60,13 @@ def conjugate_gradient_task(
     if precondition is None:
         levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
         precondition = partial(w_cycle, levels)
+    # Squares of scaled numbers stay in range. A power of two keeps all their digits.
+    scale = 0.5 ** np.clip(np.frexp(_largest_part(rhs, start))[1], -1000, 1000)
+    rhs = scale * rhs
     if start is None:
         solution, residual = np.zeros_like(rhs), rhs.copy()
     else:
+        start = scale * start
         solution, residual = start.copy(), rhs - matrix @ start
     norm = _norm(rhs)
     if is_fixed is not None and is_fixed.any():
@@ -68,10 +75,11 @@ def conjugate_gradient_task(
         norm = _norm(known_terms[~is_fixed])
     else:
         is_fixed = None
+    smallest_residual = max(tolerance * norm, ROUNDING_ERROR * _norm(residual))
     direction, previous = None, 1.0
     for iteration in range(max_iterations):
         yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), label)
-        if _norm(residual) <= tolerance * norm:
+        if _norm(residual) <= smallest_residual:
             break
         preconditioned = precondition(residual)
         if is_fixed is not None:
@@ -87,7 +95,17 @@ def conjugate_gradient_task(
         solution += step * direction
         residual -= step * image
         previous = current
-    return solution
+    return solution / scale
+
+
+def _largest_part(*vectors: np.ndarray | None) -> float:
+    """The largest absolute value of a real or an imaginary part."""
+    return max(
+        float(np.abs(part).max(initial=0))
+        for vector in vectors
+        if vector is not None
+        for part in (vector.real, vector.imag)
+    )
 
 
 def _norm(vector: np.ndarray) -> float:

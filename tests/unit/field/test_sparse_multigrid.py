@@ -63,3 +63,16 @@ def test_fixed_unknowns_keep_their_values(laplacian):
     known = rhs - matrix[:, is_fixed] @ start[is_fixed]
     expected = spsolve(matrix[free][:, free].tocsc(), known[free])
     assert np.abs(solution[free] - expected).max() < 1e-6
+
+
+@pytest.mark.parametrize("scale", [0.0, 5e-324, 1e-163, 1e-161, 1e-158, 1e-120])
+@pytest.mark.parametrize("start_scale", [1.0, 1e-161, 1e-163])
+def test_tiny_right_hand_sides(laplacian, scale, start_scale):
+    random = np.random.default_rng(3)
+    rhs = scale * random.standard_normal(len(laplacian)) + 0j
+    start = start_scale * random.standard_normal(len(laplacian)) + 0j
+    jacobi = partial(np.multiply, 1 / laplacian.diagonal)
+    for precondition in jacobi, None:
+        task = conjugate_gradient_task(laplacian, rhs, 1e-4, precondition, start=start)
+        solution = run_to_completion(task)
+        assert np.abs(solution).max() <= 1e-12 * start_scale + 1e3 * scale + 1e-160

@@ -8,9 +8,13 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
+from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.field_io import write_field_task
+from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.progress import Task, subtask
-from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.scene.combed_guides import read_combed_guides
+from ..rosy_addon.scene.field_attributes import field_degree
+from ..rosy_addon.scene.meshes import mesh_label, mesh_surface_task
 from ..rosy_addon.scene.read_field import read_mesh_field_task
 from .modal_task import DialogTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
@@ -24,6 +28,9 @@ FIELD_FORMATS = {
     ".obj": ("Fieldgen OBJ", "The mesh, with one direction per vertex, as written by fieldgen"),
     ".sings": ("Singularities", "Singular vertices and their indices, for Directional"),
 }
+
+#: Formats that keep the lengths of the vectors of each face.
+GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
 
 
 class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
@@ -43,6 +50,18 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
         description="Format of the file",
         items=[(suffix, name, text) for suffix, (name, text) in FIELD_FORMATS.items()],
         default=".rosy",
+    )
+    content: bpy.props.EnumProperty(
+        name="Content",
+        description="What is written",
+        items=[
+            ("FIELD", "Field", "The field"),
+            (
+                "GUIDES",
+                "Combed Guides",
+                "The guides that were combed; the lengths of the vectors, from 0 to 1, are their firmness",
+            ),
+        ],
     )
     skip_browser: bpy.props.BoolProperty(
         name="Skip Browser",
@@ -67,7 +86,15 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
 
     def make_task(self, context: bpy.types.Context) -> Task[Path]:
         path = Path(bpy.path.abspath(self.filepath))
-        return _export_task(selected_mesh_objects(context)[0].data, path)
+        mesh = selected_mesh_objects(context)[0].data
+        if self.content == "FIELD":
+            return _export_task(mesh, path)
+        if path.suffix.lower() not in GUIDE_FORMATS:
+            raise RosyError(
+                f"{path}: cannot keep the firmness of guides: write a {', '.join(GUIDE_FORMATS[:-1])} or "
+                f"{GUIDE_FORMATS[-1]} file"
+            )
+        return _export_guides_task(mesh, path)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         obj = selected_mesh_objects(context)[0]
@@ -81,6 +108,17 @@ def _export_task(mesh: bpy.types.Mesh, path: Path) -> Task[Path]:
     """Read the field of a mesh, and write it to a file."""
     surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
     field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
+    yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
+    return path
+
+
+def _export_guides_task(mesh: bpy.types.Mesh, path: Path) -> Task[Path]:
+    """Read the combed guides of a mesh, and write them to a file."""
+    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
+    guides = read_combed_guides(mesh, surface)
+    if not guides.any():
+        raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
+    field = RosyField(field_degree(mesh), guides)
     yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
     return path
 

@@ -151,6 +151,7 @@ def guided(
     edges: ArrayLike | None = None,
     uv: bool = False,
     reach: float = 0.0,
+    vectors_have_firmness: bool = False,
 ) -> Field:
     """Make a field that follows guides and is smooth between them.
 
@@ -172,6 +173,9 @@ def guided(
     reach : float
         Distance over which guides are smoothed, as a fraction of the longest side of the mesh. At 0,
         the field meets them exactly.
+    vectors_have_firmness : bool
+        The lengths of `vectors`, from 0 to 1, say how firmly the field follows them, as for guides that are
+        combed in Blender. Otherwise, it follows all of them exactly.
 
     Raises
     ------
@@ -194,6 +198,7 @@ def guided(
         strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
         uv=uv_map(surface) if uv else None,
         vectors=_guide_vectors(surface, vectors, degree),
+        vectors_have_firmness=vectors_have_firmness,
     )
     return _generated(surface, settings, degree)
 

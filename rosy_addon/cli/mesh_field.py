@@ -97,6 +97,12 @@ def add_mesh_options(
         "is turned to it as a whole",
     )
     parser.add_argument(
+        "--firmness",
+        action="store_true",
+        help="let the lengths of --guides, from 0 to 1, say how firmly a guided field follows them, as for "
+        "guides that are combed in Blender",
+    )
+    parser.add_argument(
         "--singularities",
         type=Path,
         metavar="FILE.sings",
@@ -238,6 +244,7 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
                 vectors=_guides(options, surface, degree),
                 uv=options.uv,
                 reach=options.reach,
+                vectors_have_firmness=options.firmness,
             )
         case kind:
             raise RosyError(f"unknown generator '{kind}': choose {', '.join(GENERATORS)}")

@@ -454,6 +454,41 @@ def test_combed_field_runs_along_the_stroke_and_is_made_again_from_its_guides(sc
     assert deviation() < 0.5
 
 
+def test_combed_guides_can_be_exported(scene, tmp_path):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    path = tmp_path / "guides.rosy"
+    write = bpy.ops.rosy.field_export
+    message = error_of(write, filepath=str(path), content="GUIDES")
+    assert "has no combed guides" in message and not path.exists()
+    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.3)
+    assert write(filepath=str(path), content="GUIDES") == {"FINISHED"}
+    rows = path.read_text().splitlines()
+    vectors = np.array([row.split() for row in rows if len(row.split()) == 3], dtype=float)
+    assert vectors == pytest.approx(member_vectors(bpy.context.object.data, "rosy_guides"))
+    singular = tmp_path / "guides.sings"
+    message = error_of(write, filepath=str(singular), content="GUIDES")
+    assert "cannot keep the firmness" in message and not singular.exists()
+
+
+def test_combing_goes_on_in_a_file_that_was_reopened(scene, tmp_path):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
+    bpy.context.object.name = "Ball"
+    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.2)
+    path = str(tmp_path / "combed.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    stored = []
+    for is_reopened in (False, True):
+        if is_reopened:
+            bpy.ops.wm.open_mainfile(filepath=path)
+        bpy.context.view_layer.objects.active = bpy.data.objects["Ball"]
+        bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.5, 1.5, 0.3)), radius=0.2)
+        mesh = bpy.context.object.data
+        stored.append((member_vectors(mesh), member_vectors(mesh, "rosy_guides")))
+    assert np.array_equal(stored[0], stored[1])
+
+
 def test_combing_goes_on_where_something_else_has_changed_the_field(scene):
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4)
     mesh = bpy.context.object.data

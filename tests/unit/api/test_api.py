@@ -175,6 +175,21 @@ def test_guides_may_be_a_field(sphere, field):
         rf.guided(sphere, 2, vectors=field)
 
 
+def test_lengths_of_guides_may_be_their_firmness(sphere, field):
+    """A weak guide hardly turns the field away from firm ones that surround it."""
+    is_weak = np.arange(sphere.face_count) == 40
+    turned = np.where(is_weak[:, None], field.rotated(np.pi / 4).vectors, field.vectors)
+    vectors = turned / np.linalg.norm(turned, axis=1)[:, None]
+    vectors[is_weak] *= 1e-3
+    angle = [
+        rf.guided(sphere, vectors=vectors, vectors_have_firmness=firmness)
+        .difference(field)
+        .angle[is_weak]
+        for firmness in (False, True)
+    ]
+    assert angle[0] == pytest.approx(np.pi / 4, abs=1e-3) and angle[1] < 0.3
+
+
 def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
     other = surface_of(icosphere(2), name="other")
     for function in (rf.render, rf.strokes):

@@ -432,6 +432,8 @@ def test_strokes_and_guides(sphere, tmp_path):
     done = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--reach", 0.01)
     assert done.returncode == 0, done.stderr
     assert facts_of(sphere, again, "--against", out)["against"]["mean"] < 3
+    firm = rosy("field", sphere, "-o", again, "--guides", out, "--degree", 2, "--firmness")
+    assert firm.returncode == 0, firm.stderr
     (tmp_path / "none.txt").write_text("1 2 3\n\n4 5 6\n")
     assert_refused(
         rosy("field", sphere, "-o", out, "--strokes", tmp_path / "none.txt"), "contains no stroke"

@@ -92,8 +92,11 @@ class CSRMatrix:
 
     @cached_property
     def diagonal_entries(self) -> np.ndarray:
-        """(n,) intp: the entries on the diagonal, if there is one in each row."""
-        return np.flatnonzero(self.indices == self.row_indices)
+        """(n,) intp: an entry on the diagonal in each row, which has at least one."""
+        entries = np.flatnonzero(self.indices == self.row_indices)
+        if len(entries) > len(self):  # a face has two equal corners
+            entries = entries[np.unique(self.row_indices[entries], return_index=True)[1]]
+        return entries
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
         """(k,) intp: the entries of (m,) rows, row by row."""

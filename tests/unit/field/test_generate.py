@@ -286,6 +286,16 @@ def test_degenerate_and_non_manifold_meshes_have_fields():
         find_singularities(surface, field)
 
 
+def test_faces_with_two_equal_corners():
+    whole = icosphere(2)
+    corners = np.append(whole.corner_vertex, [0, 0, 5])
+    surface = build_surface(whole.vertices, corners, np.arange(0, len(corners) + 1, 3))
+    vectors = np.zeros((surface.face_count, 3))
+    vectors[0] = surface.vertices[corners[1]] - surface.vertices[corners[0]]
+    field = generate(surface, GeneratorSettings("guided", vectors=vectors), 4)
+    assert field.vectors[:-1].any(axis=1).all()
+
+
 @pytest.mark.parametrize("degree", [0, -1, 1000, 1.5])
 def test_impossible_degrees(degree):
     with pytest.raises(RosyError, match="degree"):

@@ -12,7 +12,12 @@ from shapes import torus
 
 from rosy_addon.field.conjugate_gradient import conjugate_gradient_task
 from rosy_addon.field.connection import build_connection, laplacian_task
-from rosy_addon.field.sparse_multigrid import add_diagonal, hierarchy_task, w_cycle
+from rosy_addon.field.sparse_multigrid import (
+    add_diagonal,
+    from_coo_task,
+    hierarchy_task,
+    w_cycle,
+)
 from rosy_addon.progress import run_to_completion
 
 
@@ -34,6 +39,13 @@ def test_rows_and_columns(laplacian):
     rows = laplacian.rows(chosen)
     assert abs(to_scipy(rows) - expected).max() == 0
     assert abs(to_scipy(rows.columns(chosen)) - expected[:, chosen]).max() == 0
+
+
+def test_diagonal_with_several_entries_in_a_row():
+    row, column = np.array([0, 1, 1, 0, 1]), np.array([0, 1, 0, 1, 1])
+    matrix = run_to_completion(from_coo_task(row, column, np.arange(1, 6) + 0j, 2, 2))
+    expected = to_scipy(matrix).toarray() + np.diag([10, 20])
+    assert np.array_equal(to_scipy(matrix.plus_diagonal([10, 20])).toarray(), expected)
 
 
 def test_levels_with_another_diagonal(laplacian):

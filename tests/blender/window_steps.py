@@ -40,6 +40,7 @@ def run_steps(*steps):
         steps = [step for step in steps if step.__name__ in ONLY]
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.view.show_statusbar_stats = False
+    bpy.context.preferences.view.smooth_view = 0
     preferences().live_first_field = False
     bpy.app.timers.register(_resume(_run_all(steps)), first_interval=1.0, persistent=True)
 

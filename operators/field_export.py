@@ -86,15 +86,13 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
 
     def make_task(self, context: bpy.types.Context) -> Task[Path]:
         path = Path(bpy.path.abspath(self.filepath))
-        mesh = selected_mesh_objects(context)[0].data
-        if self.content == "FIELD":
-            return _export_task(mesh, path)
-        if path.suffix.lower() not in GUIDE_FORMATS:
+        is_guides = self.content == "GUIDES"
+        if is_guides and path.suffix.lower() not in GUIDE_FORMATS:
             raise RosyError(
                 f"{path}: cannot keep the firmness of guides: write a {', '.join(GUIDE_FORMATS[:-1])} or "
                 f"{GUIDE_FORMATS[-1]} file"
             )
-        return _export_guides_task(mesh, path)
+        return _export_task(selected_mesh_objects(context)[0].data, path, is_guides)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         obj = selected_mesh_objects(context)[0]
@@ -104,21 +102,15 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
         self.report({"INFO"}, f"Wrote {result}")
 
 
-def _export_task(mesh: bpy.types.Mesh, path: Path) -> Task[Path]:
-    """Read the field of a mesh, and write it to a file."""
+def _export_task(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Task[Path]:
+    """Read the field or the combed guides of a mesh, and write them to a file."""
     surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
-    field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
-    yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
-    return path
-
-
-def _export_guides_task(mesh: bpy.types.Mesh, path: Path) -> Task[Path]:
-    """Read the combed guides of a mesh, and write them to a file."""
-    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
-    guides = read_combed_guides(mesh, surface)
-    if not guides.any():
-        raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
-    field = RosyField(field_degree(mesh), guides)
+    if is_guides:
+        field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
+        if not field.vectors.any():
+            raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
+    else:
+        field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
     yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
     return path
 

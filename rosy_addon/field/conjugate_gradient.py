@@ -60,7 +60,7 @@ def conjugate_gradient_task(
     if precondition is None:
         levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
         precondition = partial(w_cycle, levels)
-    # Squares of scaled numbers stay in range. A power of two keeps all their digits.
+    # Squares of scaled numbers stay in range. A power of two, in range itself, keeps all their digits.
     scale = 0.5 ** np.clip(np.frexp(_largest_part(rhs, start))[1], -1000, 1000)
     rhs = scale * rhs
     if start is None:

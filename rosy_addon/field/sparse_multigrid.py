@@ -94,7 +94,7 @@ class CSRMatrix:
     def diagonal_entries(self) -> np.ndarray:
         """(n,) intp: an entry on the diagonal in each row, which has at least one."""
         entries = np.flatnonzero(self.indices == self.row_indices)
-        if len(entries) > len(self):  # a face has two equal corners
+        if len(entries) > len(self):  # some rows have several, which add up
             entries = entries[np.unique(self.row_indices[entries], return_index=True)[1]]
         return entries
 

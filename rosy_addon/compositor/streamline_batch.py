@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -25,6 +26,12 @@ INTERPOLATED_GAIN = 1.0
 #: pixels.
 MAX_LATERAL_OFFSET = 0.25
 
+#: Steps after which streamlines that return to a state end. Shorter ones may return.
+MIN_LOOP_STEPS = 256
+
+#: Pixels within which a state may still be that of the same passage, not a return.
+MIN_LOOP_PIXELS = 4.0
+
 #: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
 MAX_SEAM_OFFSET = np.float32(1.5)
 
@@ -34,6 +41,9 @@ class StreamlineBatch:
 
     A *lane* of the buffers is one half of a streamline: n seeds have n forward lanes, followed by n
     backward lanes.
+
+    Lanes end at the border, where the field ends, and, if they are long, where they return to a
+    state: further turns around the loop would cost time and add no other noise.
 
     Parameters
     ----------
@@ -77,6 +87,7 @@ class StreamlineBatch:
         self._step_limits = [
             None if limit is None else np.tile(limit, covering.line_count) for limit in step_limits
         ]
+        self._min_loop_steps = math.ceil(MIN_LOOP_PIXELS / look.step)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
         self._totals = np.empty((lanes, channels), dtype=np.complex64)
@@ -172,6 +183,7 @@ class StreamlineBatch:
         # Lanes that had not ended at the last compaction; None before the first one.
         active, step_counts = None, np.full(lanes, self._max_steps)
         active_counts = step_counts
+        loops = _LoopFinder(self._min_loop_steps)
         for step in range(self._max_steps + 1):
             state = sheet_offset.take(sheet, mode="clip")
             state += cell
@@ -208,6 +220,9 @@ class StreamlineBatch:
                 flat_displacement[1::2],
             )
             active_counts[ended] = step
+            looping = loops.find(step, state, cell)
+            active_counts[looping] = step
+            cell[looping] = SINK_CELL
             if len(crossing):
                 steps = covering.seams.steps
                 reached = steps.displaced(seam, position[crossing]) + steps.offset.take(seam)
@@ -239,6 +254,7 @@ class StreamlineBatch:
                         position[remaining],
                     )
                     previous_direction, total = previous_direction[remaining], total[remaining]
+                    loops.keep(remaining)
         if active is not None:
             step_counts[active] = active_counts
         return step_counts, self._max_steps
@@ -364,6 +380,36 @@ class StreamlineBatch:
         row = np.where(same_side, step - 1, -step) * stride
         gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
         return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+
+class _LoopFinder:
+    """Finds streamlines that return to a state, in a number of steps like that of the loop.
+
+    Each state is compared with one state of the past, which is replaced at steps that are powers of
+    two (Brent, An improved Monte Carlo factorization algorithm, 1980).
+
+    Parameters
+    ----------
+    min_steps : int
+        Steps of a loop, at least.
+    """
+
+    def __init__(self, min_steps: int) -> None:
+        self._min_steps = min_steps
+        self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
+
+    def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
+        """Indices of the streamlines that have returned to a state, and not ended otherwise."""
+        if step in (MIN_LOOP_STEPS, 2 * self._past_step):
+            self._past_step, self._past_state = step, state
+        elif step >= self._past_step + self._min_steps:
+            return np.flatnonzero((state == self._past_state) & (next_cell != SINK_CELL))
+        return np.empty(0, dtype=np.intp)
+
+    def keep(self, remaining: np.ndarray) -> None:
+        """Forget the streamlines that have ended; those with these indices remain."""
+        if len(self._past_state):
+            self._past_state = self._past_state[remaining]
 
 
 def _within_reach(position: np.ndarray) -> np.ndarray:

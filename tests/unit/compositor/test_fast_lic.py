@@ -235,6 +235,18 @@ def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
     assert change[borders].mean() == pytest.approx(change.mean(), rel=0.15)
 
 
+@pytest.mark.parametrize("step", [1.0, 0.3])
+def test_long_streamlines_end_when_they_have_closed_a_loop(step):
+    # The loops are circles of up to 201 pixels. The cost does not grow with the length.
+    x, y = pixel_centers(64)
+    field = planar_pixel_field(np.arctan2(y - 32, x - 32) + np.pi / 2, 1)
+    samples = fast_images(field, replace(LOOK, length=8000, step=step)).effective_samples
+    samples = samples.reshape(64, 64)[np.hypot(x - 32, y - 32) < 31]
+    loop = 2 * np.pi * 31 / step
+    assert samples.max() < 4 * (256 + 2 * loop)
+    assert np.median(samples) > 256
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
 def test_pictures_of_any_size(shape):
     images = fast_images(planar_pixel_field(np.full(shape, 0.7), 3))

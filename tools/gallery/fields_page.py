@@ -12,13 +12,11 @@ from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
 
 from .page import ROOT
 from .shapes import sphere, suzanne, torus
 from .sheet import Panel, display, dotted, save, sheet
-from .solid import compose_view, curve_through, points_on_surface, view
+from .solid import compose_view, curve_through, points_on_surface, view, visible_vertices
 
 IMAGES = ROOT / "docs" / "images"
 
@@ -184,24 +182,21 @@ def _prescribed() -> list[Panel]:
 
 def _dotted_panel(surface: Surface, field: RosyField, side: int, text: str) -> Panel:
     """Draw a field with dots at the visible singularities."""
+    return Panel(dotted_picture(surface, field, LOOK, (-26, 8), side), text)
+
+
+def dotted_picture(
+    surface: Surface, field: RosyField, look: Look, angles: tuple[float, float], side: int
+) -> np.ndarray:
+    """Draw a field with dots at the visible singularities."""
     vertex, index = find_singularities(surface, field)
-    camera = view(surface, (-26, 8), (side, side), LOOK.supersampling)
-    picture = display(compose_view(surface, field, LOOK, camera).rgba)
-    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    depth = np.full(camera.height * camera.width, -np.inf)
-    depth[buffer.pixel] = buffer.position[:, 2]
-    clip = np.c_[surface.vertices[vertex], np.ones(len(vertex))]
-    clip = clip @ (camera.projection @ camera.view).T
-    x, y = ((clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)).T
-    z = (surface.vertices[vertex] @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
-    pixel = y.astype(int) * camera.width + x.astype(int)
-    visible = z > depth[pixel] - 0.03
-    for column, row, sign in zip(x[visible], y[visible], np.sign(index[visible]), strict=True):
-        supersampling = LOOK.supersampling
-        picture = dotted(
-            picture, column / supersampling, side - row / supersampling, DOTS[int(sign)]
-        )
-    return Panel(picture, text)
+    camera = view(surface, angles, (side, side), look.supersampling)
+    picture = display(compose_view(surface, field, look, camera).rgba)
+    visible, place = visible_vertices(surface, vertex, camera)
+    x, y = (place[visible] / look.supersampling).T
+    for column, row, sign in zip(x, y, np.sign(index[visible]), strict=True):
+        picture = dotted(picture, column, side - row, DOTS[int(sign)])
+    return picture
 
 
 def _box() -> Surface:

@@ -120,6 +120,22 @@ def visible_points(
     return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
 
 
+def visible_vertices(
+    surface: Surface, vertex: np.ndarray, camera: Camera
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return whether the camera sees some vertices, and their (n, 2) places in its pixels."""
+    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
+    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    depth = np.full(camera.height * camera.width, -np.inf)
+    depth[buffer.pixel] = buffer.position[:, 2]
+    points = np.c_[surface.vertices[vertex], np.ones(len(vertex))]
+    clip = points @ (camera.projection @ camera.view).T
+    place = (clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)
+    z = (points @ camera.view.T)[:, 2]
+    column, row = place.astype(int).T
+    return z > depth[row * camera.width + column] - 0.03, place
+
+
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:
     """Return (H, W) values at their pixels, 0 elsewhere."""
     frame = np.zeros(int(np.prod(shape)), dtype=np.float64)

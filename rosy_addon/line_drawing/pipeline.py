@@ -51,8 +51,9 @@ TIP_WIDTH = 0.15
 #: fraction of its mean distance to the camera.
 OFFSCREEN_DISTANCE_RATIO = 0.1
 
-#: Smallest distance between strokes in a picture, in pixels.
-MIN_SPACING_PIXELS = 0.1
+#: Smallest distance between strokes in a picture, in pixels. Runs of visible points shorter than a few pixels
+#: are artifacts, and finer strokes are hardly longer.
+MIN_SPACING_PIXELS = 0.5
 
 #: Largest distance in pixels between a removed point and the simplified stroke, and the number of
 #: pixels that a difference of the full width counts as.

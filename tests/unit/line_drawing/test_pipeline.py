@@ -262,8 +262,9 @@ def test_errors(error_of):
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
     assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
     assert "pen" in error_of(Pen, width=0.0)
-    fine = StrokeStyle(unit="world", distance=1e-4)
-    assert "strokes would be 0.0" in error_of(draw_instances, [SPHERE], CAMERA, fine)
+    pixel = float(pixel_size(SPHERE.world_points(), CAMERA).min())
+    fine = StrokeStyle(unit="world", distance=0.4 * pixel)
+    assert "strokes would be 0.4 pixels" in error_of(draw_instances, [SPHERE], CAMERA, fine)
 
 
 @pytest.mark.slow

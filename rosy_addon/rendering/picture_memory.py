@@ -231,7 +231,7 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     if not has_even_lines(look) or has_breaks(look):
         lic += _lic_bytes(view, look, coverage, lines, noise_channels)
     if has_overshoot(look):
-        tones = 4 * (lines + 6) * visible
+        tones = 4 * (lines + 1) * visible
         lic = max(lic, images + tones + _sheets_bytes(view, look, coverage, lines, 3))
     has_surface_grain = has_paper_grain(look) and look.anchor == "surface"
     paper_grain = 0

@@ -377,7 +377,7 @@ def test_a_cluster_renders_all_frames(file, tmp_path, cluster):
     address = cluster.scheduler_address
     process = start(file, tmp_path / "two", "--frames", "1-20", "--scheduler", address)
     deadline = time.monotonic() + 60
-    while len(frames_of(tmp_path / "two")) < 3 and time.monotonic() < deadline:
+    while len(list((tmp_path / "two").glob("[!.]*.png"))) < 3 and time.monotonic() < deadline:
         time.sleep(0.02)
     victim = next(iter(cluster.workers.values()))
     os.kill(victim.pid, signal.SIGKILL)

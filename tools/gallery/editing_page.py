@@ -122,7 +122,7 @@ def _moved_out_of_sight(
         free = hidden[distance > HIDDEN_DISTANCE * surface.extent]
         target = free[np.linalg.norm(points[free] - points[source], axis=1).argmin()]
         field = move_index(surface, field, int(source), int(target))
-        singular, _ = find_singularities(surface, field)
+        singular[singular == source] = target
     return field
 
 

@@ -19,8 +19,9 @@ from rosy_addon.field.representation import (
 )
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import Camera, orbit_camera
-from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
 
 
@@ -92,8 +93,7 @@ def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
 
 def points_on_surface(surface: Surface, camera: Camera, curve: np.ndarray) -> np.ndarray:
     """Return the points of a surface that a camera sees at (n, 2) places of the picture, without misses."""
-    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
-    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    buffer = _visible_pixels(surface, camera)
     position = np.full((camera.height * camera.width, 3), np.nan)
     position[buffer.pixel] = (
         buffer.position @ camera.view[:3, :3] - camera.view[:3, 3] @ camera.view[:3, :3]
@@ -124,16 +124,18 @@ def visible_vertices(
     surface: Surface, vertex: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return whether the camera sees some vertices, and their (n, 2) places in its pixels."""
-    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
-    buffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    depth = np.full(camera.height * camera.width, -np.inf)
-    depth[buffer.pixel] = buffer.position[:, 2]
-    points = np.c_[surface.vertices[vertex], np.ones(len(vertex))]
-    clip = points @ (camera.projection @ camera.view).T
-    place = (clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)
-    z = (points @ camera.view.T)[:, 2]
+    buffer = _visible_pixels(surface, camera)
+    nearest = np.full(camera.height * camera.width, np.inf)
+    nearest[buffer.pixel] = -buffer.position[:, 2]
+    place, depth = project_to_pixels(surface.vertices[vertex], camera)
     column, row = place.astype(int).T
-    return z > depth[row * camera.width + column] - 0.03, place
+    return depth < nearest[row * camera.width + column] + 0.03, place
+
+
+def _visible_pixels(surface: Surface, camera: Camera) -> GBuffer:
+    """Return the G-buffer of a surface without a field of its own."""
+    field = RosyField(1, np.broadcast_to([1.0, 0.0, 0.0], (surface.face_count, 3)))
+    return project([MeshInstance(surface, np.eye(4), field)], camera)
 
 
 def frame_of(values: np.ndarray, pixel: np.ndarray, shape: Sequence[int]) -> np.ndarray:

@@ -57,9 +57,6 @@ class Device(Protocol):
     def depth_texture(self, width: int, height: int) -> Any:
         """Return a depth buffer."""
 
-    def clear(self, texture: Any) -> None:
-        """Set a texture to 0."""
-
     def batch(self, vertices: np.ndarray) -> Any:
         """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
 
@@ -147,10 +144,6 @@ class BlenderDevice:
     def depth_texture(self, width: int, height: int) -> Any:
         """As `Device.depth_texture`."""
         return self._gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
-
-    def clear(self, texture: Any) -> None:
-        """As `Device.clear`."""
-        texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
 
     def batch(self, vertices: np.ndarray) -> Any:
         """As `Device.batch`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,14 @@ from ..compositor.shading import Light
 from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
 from .field_kind import FieldKind
-from .passes import ComputePass
+from .mesh_buffers import MAX_TRIANGLES
+from .passes import ComputePass, clear_pass
 from .resources import DrawItem, GpuResources
 from .screen_box import Box, box_size, is_empty, screen_box, union_box
 from .uniforms import camera_uniforms, instance_uniforms
+
+#: The smallest id in the id buffer. Ids are the bits of floats, which are then neither 0 nor subnormal.
+FIRST_TRIANGLE_ID = 0x00800000
 
 
 @dataclass(eq=False)
@@ -58,6 +63,14 @@ class Frame:
     def pixel_look(self) -> Look:
         """The look with lengths in pixels of the supersampled frame."""
         return supersampled_look(self.look)
+
+    @cached_property
+    def first_triangle_ids(self) -> list[int]:
+        """The id of the first triangle of each item in the id buffer."""
+        counts = [item.mesh.buffers.triangle_count for item in self.items]
+        # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
+        spans = [count + count // MAX_TRIANGLES for count in counts]
+        return [FIRST_TRIANGLE_ID + sum(spans[:index]) for index in range(len(spans))]
 
     @property
     def kinds(self) -> list[FieldKind]:
@@ -109,11 +122,22 @@ class Frame:
             {**self.textures, "triangle_records": item.mesh.records_texture},
             images,
             {
-                **camera_uniforms(self.camera),
-                **instance_uniforms(instance_id, item, self.camera),
+                **self.instance_uniforms(instance_id),
                 **uniforms,
             },
         )
+
+    def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
+        """Return the uniforms of the camera and of one instance."""
+        first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
+        return {
+            **camera_uniforms(self.camera),
+            **instance_uniforms(instance_id, first_triangle_id, item, self.camera),
+        }
+
+    def clear(self, image: Any, texel_format: str = "RGBA32F") -> None:
+        """Set an image of the size of the frame to 0."""
+        self.run(clear_pass(texel_format), (0, 0, *self.size), {}, {"cleared": image}, {})
 
     def run(
         self,

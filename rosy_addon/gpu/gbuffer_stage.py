@@ -20,15 +20,15 @@ def render_gbuffer(frame: Frame) -> None:
         (
             item.mesh.batch,
             {
-                "instance_id": float(instance_id),
+                "first_triangle_id": first_triangle_id,
                 **clip_uniforms(item, camera, frame.clip_planes),
             },
         )
-        for instance_id, item in enumerate(frame.items)
+        for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True)
     ]
     is_clipped = not np.array_equal(frame.clip_planes, NO_CLIP_PLANES)
     shader = passes.VISIBILITY_CLIPPED if is_clipped else passes.VISIBILITY
-    visibility = image("visibility", *size, "RG32F")
+    visibility = image("visibility", *size, "R32F")
     frame.resources.device.draw(
         shader, batches, (visibility, frame.resources.depth_image(*size)), {}
     )
@@ -40,7 +40,7 @@ def render_gbuffer(frame: Frame) -> None:
         "depth_slopes": image("depth_slopes", *size),
         "field_channels": image("field_channels", *channel_size, layers=max(channel_count, 1)),
     }
-    frame.resources.device.clear(gbuffer["field_values"])
+    frame.clear(gbuffer["field_values"])
     frame.textures["visibility"] = visibility
     for instance_id, item, box in frame.fields_in_view():
         uniforms = {

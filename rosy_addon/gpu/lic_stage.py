@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..compositor.lic import noise_args
 from ..compositor.look import Look
 from ..progress import Progress, Task
 from . import lookup_tables, passes
@@ -74,11 +75,13 @@ def _unfold_task(
     """Return the images of the covering: its cells, and directions with their gradients."""
     yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
-    cells = image("cells", *frame.size)
+    has_color_noise = noise_args(frame.pixel_look)["channels"] > 1
+    shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
+    cells = image("cells", *frame.size, dict(shader.images)["cells"])
     directions = image("directions", *frame.size, "RGBA16F", lines)
     angle_gradients = image("angle_gradients", *frame.size, "RGBA16F", lines)
     frame.run(
-        passes.DIRECTIONS,
+        shader,
         box,
         frame.textures,
         {"cells": cells, "directions": directions},

@@ -63,6 +63,11 @@ class MeshBuffers:
     has_tone: bool = False
 
     @property
+    def triangle_count(self) -> int:
+        """Number of triangles."""
+        return len(self.corners) // 3
+
+    @property
     def channel_count(self) -> int:
         """Number of channels of the field."""
         return max(self.texels_per_record - record_texels(0, self.has_tone), 0) // 2

@@ -75,7 +75,7 @@ def _render_wobble(frame: Frame) -> None:
 def _surface_noise_task(frame: Frame, settings: dict[str, Any], name: str) -> Task[Any]:
     """Return noise that moves with the surfaces, as `surface_noise.surface_noise`."""
     raw_noise = frame.resources.image("raw_noise", *frame.size)
-    frame.resources.device.clear(raw_noise)
+    frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
     names = [item.mesh.keep_alive[0].name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)

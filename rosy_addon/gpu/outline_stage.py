@@ -13,7 +13,7 @@ from .defines import CREASE_SLICES, CREASES_PER_ROW
 from .frame import Frame
 from .resources import DrawItem, OutlineTextures
 from .screen_box import Box
-from .uniforms import camera_uniforms, clip_uniforms, instance_uniforms
+from .uniforms import clip_uniforms
 
 #: Label of all steps of this stage.
 STEP_LABEL = "drawing outlines"
@@ -27,10 +27,10 @@ def outline_task(frame: Frame) -> Task[None]:
     look = frame.pixel_look
     if not has_outline(look):
         return
-    image, device, size = frame.resources.image, frame.resources.device, frame.size
+    image, size = frame.resources.image, frame.size
     crease_marks, edges = image("crease_marks", *size, "RGBA16F"), image("outline_edges", *size)
-    device.clear(crease_marks)
-    device.clear(edges)
+    frame.clear(crease_marks, "RGBA16F")
+    frame.clear(edges)
     crease_angle = None if look.cross_creases else look.crease_angle
     for instance_id, item, box in frame.fields_in_view():
         yield Progress(0.01, STEP_LABEL)
@@ -65,8 +65,7 @@ def _mark_creases(
         {"crease_marks": crease_marks},
         {
             **clip_uniforms(item, frame.camera, frame.clip_planes),
-            **camera_uniforms(frame.camera),
-            **instance_uniforms(instance_id, item, frame.camera),
+            **frame.instance_uniforms(instance_id),
             "crease_count": found.crease_count,
         },
     )
@@ -89,7 +88,7 @@ def _render_edges(
         {**frame.textures, "crease_marks": crease_marks, "triangle_parts": parts},
         {"outline_edges": edges},
         {
-            "instance_id": float(instance_id),
+            **frame.instance_uniforms(instance_id),
             "outline": look.outline,
             "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
             "has_creases": int(found.crease_count > 0),

@@ -32,7 +32,8 @@ _INSTANCE: Uniforms = (
     ("model_view_x", "vec4"),
     ("model_view_y", "vec4"),
     ("model_view_z", "vec4"),
-    ("instance_id", "float"),
+    ("first_triangle_id", "int"),
+    ("triangle_count", "int"),
     ("texels_per_record", "int"),
 )
 _COVERING: Uniforms = (("degree", "int"), ("line_count", "int"), ("sheet_count", "int"))
@@ -97,7 +98,7 @@ class ComputePass:
     @property
     def key(self) -> Hashable:
         """What tells compiled shaders apart."""
-        return self.name, self.constants
+        return self.name, self.images, self.constants
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -178,7 +179,7 @@ VISIBILITY = RasterPass(
     (),
     (("triangle_id", "float"),),
     "visibility",
-    (*_CLIP_MATRIX, ("instance_id", "float")),
+    (*_CLIP_MATRIX, ("first_triangle_id", "int")),
 )
 
 #: `VISIBILITY` with clip planes. It is a separate pass, as the planes take a third of its time.
@@ -187,7 +188,7 @@ VISIBILITY_CLIPPED = RasterPass(
     (),
     (("triangle_id", "float"), *_CLIP_DISTANCES),
     "visibility",
-    (*_CLIP_MATRIX, *_CLIP_PLANES, ("instance_id", "float")),
+    (*_CLIP_MATRIX, *_CLIP_PLANES, ("first_triangle_id", "int")),
 )
 
 RESOLVE = ComputePass(
@@ -204,6 +205,7 @@ RESOLVE = ComputePass(
         *_CAMERA,
         ("pixels_per_unit", "float"),
         *_INSTANCE,
+        ("instance_id", "float"),
         ("model_scale", "float"),
         ("channel_count", "int"),
     ),
@@ -305,7 +307,7 @@ EVEN_LINES = ComputePass(
 DIRECTIONS = ComputePass(
     "directions",
     ("normals", "field_values", "depth_slopes", "field_channels[]", "noise", "wobble_angles"),
-    (("cells", "RGBA32F"), ("directions[]", "RGBA16F")),
+    (("cells", "RG32F"), ("directions[]", "RGBA16F")),
     (
         *_BOX_ORIGIN,
         *_CAMERA,
@@ -318,6 +320,9 @@ DIRECTIONS = ComputePass(
     ),
     includes=("surface_continuity", "screen_direction"),
 )
+
+#: `DIRECTIONS` for noise of three channels.
+COLOR_DIRECTIONS = replace(DIRECTIONS, images=(("cells", "RGBA32F"), *DIRECTIONS.images[1:]))
 
 #: The pixels next to creases, one thread for some of the crossings of each edge.
 OUTLINE_CREASES = ComputePass(
@@ -342,6 +347,7 @@ OUTLINE_EDGES = ComputePass(
     (
         *_BOX_ORIGIN,
         ("instance_id", "float"),
+        ("first_triangle_id", "int"),
         *setting_uniforms(("outline",)),
         ("min_normal_cosine", "float"),
         ("has_creases", "int"),
@@ -540,7 +546,14 @@ BACKGROUND = RasterPass(
     (("background_color", "vec4"), ("low_corner", "vec2"), ("high_corner", "vec2")),
 )
 
+
+def clear_pass(texel_format: str) -> ComputePass:
+    """Return the pass that sets an image of a format to 0."""
+    return ComputePass("clear", (), (("cleared", texel_format),), _BOX_ORIGIN)
+
+
 ALL_PASSES = (
+    clear_pass("RGBA32F"),
     VISIBILITY,
     VISIBILITY_CLIPPED,
     RESOLVE,

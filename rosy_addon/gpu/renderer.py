@@ -124,7 +124,7 @@ class GpuRenderer:
         )
         render_gbuffer(frame)
         yield from outline_task(frame)
-        self.device.clear(fine_picture)
+        frame.clear(fine_picture)
         yield from noise_task(frame)
         yield from even_lines_task(frame)
         yield Progress(0.15, "finding tones")
@@ -181,7 +181,7 @@ class GpuRenderer:
         size = camera.width, camera.height
         return {
             name: self.device.read(self.resources.image(name, *size), *size)
-            for name in ("visibility", "normals", "field_values")
+            for name in ("normals", "field_values")
         }
 
     def _downsampled(

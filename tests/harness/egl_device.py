@@ -16,7 +16,7 @@ from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 from rosy_addon.progress import Progress, Task
 
 #: Components and data type of each texel format.
-FORMATS = {"RGBA32F": (4, "f4"), "RGBA16F": (4, "f2"), "RG32F": (2, "f4")}
+FORMATS = {"RGBA32F": (4, "f4"), "RGBA16F": (4, "f2"), "RG32F": (2, "f4"), "R32F": (1, "f4")}
 
 #: A function that Blender defines for shaders that draw into its views.
 BLENDER_DEFINES = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
@@ -62,10 +62,6 @@ class EglDevice:
     def depth_texture(self, width: int, height: int) -> Any:
         """As `Device.depth_texture`."""
         return self.context.depth_texture((width, height))
-
-    def clear(self, texture: Any) -> None:
-        """As `Device.clear`."""
-        self.context.framebuffer([texture]).clear()
 
     def batch(self, vertices: np.ndarray) -> Any:
         """As `Device.batch`."""

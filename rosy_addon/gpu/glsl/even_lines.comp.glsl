@@ -25,11 +25,10 @@ void main()
   if (any(greaterThanEqual(pixel, frame))) {
     return;
   }
-  vec2 visible = texelFetch(visibility, pixel, 0).xy;
-  if (visible.x != instance_id + 1.0) {
+  int triangle = visible_triangle(pixel);
+  if (!is_of_instance(triangle)) {
     return;
   }
-  int triangle = int(visible.y);
   vec2 ray = pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift);
   vec3 eye = direction_to_eye(ray, is_perspective != 0);
   Corners corners = corners_to_camera(corner_positions(triangle));

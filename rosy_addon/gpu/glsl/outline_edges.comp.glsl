@@ -4,7 +4,8 @@
 
 int part_of(ivec2 pixel)
 {
-  int triangle = int(texelFetch(visibility, pixel, 0).y), texel = triangle >> 2;
+  int triangle = floatBitsToInt(texelFetch(visibility, pixel, 0).x) - first_triangle_id;
+  int texel = triangle >> 2;
   vec4 parts = texelFetch(triangle_parts, ivec2(texel & ((1 << ROW_BITS) - 1), texel >> ROW_BITS), 0);
   return int(parts[triangle & 3]);
 }

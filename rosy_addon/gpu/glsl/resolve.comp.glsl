@@ -41,11 +41,10 @@ void main()
   if (any(greaterThanEqual(pixel, frame))) {
     return;
   }
-  vec2 visible = texelFetch(visibility, pixel, 0).xy;
-  if (visible.x != instance_id + 1.0) {
+  int triangle = visible_triangle(pixel);
+  if (!is_of_instance(triangle)) {
     return;
   }
-  int triangle = int(visible.y);
   Corners model_corners = corner_positions(triangle), model_normals = corner_normals(triangle);
   vec3 n0 = model_normals.first, n1 = model_normals.second, n2 = model_normals.third;
   vec2 ray = pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift);

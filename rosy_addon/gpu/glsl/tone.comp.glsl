@@ -40,8 +40,8 @@ void main()
   if (any(greaterThanEqual(pixel, frame))) {
     return;
   }
-  vec2 visible = texelFetch(visibility, pixel, 0).xy;
-  if (visible.x != instance_id + 1.0) {
+  int triangle = visible_triangle(pixel);
+  if (!is_of_instance(triangle)) {
     return;
   }
   vec3 light = 1.0 - shading + shading * texelFetch(lighting, pixel, 0).xyz;
@@ -60,7 +60,6 @@ void main()
     tone = sample_image(uv, image_level);
   }
   else {
-    int triangle = int(visible.y);
     vec4 uv01 = record_texel(triangle, texels_per_record - 3);
     vec4 uv2 = record_texel(triangle, texels_per_record - 2);
     Corners corners = corners_to_camera(corner_positions(triangle));

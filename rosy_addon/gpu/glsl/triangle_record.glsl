@@ -1,4 +1,15 @@
-// The record of a triangle (`mesh_buffers`), for passes over one instance.
+// The triangles of one instance, and their records (`mesh_buffers`).
+
+// The triangle of the instance that a pixel sees; outside of [0, triangle_count) if it sees another one.
+int visible_triangle(ivec2 pixel)
+{
+  return floatBitsToInt(texelFetch(visibility, pixel, 0).x) - first_triangle_id;
+}
+
+bool is_of_instance(int triangle)
+{
+  return triangle >= 0 && triangle < triangle_count;
+}
 
 // A texel of a record. Row lengths are powers of two because integer division is slow.
 vec4 record_texel(int triangle, int texel)

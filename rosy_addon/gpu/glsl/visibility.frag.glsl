@@ -1,6 +1,6 @@
-// The id buffer: instance id + 1, and triangle id.
+// The id of the triangle in the picture, as the bits of a float; 0 where there is none.
 
 void main()
 {
-  visibility = vec4(instance_id + 1.0, triangle_id, 0.0, 1.0);
+  visibility = vec4(uintBitsToFloat(uint(first_triangle_id) + uint(triangle_id)), 0.0, 0.0, 1.0);
 }

@@ -5,5 +5,5 @@ void main()
   if (any(lessThan(clip_distances, vec4(0.0))) || any(lessThan(more_clip_distances, vec2(0.0)))) {
     discard;
   }
-  visibility = vec4(instance_id + 1.0, triangle_id, 0.0, 1.0);
+  visibility = vec4(uintBitsToFloat(uint(first_triangle_id) + uint(triangle_id)), 0.0, 0.0, 1.0);
 }

@@ -27,14 +27,13 @@ void main()
   if (any(greaterThanEqual(pixel, frame))) {
     return;
   }
-  vec2 visible = texelFetch(visibility, pixel, 0).xy;
-  if (visible.x != instance_id + 1.0) {
+  int triangle = visible_triangle(pixel);
+  if (!is_of_instance(triangle)) {
     return;
   }
   vec3 position = vec3(vec2(pixel), 0.0);
   float size = pixel_size;
   if (on_surface != 0) {
-    int triangle = int(visible.y);
     Corners rest_corners = rest_positions(triangle);
     Corners corners = corners_to_camera(corner_positions(triangle));
     vec3 weights = edge_functions(corners, pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift));

@@ -1,0 +1,9 @@
+// Set an image to 0. Framebuffer clears are slow on some cards.
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  if (all(lessThan(pixel, imageSize(cleared)))) {
+    imageStore(cleared, pixel, vec4(0.0));
+  }
+}

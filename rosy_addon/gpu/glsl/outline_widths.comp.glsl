@@ -7,7 +7,7 @@
 
 // The connected part of the window that contains its center.
 struct Mark {
-  int length;
+  int long_side;
   int short_side;
   int part_borders;
   bool is_at_empty;
@@ -30,10 +30,10 @@ Mark mark_around(ivec2 block)
     }
   }
   Mark mark;
-  mark.length = 0;
+  mark.long_side = 0;
   // Sweeps up and down, until nothing is added. Longer marks need not be followed to their ends.
   bool grows = true;
-  for (int sweep = 0; grows && sweep < WINDOW_SIDE * WINDOW_SIDE && mark.length < FULL_MARK_LENGTH;
+  for (int sweep = 0; grows && sweep < WINDOW_SIDE * WINDOW_SIDE && mark.long_side < FULL_MARK_LENGTH;
        ++sweep) {
     grows = false;
     int columns = 0, first_row = WINDOW_SIDE, last_row = 0;
@@ -49,7 +49,7 @@ Mark mark_around(ivec2 block)
       last_row = grown != 0 ? max(last_row, row) : last_row;
     }
     ivec2 sides = ivec2(findMSB(columns) - findLSB(columns), last_row - first_row) + 1;
-    mark.length = max(sides.x, sides.y);
+    mark.long_side = max(sides.x, sides.y);
     mark.short_side = min(sides.x, sides.y);
   }
   mark.part_borders = 0;
@@ -70,9 +70,9 @@ void main()
   float max_width = 0.0;
   if (texelFetch(outline_blocks, block, 0).x > 0.0) {
     Mark mark = mark_around(block);
-    bool surrounds = mark.part_borders >= mark.length + mark.short_side && mark.short_side > 1;
+    bool surrounds = mark.part_borders >= mark.long_side + mark.short_side && mark.short_side > 1;
     float hidden = float(MIN_MARK_LENGTH - 1);
-    float share = (float(mark.length) - hidden) / (float(FULL_MARK_LENGTH) - hidden);
+    float share = (float(mark.long_side) - hidden) / (float(FULL_MARK_LENGTH) - hidden);
     max_width = outline * (surrounds || mark.is_at_empty ? 1.0 : clamp(share, 0.0, 1.0));
   }
   for (int y = 0; y < supersampling; ++y) {

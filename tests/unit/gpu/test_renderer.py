@@ -366,6 +366,12 @@ def test_sources_use_no_other_names_of_passes(shader):
 
 
 @pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+def test_no_member_of_a_struct_is_called_length(shader):
+    """With Vulkan, the compiler takes it for the length of an array."""
+    assert not re.search(r"\.length\b", without_comments(own_source(shader)))
+
+
+@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
 def test_arrays_are_read_and_written_as_arrays(shader):
     code = without_comments(own_source(shader))
     names = list(shader.textures)

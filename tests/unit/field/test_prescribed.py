@@ -15,7 +15,7 @@ from rosy_addon.field.face_graph import face_graph_task, spanning_forest_task
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
-from rosy_addon.field.surface import Surface
+from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.progress import run_to_completion
 
 
@@ -91,6 +91,80 @@ def test_a_torus_without_singularities_has_parallel_lines():
     along /= np.linalg.norm(along, axis=1)[:, None]
     cosine = np.abs((field.vectors * along).sum(axis=1))
     assert np.minimum(cosine, np.sqrt(np.maximum(1 - cosine**2, 0))).max() < 1e-6
+
+
+def rings(count: int, segments: int, total: float = 2 * np.pi) -> Surface:
+    """Right triangles in rings around vertex 0: a disc, or a cone whose angles add up to `total`."""
+    radius = np.repeat(np.arange(1, count + 1) / count, segments)
+    azimuth = np.tile(np.arange(segments) * 2 * np.pi / segments, count)
+    slope = total / (2 * np.pi)
+    points = np.stack(
+        [
+            slope * radius * np.cos(azimuth),
+            slope * radius * np.sin(azimuth),
+            -np.sqrt(1 - slope**2) * radius,
+        ],
+        axis=1,
+    )
+    inner = 1 + np.arange(segments)
+    following = np.roll(inner, -1)
+    fan = np.stack([np.zeros_like(inner), inner, following], axis=1)
+    band = np.stack([inner, inner + segments, following + segments], axis=1)
+    other = np.stack([inner, following + segments, following], axis=1)
+    shift = segments * np.arange(count - 1)[:, None, None]
+    faces = np.concatenate([fan, *((part + shift).reshape(-1, 3) for part in (band, other))])
+    return build_surface(
+        np.concatenate([[[0, 0, 0]], points]), faces.ravel(), np.arange(0, faces.size + 1, 3)
+    )
+
+
+def errors(field, first_axis, second_axis, angle) -> np.ndarray:
+    """(F,) degrees from a field to angles in frames, which it may differ from by a constant."""
+    own = np.arctan2(
+        (field.vectors * second_axis).sum(axis=1), (field.vectors * first_axis).sum(axis=1)
+    )
+    relative = np.exp(1j * field.degree * (own - angle))
+    return np.degrees(np.abs(np.angle(relative * relative.mean().conj()))) / field.degree
+
+
+#: Edges are weighed by the distances of the centers of their faces, which is right only if the line
+#: between two centers is perpendicular to their edge.
+wrong_on_skewed_triangles = pytest.mark.xfail(reason="needs circumcenters", strict=True)
+
+
+@wrong_on_skewed_triangles
+@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+def test_a_pair_in_a_disc_turns_as_its_closed_form(degree):
+    """Its potential is that of two charges and their images in the border."""
+    surface = rings(60, 120)
+    points = surface.vertices @ (1, 1j, 0)
+    pair = [int(np.abs(points - place).argmin()) for place in (0.4 + 0.1j, -0.3 - 0.35j)]
+    field = prescribed_field(surface, degree, pair, [1, -1])
+    center = surface.face_center @ (1, 1j, 0)
+    phase = [
+        np.angle(center - place) - np.angle(1 - place.conj() * center) for place in points[pair]
+    ]
+    error = errors(field, (1, 0, 0), (0, 1, 0), (phase[0] - phase[1]) / degree)
+    assert np.percentile(error, 90) < 2 / degree
+
+
+@wrong_on_skewed_triangles
+@pytest.mark.parametrize("degree, index", [(1, 1), (2, 0), (4, 0), (6, 1)])
+def test_a_cone_turns_evenly_around_its_apex(degree, index):
+    surface = rings(30, 120, np.radians(240))
+    field = prescribed_field(surface, degree, [0][:index], [1][:index])
+    azimuth = np.arctan2(surface.face_center[:, 1], surface.face_center[:, 0])
+    slope = 240 / 360
+    outward = np.stack(
+        [
+            slope * np.cos(azimuth),
+            slope * np.sin(azimuth),
+            np.full(len(azimuth), -np.sqrt(1 - slope**2)),
+        ],
+        axis=1,
+    )
+    around = np.cross(surface.face_normal, outward)
+    assert errors(field, outward, around, (index / degree - 1) * azimuth).max() < 0.5
 
 
 def test_guides_turn_the_whole_field():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ class Frame:
         counts = [item.mesh.buffers.triangle_count for item in self.items]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
         spans = [count + count // MAX_TRIANGLES for count in counts]
-        return [FIRST_TRIANGLE_ID + sum(spans[:index]) for index in range(len(spans))]
+        return list(accumulate(spans, initial=FIRST_TRIANGLE_ID))[:-1]
 
     @property
     def kinds(self) -> list[FieldKind]:

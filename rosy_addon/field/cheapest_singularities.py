@@ -125,17 +125,17 @@ def _settled_task(
         charge = unit * (given + added) - graph.defect
         solution = yield from conjugate_gradient_task(
             matrix,
-            charge[graph.is_interior].astype(np.complex128),
+            charge[graph.is_interior],
             TOLERANCE,
             partial(w_cycle, levels),
             LABEL,
         )
-        energy = float(charge[graph.is_interior] @ solution.real)
+        energy = float(charge[graph.is_interior] @ solution)
         # Those that are still at given singularities have to leave them, whatever it costs.
         if energy < least or (best[given != 0] != 0).any():
             best, least = added, energy
             potential = np.zeros(graph.node_count)
-            potential[graph.is_interior] = solution.real
+            potential[graph.is_interior] = solution
         else:
             share *= 0.5
             if share < MIN_SHARE:

@@ -33,7 +33,7 @@ def conjugate_gradient_task(
     ----------
     matrix : CSRMatrix
         (n, n), Hermitian and positive definite.
-    rhs : (n,) complex ndarray
+    rhs : (n,) complex or float ndarray
     tolerance : float
         Residual norm relative to that of `rhs` at which the iteration stops, unless rounding errors stop it
         before.
@@ -42,7 +42,7 @@ def conjugate_gradient_task(
         of multigrid by default.
     label : str
         Of the progress.
-    start : (n,) complex ndarray, optional
+    start : (n,) complex or float ndarray, optional
         First approximation; 0 by default.
     is_fixed : (n,) bool ndarray, optional
         Unknowns that keep the values of `start`. Their equations are left out.
@@ -54,7 +54,7 @@ def conjugate_gradient_task(
 
     Returns
     -------
-    (n,) complex ndarray
+    (n,) complex or float ndarray
         The last iterate.
     """
     if precondition is None:
@@ -104,7 +104,7 @@ def _largest_part(*vectors: np.ndarray | None) -> float:
         float(np.abs(part).max(initial=0))
         for vector in vectors
         if vector is not None
-        for part in (vector.real, vector.imag)
+        for part in ((vector.real, vector.imag) if np.iscomplexobj(vector) else (vector,))
     )
 
 
@@ -115,4 +115,5 @@ def _norm(vector: np.ndarray) -> float:
 
 def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
     """The real part of the inner product a* b."""
-    return float(np.sum(a.real * b.real) + np.sum(a.imag * b.imag))
+    product = np.sum(a.real * b.real)
+    return float(product + np.sum(a.imag * b.imag) if np.iscomplexobj(a) else product)

@@ -28,8 +28,10 @@ class FaceGraph:
 
     Attributes
     ----------
+    halfedges : (I, 2) int32 ndarray
+        The corners where each edge starts, in the face on either side.
     source, target : (I,) int32 ndarray
-        The two faces at each edge.
+        Those two faces.
     unfolding : (I,) float64 ndarray
         Angle in radians that is added to a direction in the frame of the source, if it is transported to
         that of the target.
@@ -49,6 +51,7 @@ class FaceGraph:
         That of the faces of each vertex node.
     """
 
+    halfedges: np.ndarray
     source: np.ndarray
     target: np.ndarray
     unfolding: np.ndarray
@@ -120,6 +123,7 @@ def face_graph_task(
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
     return FaceGraph(
+        halfedges=halfedges,
         source=source,
         target=target,
         unfolding=np.angle(unfolding),

@@ -18,10 +18,13 @@ from .conjugate_gradient import conjugate_gradient_task
 from .face_graph import FaceGraph
 from .representation import complex_bincount
 from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task, w_cycle
-from .turning_angles import MAX_ATTEMPTS, added_resistance
+from .turning_angles import added_resistance
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-8
+
+#: Number of times that the field is kept from turning too fast between two faces.
+MAX_ATTEMPTS = 8
 
 #: Number of times that the multiples of the guides are improved.
 MAX_ROUNDS = 12
@@ -91,8 +94,7 @@ def guided_rotation_task(
             yield Progress(0.5 * (start + stop), LABEL)
             multiple = np.rint((angle - wanted) / sector)
             rhs = penalty * (wanted + sector * multiple)
-            solution = yield from _solve_task(matrix, rhs, levels)
-            angle = solution.real
+            angle = yield from _solve_task(matrix, rhs, levels)
             if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
                 break
         added = angle[graph.target] - angle[graph.source]
@@ -113,7 +115,7 @@ def _system_task(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -
         yield from from_coo_task(
             np.concatenate([source, target, faces]),
             np.concatenate([target, source, faces]),
-            np.concatenate([-stiffness, -stiffness, diagonal]).astype(np.complex128),
+            np.concatenate([-stiffness, -stiffness, diagonal]),
             count,
             count,
         )
@@ -137,7 +139,7 @@ def _initial_angle_task(
     divergence = np.bincount(graph.target, stiffness * difference, count)
     divergence -= np.bincount(graph.source, stiffness * difference, count)
     laplacian = yield from _system_task(graph, stiffness, np.zeros(count))
-    angle = (yield from _solve_task(laplacian, divergence, None)).real
+    angle = yield from _solve_task(laplacian, divergence, None)
     rest = penalty * unit * np.exp(-1j * angle)
     parts = int(graph.component.max(initial=-1)) + 1
     return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]
@@ -146,8 +148,4 @@ def _initial_angle_task(
 def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> Task[np.ndarray]:
     """Solve a system; see `conjugate_gradient_task`."""
     precondition = None if levels is None else partial(w_cycle, levels)
-    return (
-        yield from conjugate_gradient_task(
-            matrix, rhs.astype(np.complex128), TOLERANCE, precondition, LABEL
-        )
-    )
+    return (yield from conjugate_gradient_task(matrix, rhs, TOLERANCE, precondition, LABEL))

@@ -97,10 +97,10 @@ def prescribed_task(
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, graph.defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - graph.defect
-    angle, tree = yield from subtask(turning_angles_task(graph, degree, required), 0.2, 0.85)
+    task = turning_angles_task(surface, graph, degree, required)
+    angle, direction = yield from subtask(task, 0.2, 0.85)
     _check_angles(surface, graph, degree, angle)
     yield Progress(0.85, LABEL)
-    direction = tree.sums_from_root(graph.unfolding + angle)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     edge = surface.vertices[surface.corner_vertex[next_corners(surface.face_start)]]
     edge = edge - surface.vertices[surface.corner_vertex]
@@ -170,11 +170,11 @@ def change_singularities_task(
     _check_sums(surface, graph, np.zeros(graph.node_count), node_change, degree)
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
-    task = turning_angles_task(graph, degree, 2 * np.pi / degree * node_change, present)
-    added, tree = yield from subtask(task, 0.2, 0.85)
+    required = 2 * np.pi / degree * node_change
+    task = turning_angles_task(surface, graph, degree, required, present)
+    added, direction = yield from subtask(task, 0.2, 0.85)
     _check_angles(surface, graph, degree, present + added)
     yield Progress(0.85, LABEL)
-    direction = tree.sums_from_root(graph.unfolding + present + added)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     task = _bent_task(surface, graph, degree, present + added, turned, z, reach)

@@ -1,5 +1,7 @@
 """Sparse Hermitian matrices in numpy, and algebraic multigrid for connection Laplacians.
 
+Matrices are complex or, if all their entries are, real; so is all that is made from them.
+
 The smooth vectors of a connection Laplacian are parallel, not constant: between neighboring
 unknowns their phase changes by the phase of the matrix entry. So each aggregate stores the phases
 along a tree within it. The prolongation is then smoothed by a Jacobi step (smoothed aggregation:
@@ -46,7 +48,7 @@ class CSRMatrix:
         The entries of row i are ``indptr[i] .. indptr[i + 1] - 1``.
     indices : (m,) intp ndarray
         Column of each entry.
-    data : (m,) complex ndarray
+    data : (m,) complex or float ndarray
         Values of the entries.
     column_count : int
     """
@@ -146,7 +148,7 @@ def from_coo_task(
     Parameters
     ----------
     row, column : (m,) intp ndarray
-    value : (m,) complex ndarray
+    value : (m,) complex or float ndarray
     row_count, column_count : int
     """
     # A radix sort by digits of 16 bits, the low digit first: numpy's stable sort takes linear time
@@ -239,7 +241,7 @@ class Level:
         (n, n_coarse) interpolation from the next coarser level; None on the coarsest level.
     jacobi_weight : (n,) float64 ndarray
         Factors of the residual in a Jacobi smoothing step.
-    inverse : (n, n) complex128 ndarray or None
+    inverse : (n, n) ndarray or None
         Dense inverse of the matrix on the coarsest level, if that is small enough.
     """
 
@@ -325,11 +327,11 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
     ----------
     levels : list of Level
         From `hierarchy_task`.
-    rhs : (n,) complex ndarray
+    rhs : (n,) complex or float ndarray
 
     Returns
     -------
-    (n,) complex ndarray
+    (n,) complex or float ndarray
     """
     level = levels[0]
     if level.inverse is not None:
@@ -367,7 +369,7 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     If the matrix is singular, its diagonal is enlarged a little. The inverse is a preconditioner, so
     that changes the rate of convergence, not the solution.
     """
-    dense = np.zeros((len(matrix), len(matrix)), dtype=np.complex128)
+    dense = np.zeros((len(matrix), len(matrix)), dtype=matrix.data.dtype)
     np.add.at(dense, (matrix.row_indices, matrix.indices), matrix.data)
     try:
         return np.linalg.inv(dense)
@@ -409,7 +411,7 @@ def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarra
         Aggregate of each unknown.
     count : int
         Number of aggregates.
-    phase : (n,) complex128 ndarray
+    phase : (n,) ndarray
         Numbers of modulus 1; a smooth vector is nearly proportional to them in each aggregate.
     """
     count = len(matrix)
@@ -435,7 +437,7 @@ def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarra
         free &= max_over_neighbors(max_over_neighbors(new_roots.astype(np.intp))) < 1
     aggregate = np.full(count, -1)
     aggregate[root] = np.arange(np.count_nonzero(root))
-    phase = np.ones(count, dtype=np.complex128)
+    phase = np.ones(count, dtype=matrix.data.dtype)
     for _ in range(2):
         yield Progress(1.0, "building multigrid levels")
         # A free unknown joins the aggregate of the neighbor with the strongest connection.

@@ -5,13 +5,14 @@ vertex, these angles and the angle defect add up to the singularity index. So a 
 solves linear equations for the angles, one for each interior vertex; and on surfaces with handles, or with
 several borders, one for each loop that no vertex can contract.
 
-The angles of least squares are those of a potential at the vertices, which solves a Poisson equation; and
-those of one harmonic solution for each loop. Around a loop, the field may turn by any multiple of 2 pi / N;
+The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
+triangles (`triangle_graph`); and those of one harmonic solution for each loop. Around a loop, the field may turn by any multiple of 2 pi / N;
 the multiples of least energy are chosen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -21,16 +22,24 @@ from ..progress import Progress, Task, subtask
 from .conjugate_gradient import conjugate_gradient_task
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest_task
 from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
+from .surface import Surface, connected_components
+from .triangle_graph import triangle_graph
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-10
 
 #: Attempts to keep the field from turning too fast between two faces, and the angle up to which edges
 #: are left alone, relative to half the angle between two members.
-MAX_ATTEMPTS, ANGLE_MARGIN = 8, 0.8
+MAX_ATTEMPTS, ANGLE_MARGIN = 24, 0.8
+
+#: Number of edges around too fast ones where the angles change at an attempt.
+REACH = 16
 
 #: Least angle that is left to add, relative to half the angle between two members.
 MIN_ROOM = 1e-6
+
+#: Largest change of the angle around a loop that is a rounding error, in radians.
+MAX_LOOP_CHANGE = 1e-6
 
 #: Least eigenvalue of the matrix of the loops, relative to the largest one. Smaller ones are rounding errors.
 MIN_EIGENVALUE = 1e-8
@@ -40,13 +49,19 @@ MAX_PAIRED_LOOPS = 20
 
 
 def turning_angles_task(
-    graph: FaceGraph, degree: int, required: np.ndarray, present: np.ndarray | float = 0.0
-) -> Task[tuple[np.ndarray, SpanningForest]]:
+    surface: Surface,
+    graph: FaceGraph,
+    degree: int,
+    required: np.ndarray,
+    present: np.ndarray | float = 0.0,
+) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Compute angles at the edges that have given sums around the vertices.
 
     Parameters
     ----------
+    surface : Surface
     graph : FaceGraph
+        Of its faces.
     degree : int
         N.
     required : (n,) ndarray
@@ -61,28 +76,75 @@ def turning_angles_task(
     Returns
     -------
     angle : (I,) float64 ndarray
-        Of least squares, weighted by 1 / conductance. Around loops, the angles are added to those present
-        and to the unfolding, and have a sum that is a multiple of 2 pi / N. Where a field would turn by half
-        of that or more between two faces, they get smaller, if that is possible.
-    tree : SpanningForest
-        Of the faces.
+        Of least squares. Around loops, the angles are added to those present and to the unfolding, and
+        have a sum that is a multiple of 2 pi / N. Where a field would turn by half of that or more between
+        two faces, they get smaller, if that is possible.
+    direction : (F,) float64 ndarray
+        Of the field that turns by these angles, in radians in the frames of the faces.
     """
-    face_count = len(graph.component)
-    tree = yield from subtask(
-        spanning_forest_task(face_count, graph.source, graph.target), 0.0, 0.1
-    )
-    loops = yield from subtask(_loops_task(graph, tree), 0.1, 0.2)
-    limit = np.pi / degree
+    triangles = triangle_graph(surface, graph)
+    present_between = triangles.on_triangles(present)
+    count = len(triangles.area)
+    task = spanning_forest_task(count, triangles.graph.source, triangles.graph.target)
+    tree = yield from subtask(task, 0.0, 0.1)
+    loops = yield from subtask(_loops_task(triangles.graph, tree), 0.1, 0.2)
+    task = least_angles_task(triangles.graph, degree, required, loops, present_between)
+    between = yield from subtask(task, 0.2, 0.8)
+    limit, angle = np.pi / degree, triangles.on_faces(between)
     for attempt in range(MAX_ATTEMPTS):
-        start, stop = 1 - 0.8 * 0.2**attempt, 1 - 0.8 * 0.2 ** (attempt + 1)
-        task = least_angles_task(graph, degree, required, loops, present)
-        angle = yield from subtask(task, start, stop)
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
-        # Where the field turns too fast, it turns less with a smaller conductance.
-        conductance = graph.conductance / added_resistance(angle, present, limit)
-        graph = replace(graph, conductance=conductance)
-    return angle, tree
+        factor = added_resistance(angle, present, limit)
+        triangles = triangles.with_resistance(factor)
+        start, stop = 1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt
+        task = _least_angles_near_task(
+            triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
+        )
+        between = yield from subtask(task, start, stop)
+        if between is None:
+            task = least_angles_task(triangles.graph, degree, required, loops, present_between)
+            between = yield from subtask(task, start, stop)
+        angle = triangles.on_faces(between)
+    direction = tree.sums_from_root(triangles.graph.unfolding + present_between + between)
+    return angle, triangles.directions_of_faces(direction, between)
+
+
+def _least_angles_near_task(
+    graph: FaceGraph,
+    required: np.ndarray,
+    loops: list[tuple[np.ndarray, np.ndarray]],
+    angle: np.ndarray,
+    changed: np.ndarray,
+) -> Task[np.ndarray | None]:
+    """(I,) angles of least squares near changed edges, where the other angles stay.
+
+    The result is None if the angles around loops would change, because the neighborhoods of the edges surround
+    a part of the surface.
+    """
+    is_near = np.zeros(graph.node_count, dtype=bool)
+    is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
+    for step in range(REACH):
+        yield Progress(0.2 * step / REACH, LABEL)
+        touches = is_near[graph.tail] | is_near[graph.head]
+        is_near[graph.tail[touches]] = is_near[graph.head[touches]] = True
+    edges = np.flatnonzero(is_near[graph.tail] & is_near[graph.head])
+    new_node = np.cumsum(is_near) - 1
+    tail, head = new_node[graph.tail[edges]], new_node[graph.head[edges]]
+    fixed = angle.copy()
+    fixed[edges] = 0
+    near = replace(
+        graph,
+        tail=tail,
+        head=head,
+        conductance=graph.conductance[edges],
+        is_interior=graph.is_interior[is_near],
+        node_component=connected_components(int(is_near.sum()), np.stack([tail, head], axis=1)),
+    )
+    rest = (required - graph.turn_around_nodes(fixed))[is_near]
+    solver = yield from subtask(_potential_solver_task(near), 0.2, 0.5)
+    fixed[edges] = yield from subtask(solver(rest), 0.5, 1.0)
+    change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
+    return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
@@ -101,36 +163,17 @@ def least_angles_task(
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
 ) -> Task[np.ndarray]:
-    """(I,) angles of least squares; see `turning_angles_task`."""
+    """(I,) angles of least squares, weighed by 1 / conductance; see `turning_angles_task`."""
     yield Progress(0.0, LABEL)
-    matrix = levels = None
-    if graph.is_interior.any():
-        matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.1)
-        levels = yield from subtask(hierarchy_task(matrix), 0.1, 0.5)
-
-    def potential_task(sums: np.ndarray) -> Task[np.ndarray]:
-        """(I,) angles of the potential whose angles have the sums around the nodes."""
-        if matrix is None:
-            return np.zeros(len(graph.source))
-        solution = yield from conjugate_gradient_task(
-            matrix,
-            sums[graph.is_interior].astype(np.complex128),
-            TOLERANCE,
-            partial(w_cycle, levels),
-            LABEL,
-        )
-        potential = np.zeros(graph.node_count)
-        potential[graph.is_interior] = solution.real
-        return graph.conductance * (potential[graph.head] - potential[graph.tail])
-
+    solver = yield from subtask(_potential_solver_task(graph), 0.0, 0.5)
     share = 0.5 / (len(loops) + 1)
-    angle = yield from subtask(potential_task(required), 0.5, 0.5 + share)
+    angle = yield from subtask(solver(required), 0.5, 0.5 + share)
     harmonics = []
     for number, (edges, signs) in enumerate(loops, 1):
         crossing = np.zeros(len(angle))
         np.add.at(crossing, edges, signs)
         crossing *= graph.conductance
-        task = potential_task(-graph.turn_around_nodes(crossing))
+        task = solver(-graph.turn_around_nodes(crossing))
         start = 0.5 + number * share
         harmonics.append(crossing + (yield from subtask(task, start, start + share)))
     if loops:
@@ -146,11 +189,29 @@ def least_angles_task(
     return angle
 
 
+def _potential_solver_task(graph: FaceGraph) -> Task[Callable[[np.ndarray], Task[np.ndarray]]]:
+    """A function that computes the (I,) angles of the potential with (n,) sums around the nodes."""
+    matrix = levels = None
+    if graph.is_interior.any():
+        matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.2)
+        levels = yield from subtask(hierarchy_task(matrix), 0.2, 1.0)
+
+    def solve_task(sums: np.ndarray) -> Task[np.ndarray]:
+        potential = np.zeros(graph.node_count)
+        if matrix is not None:
+            rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
+            task = conjugate_gradient_task(matrix, rhs, TOLERANCE, precondition, LABEL)
+            potential[graph.is_interior] = yield from task
+        return graph.conductance * (potential[graph.head] - potential[graph.tail])
+
+    return solve_task
+
+
 def potential_matrix_task(graph: FaceGraph) -> Task[CSRMatrix]:
     """The Laplacian of potentials at interior nodes, which are 0 at the others.
 
-    On closed components, the first node is
-    tied to 0 as well; the sums of a solvable equation do not change that node.
+    On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
+    that node.
     """
     count, unknown = int(graph.is_interior.sum()), np.cumsum(graph.is_interior) - 1
     tail, head, conductance = graph.tail, graph.head, graph.conductance
@@ -165,7 +226,7 @@ def potential_matrix_task(graph: FaceGraph) -> Task[CSRMatrix]:
     nodes = np.arange(count)
     value = np.concatenate(
         [-conductance[inside], -conductance[inside], diagonal[graph.is_interior]]
-    ).astype(np.complex128)
+    )
     row = np.concatenate([tail, head, nodes]).astype(np.intp)
     column = np.concatenate([head, tail, nodes]).astype(np.intp)
     return (yield from from_coo_task(row, column, value, count, count))

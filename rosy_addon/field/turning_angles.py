@@ -6,8 +6,8 @@ solves linear equations for the angles, one for each interior vertex; and on sur
 several borders, one for each loop that no vertex can contract.
 
 The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
-triangles (`triangle_graph`); and those of one harmonic solution for each loop. Around a loop, the field may turn by any multiple of 2 pi / N;
-the multiples of least energy are chosen.
+triangles (`triangle_graph`); and those of one harmonic solution for each loop. Around a loop, the field may
+turn by any multiple of 2 pi / N; the multiples of least energy are chosen.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ is stored and after an undo: the dots move with the object, but do not follow ot
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container
 from typing import Any
 
@@ -17,6 +18,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..compositor.label_placement import place_labels
 from ..errors import RosyError
 from ..scene.singularity_points import (
     Singularities,
@@ -220,20 +222,24 @@ def _draw_labels() -> None:
     blf.color(font_id, 1.0, 1.0, 1.0, 1.0)
     blf.enable(font_id, blf.SHADOW)
     blf.shadow(font_id, 5, 0.0, 0.0, 0.0, 1.0)
+    dots, texts = [], []
     for obj, singularities in _visible_singularities():
         if len(singularities) > MAX_LABELS:
             continue
         for point, index in zip(
             offset_points(obj, singularities), singularities.index.tolist(), strict=True
         ):
-            screen_position = location_3d_to_region_2d(
-                context.region, context.region_data, Vector(point)
-            )
-            if screen_position is not None and not is_occluded(context, point):
-                blf.position(
-                    font_id, screen_position.x + 8 * scale, screen_position.y + 5 * scale, 0
-                )
-                blf.draw(font_id, format_index(index, singularities.degree))
+            position = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
+            if position is not None and not is_occluded(context, point):
+                dots.append(position)
+                texts.append(format_index(index, singularities.degree))
+    if texts:
+        radius = (DOT_DIAMETER / 2 + 2) * scale
+        sizes = [blf.dimensions(font_id, text) for text in texts]
+        for text, corner in zip(texts, place_labels(dots, sizes, radius).tolist(), strict=True):
+            if math.isfinite(corner[0]):
+                blf.position(font_id, *corner, 0)
+                blf.draw(font_id, text)
     blf.disable(font_id, blf.SHADOW)
 
 

@@ -98,6 +98,9 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
         default=0.1,
     )
 
+    #: The stroke of the mouse, once that has been on the mesh.
+    _line = None
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if not poll_idle(cls):
@@ -125,22 +128,13 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if len(self.stroke) or context.region_data is None:
             return super().invoke(context, event)
-        obj = selected_mesh_objects(context)[0]
-        mouse = event.mouse_region_x, event.mouse_region_y
+        self._is_away = False
         try:
-            self._mouse = comb_brush.start_stroke(context, obj)
-            place = self._mouse.place(mouse)
-            if place is None:
-                comb_brush.end_stroke()
-                return {"CANCELLED", "PASS_THROUGH"}
-            comb = context.scene.rosy.comb
-            self.radius, self.strength = self._mouse.radius(place, comb.size), comb.strength
-            self._line: CombStroke = run_to_completion(self._stroke_task(context))
+            self._mouse = comb_brush.start_stroke(context, selected_mesh_objects(context)[0])
+            self._add(context, event)
         except REPORTED_ERRORS as error:
             comb_brush.end_stroke()
             return report_error(self, error)
-        self._is_away = False
-        self._add(mouse, event.pressure)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -162,15 +156,15 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
         """Handle an event while the mouse button is down."""
         try:
             if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
-                has_changed = self._add(
-                    (event.mouse_region_x, event.mouse_region_y), event.pressure
-                )
-                if has_changed and event.type == "MOUSEMOVE":
+                if self._add(context, event) and event.type == "MOUSEMOVE":
                     self._line.show()
             elif event.type in {"ESC", "RIGHTMOUSE"}:
                 self._take_back()
                 return {"CANCELLED"}
             elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+                if self._line is None:
+                    self._click_beside(context, event)
+                    return {"CANCELLED"}
                 self._line.lift()
                 self._line.show()
                 self._job = Job(context, self._settle_task(context, self._line), [self._line.mesh])
@@ -182,18 +176,29 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _take_back(self) -> None:
-        """Restore the field, if the mesh still exists."""
+        """Restore the field, if it was changed and the mesh still exists."""
         with suppress(ReferenceError):
-            self._line.restore()
+            if self._line is not None:
+                self._line.restore()
 
-    def _add(self, mouse: tuple[int, int], pressure: float) -> bool:
-        """Go on to a place under the mouse. Return whether the field has changed."""
-        place = self._mouse.place(mouse)
+    def _click_beside(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
+        """Select what is under the mouse, as a click does that is not on the mesh."""
+        if context.mode == "OBJECT" and self.effect == "COMB":
+            mouse = event.mouse_region_x, event.mouse_region_y
+            bpy.ops.view3d.select("EXEC_DEFAULT", True, deselect_all=True, location=mouse)
+
+    def _add(self, context: bpy.types.Context, event: bpy.types.Event) -> bool:
+        """Go on to the place under the mouse. Return whether the field has changed."""
+        place = self._mouse.place((event.mouse_region_x, event.mouse_region_y))
         if place is None:
             self._is_away = True
-            return self._line.lift()
+            return self._line is not None and self._line.lift()
+        if self._line is None:
+            comb = context.scene.rosy.comb
+            self.radius, self.strength = self._mouse.radius(place, comb.size), comb.strength
+            self._line = run_to_completion(self._stroke_task(context))
         point = self.stroke.add()
-        point.location, point.pressure = place, pressure
+        point.location, point.pressure = place, event.pressure
         point.is_start = len(self.stroke) > 1 and self._is_away
         self._is_away = False
         return self._line.extend(np.array([point.location]), np.array([point.pressure]))

@@ -208,6 +208,8 @@ class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):
             {"type": "LEFTMOUSE", "value": "PRESS", "ctrl": True},
             {"properties": [("make_pair", True)]},
         ),
+        # Beside the singularities. Blender's own keymap would move the object.
+        ("view3d.select_box", {"type": "LEFTMOUSE", "value": "CLICK_DRAG"}, None),
     )
 
     # Blender calls both without an instance.

@@ -725,6 +725,9 @@ def singularities_dragged_with_the_tool():
         bpy.ops.ed.undo()
     yield 0.3
     assert shown_singularities() == before
+    yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))  # beside them: selects
+    assert bpy.context.object.location.length == 0 and bpy.context.selected_objects
+    assert shown_singularities() == before
     yield from drag((-0.4, -0.8, -0.4), (0.4, -0.8, -0.4), ctrl=True)
     yield from wait_until(lambda: shown_singularities() != before)
     added = dict(shown_singularities().items() - before.items())
@@ -789,6 +792,13 @@ def field_combed_with_the_tool():
         assert field_bytes() != combed
         yield from move_mouse((0.3, -0.9, -0.3), "ESC", "PRESS")
         assert field_bytes() == combed
+        # A stroke may begin beside the mesh.
+        yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))
+        yield from wait_until(lambda: field_bytes() != combed)
+        assert bpy.context.object.location.length == 0
+        if mode == "OBJECT":
+            yield from drag((-1.15, -0.9, 0.0), (-1.15, -0.9, 0.0))
+            yield from wait_until(lambda: not bpy.context.selected_objects)
         with in_view():
             bpy.ops.wm.tool_set_by_id(
                 name="builtin.select_box" if mode == "OBJECT" else "builtin.brush"

@@ -182,8 +182,12 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
                 self._line.restore()
 
     def _click_beside(self, context: bpy.types.Context, event: bpy.types.Event) -> None:
-        """Select what is under the mouse, as a click does that is not on the mesh."""
-        if context.mode == "OBJECT" and self.effect == "COMB":
+        """Select what is under the mouse, if it was clicked and not dragged beside the mesh."""
+        moved = np.hypot(
+            event.mouse_x - event.mouse_prev_press_x, event.mouse_y - event.mouse_prev_press_y
+        )
+        is_click = moved <= context.preferences.inputs.drag_threshold_mouse
+        if is_click and context.mode == "OBJECT" and self.effect == "COMB":
             mouse = event.mouse_region_x, event.mouse_region_y
             bpy.ops.view3d.select("EXEC_DEFAULT", True, deselect_all=True, location=mouse)
 

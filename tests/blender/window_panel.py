@@ -726,6 +726,7 @@ def singularities_dragged_with_the_tool():
     yield 0.3
     assert shown_singularities() == before
     yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))  # beside them: selects
+    yield 0.5
     assert bpy.context.object.location.length == 0 and bpy.context.selected_objects
     assert shown_singularities() == before
     yield from drag((-0.4, -0.8, -0.4), (0.4, -0.8, -0.4), ctrl=True)
@@ -794,9 +795,12 @@ def field_combed_with_the_tool():
         assert field_bytes() == combed
         # A stroke may begin beside the mesh.
         yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))
-        yield from wait_until(lambda: field_bytes() != combed)
+        yield from wait_until(lambda old=combed: field_bytes() != old)
         assert bpy.context.object.location.length == 0
         if mode == "OBJECT":
+            yield from drag((-1.15, -0.9, 0.3), (-1.15, -0.9, -0.3))
+            yield 0.3
+            assert bpy.context.selected_objects
             yield from drag((-1.15, -0.9, 0.0), (-1.15, -0.9, 0.0))
             yield from wait_until(lambda: not bpy.context.selected_objects)
         with in_view():

@@ -33,6 +33,8 @@ class TriangleGraph:
         Of the T triangles. Its M edges are the I edges between faces, and then those within faces. Its
         conductance is half the sum of the cotangents. It may be negative, but the matrix of the potential
         is positive semidefinite.
+    weight : (M, 2) float64 ndarray
+        Half the cotangent opposite each edge, in the source and in the target.
     triangle_face : (T,) intp ndarray
         Face of each triangle, ascending.
     area : (T,) float64 ndarray
@@ -41,6 +43,7 @@ class TriangleGraph:
     """
 
     graph: FaceGraph
+    weight: np.ndarray
     triangle_face: np.ndarray
     area: np.ndarray
     face_edge_count: int
@@ -51,23 +54,38 @@ class TriangleGraph:
         result[: self.face_edge_count] = angle
         return result
 
-    def on_faces(self, angle: np.ndarray) -> np.ndarray:
-        """Return (I,) angles between faces from (M,) angles between triangles."""
-        turn, outer = self._turns_in_faces(angle), slice(self.face_edge_count)
+    def turns_to_centers(self, drop: np.ndarray) -> np.ndarray:
+        """Return (T,) angles from the circumcenter of each triangle to its center.
+
+        `drop` is (M,) differences of the potential along the edges. The angles between triangles are those from
+        circumcenter to circumcenter. They lead across the middles of the edges, whose mean is the center.
+        """
+        graph, count = self.graph, len(self.triangle_face)
+        total = np.bincount(graph.source, self.weight[:, 0] * drop, count)
+        return (total - np.bincount(graph.target, self.weight[:, 1] * drop, count)) / 3
+
+    def on_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
+        """Return (I,) angles between faces from (M,) angles between triangles.
+
+        `to_center` is (T,) angles that are added to the directions of triangles; see `turns_to_centers`.
+        """
+        turn, outer = self._turns_in_faces(angle, to_center), slice(self.face_edge_count)
         return angle[outer] + turn[self.graph.source[outer]] - turn[self.graph.target[outer]]
 
-    def directions_of_faces(self, direction: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Return (F,) directions from (T,) directions of triangles and (M,) angles between them."""
+    def directions_of_faces(
+        self, direction: np.ndarray, angle: np.ndarray, to_center: np.ndarray
+    ) -> np.ndarray:
+        """Return (F,) directions from (T,) directions of triangles; the rest is as in `on_faces`."""
         first = np.flatnonzero(np.diff(self.triangle_face, prepend=-1))
-        return (direction - self._turns_in_faces(angle))[first]
+        return (direction - self._turns_in_faces(angle, to_center))[first]
 
-    def _turns_in_faces(self, angle: np.ndarray) -> np.ndarray:
+    def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
         """(T,) angles from the direction of a face to that of each of its triangles."""
-        step = np.zeros(len(self.triangle_face))
-        inner = slice(self.face_edge_count, None)
+        face, inner = self.triangle_face, slice(self.face_edge_count, None)
+        step = np.zeros(len(face))
         step[self.graph.target[inner]] = angle[inner]
-        turn, face = np.cumsum(step), self.triangle_face
-        mean = np.bincount(face, self.area * turn) / np.bincount(face, self.area)
+        turn = np.cumsum(step)
+        mean = np.bincount(face, self.area * (turn + to_center)) / np.bincount(face, self.area)
         return turn - mean[face]
 
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
@@ -112,6 +130,7 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
     inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
     weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
     tail, head = faces.corner_node[corner[inner, 1]], faces.corner_node[apex[inner]]
+    weight = np.stack(weights, axis=1)
     graph = replace(
         faces,
         source=triangles[0],
@@ -119,10 +138,10 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
         unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
         tail=np.concatenate([faces.tail, tail]),
         head=np.concatenate([faces.head, head]),
-        conductance=weights[0] + weights[1],
+        conductance=weight.sum(axis=1),
         component=faces.component[face],
     )
-    return TriangleGraph(graph, face, area, len(faces.source))
+    return TriangleGraph(graph, weight, face, area, len(faces.source))
 
 
 def _cotangents(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

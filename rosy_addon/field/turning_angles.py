@@ -89,8 +89,9 @@ def turning_angles_task(
     tree = yield from subtask(task, 0.0, 0.1)
     loops = yield from subtask(_loops_task(triangles.graph, tree), 0.1, 0.2)
     task = least_angles_task(triangles.graph, degree, required, loops, present_between)
-    between = yield from subtask(task, 0.2, 0.8)
-    limit, angle = np.pi / degree, triangles.on_faces(between)
+    drop = yield from subtask(task, 0.2, 0.8)
+    between, to_center = triangles.graph.conductance * drop, triangles.turns_to_centers(drop)
+    limit, angle = np.pi / degree, triangles.on_faces(between, to_center)
     for attempt in range(MAX_ATTEMPTS):
         if np.abs(angle + present).max(initial=0.0) < limit:
             break
@@ -100,13 +101,17 @@ def turning_angles_task(
         task = _least_angles_near_task(
             triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
         )
-        between = yield from subtask(task, start, stop)
-        if between is None:
+        changed = yield from subtask(task, start, stop)
+        if changed is None:
             task = least_angles_task(triangles.graph, degree, required, loops, present_between)
-            between = yield from subtask(task, start, stop)
-        angle = triangles.on_faces(between)
+            changed = triangles.graph.conductance * (yield from subtask(task, start, stop))
+        # Resistance is of angles between triangles.
+        is_changed = changed != between
+        to_center[triangles.graph.source[is_changed]] = 0
+        to_center[triangles.graph.target[is_changed]] = 0
+        between, angle = changed, triangles.on_faces(changed, to_center)
     direction = tree.sums_from_root(triangles.graph.unfolding + present_between + between)
-    return angle, triangles.directions_of_faces(direction, between)
+    return angle, triangles.directions_of_faces(direction, between, to_center)
 
 
 def _least_angles_near_task(
@@ -142,7 +147,7 @@ def _least_angles_near_task(
     )
     rest = (required - graph.turn_around_nodes(fixed))[is_near]
     solver = yield from subtask(_potential_solver_task(near), 0.2, 0.5)
-    fixed[edges] = yield from subtask(solver(rest), 0.5, 1.0)
+    fixed[edges] = near.conductance * (yield from subtask(solver(rest), 0.5, 1.0))
     change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
     return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
@@ -163,34 +168,36 @@ def least_angles_task(
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
 ) -> Task[np.ndarray]:
-    """(I,) angles of least squares, weighed by 1 / conductance; see `turning_angles_task`."""
+    """(I,) angles of least squares, divided by the conductances; see `turning_angles_task`."""
     yield Progress(0.0, LABEL)
     solver = yield from subtask(_potential_solver_task(graph), 0.0, 0.5)
     share = 0.5 / (len(loops) + 1)
-    angle = yield from subtask(solver(required), 0.5, 0.5 + share)
+    drop = yield from subtask(solver(required), 0.5, 0.5 + share)
     harmonics = []
     for number, (edges, signs) in enumerate(loops, 1):
-        crossing = np.zeros(len(angle))
+        crossing = np.zeros(len(drop))
         np.add.at(crossing, edges, signs)
-        crossing *= graph.conductance
-        task = solver(-graph.turn_around_nodes(crossing))
+        task = solver(-graph.turn_around_nodes(graph.conductance * crossing))
         start = 0.5 + number * share
         harmonics.append(crossing + (yield from subtask(task, start, start + share)))
     if loops:
         turn = 2 * np.pi / degree
-        total = angle + present + graph.unfolding
+        total = graph.conductance * drop + present + graph.unfolding
         sums = np.array([(signs * total[edges]).sum() for edges, signs in loops])
         matrix_of_loops = np.array(
-            [[(signs * harmonic[edges]).sum() for harmonic in harmonics] for edges, signs in loops]
+            [
+                [(signs * (graph.conductance * harmonic)[edges]).sum() for harmonic in harmonics]
+                for edges, signs in loops
+            ]
         )
         coefficients = _nearest_lattice_coefficients(matrix_of_loops, -sums, turn)
         for coefficient, harmonic in zip(coefficients, harmonics, strict=True):
-            angle += coefficient * harmonic
-    return angle
+            drop += coefficient * harmonic
+    return drop
 
 
 def _potential_solver_task(graph: FaceGraph) -> Task[Callable[[np.ndarray], Task[np.ndarray]]]:
-    """A function that computes the (I,) angles of the potential with (n,) sums around the nodes."""
+    """A function that computes the (I,) differences of the potential with (n,) sums around the nodes."""
     matrix = levels = None
     if graph.is_interior.any():
         matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.2)
@@ -202,7 +209,7 @@ def _potential_solver_task(graph: FaceGraph) -> Task[Callable[[np.ndarray], Task
             rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
             task = conjugate_gradient_task(matrix, rhs, TOLERANCE, precondition, LABEL)
             potential[graph.is_interior] = yield from task
-        return graph.conductance * (potential[graph.head] - potential[graph.tail])
+        return potential[graph.head] - potential[graph.tail]
 
     return solve_task
 

@@ -97,17 +97,17 @@ def _interpolated(
     mask = field.neighbor_mask.take(texel)
     total = np.zeros((len(texel), color.shape[1]), dtype=np.float32)
     weights = np.zeros(len(texel), dtype=np.float32)
-    for dx, dy, weight in (
-        (0 * column, 0 * row, (1 - x) * (1 - y)),
-        (column, 0 * row, x * (1 - y)),
-        (0 * column, row, (1 - x) * y),
-        (column, row, x * y),
+    neighbor = field.pixel.take(texel) + row * field.width
+    # A linked neighbor in the same row is the texel before or after.
+    for dx, dy, place, weight in (
+        (0 * column, 0 * row, texel, (1 - x) * (1 - y)),
+        (column, 0 * row, texel + column, x * (1 - y)),
+        (0 * column, row, np.searchsorted(field.pixel, neighbor), (1 - x) * y),
+        (column, row, np.searchsorted(field.pixel, neighbor + column), x * y),
     ):
         linked = mask >> (dx + 3 * dy + 4).astype(np.uint16) & 1
         weight = (weight + 1e-6) * linked
-        neighbor = field.pixel.take(texel) + dy * field.width + dx
-        place = np.minimum(np.searchsorted(field.pixel, neighbor), len(field.pixel) - 1)
-        total += weight[:, None] * color.take(place, axis=0)
+        total += weight[:, None] * color.take(place, axis=0, mode="clip")
         weights += weight
     return total / weights[:, None]
 
@@ -155,6 +155,8 @@ def _dilate(
 def _neighbors(frame: TextureFrame, index: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """Return the (n,) intp flat indices of neighbors; -1 outside of the tile."""
     row, column = np.divmod(index.astype(np.intp), frame.width)
-    inside = (column + dx >= 0) & (column + dx < frame.width)
-    inside &= (row + dy >= 0) & ((row + dy) // frame.size == row // frame.size)
+    column += dx
+    row %= frame.size
+    row += dy
+    inside = (column >= 0) & (column < frame.width) & (row >= 0) & (row < frame.size)
     return np.where(inside, index + dy * frame.width + dx, -1)

@@ -17,7 +17,7 @@ from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents_task
-from .line_order import LineOrder, combed_directions_task
+from .line_order import CombedDirections, combed_directions_task
 from .texel_surface import TexelSurface
 
 #: Label of all steps.
@@ -98,10 +98,10 @@ def corner_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[np.n
 
 
 def _directions_at(
-    mesh: TangentMesh, combed: LineOrder, triangle: np.ndarray, weights: np.ndarray
+    mesh: TangentMesh, combed: CombedDirections, triangle: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (n,) unit tangents of points, those nearest to the combed ones, and whether they are defined."""
-    guide = np.exp(1j * np.angle(combed.first_at(triangle, weights)))
+    guide = combed.directions_at(triangle, weights)
     z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
     member = nearest_member(guide, z, mesh.degree)
     return mesh.directions_at(triangle, weights, member), z != 0

@@ -77,6 +77,34 @@ class LineOrder:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class CombedDirections:
+    """One direction of the first line at the points of a surface.
+
+    Attributes
+    ----------
+    line : LineOrder
+    sense : LineOrder
+        Of degree 1: which of the two opposite directions of a line is chosen. Where it turns over, the line
+        goes on.
+    """
+
+    line: LineOrder
+    sense: LineOrder
+
+    def directions_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return (n,) unit tangents near to the directions of the field.
+
+        Parameters
+        ----------
+        triangle, weights
+            As for `LineOrder.first_at`.
+        """
+        direction = _unit_root(self.line.first_at(triangle, weights), self.line.degree)
+        is_opposite = (direction * self.sense.first_at(triangle, weights).conj()).real < 0
+        return np.where(is_opposite, -direction, direction)
+
+
 def first_line_weights(first: np.ndarray, members: np.ndarray, degree: int) -> np.ndarray:
     """Return (M, n) float32: how much each line comes first; the sum is 1.
 
@@ -132,7 +160,7 @@ def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Ta
     return (yield from subtask(task, 0.4, 1.0, STEP_LABEL))
 
 
-def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[LineOrder]:
+def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[CombedDirections]:
     """Choose one direction of a field at each point: a direction of the first line.
 
     Opposite directions of that line meet only where they must.
@@ -144,19 +172,19 @@ def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[Line
 
     Returns
     -------
-    LineOrder
-        Of degree 1.
+    CombedDirections
     """
     refined = yield from subtask(_refined_task(mesh), 0.0, 0.3)
     task = _first_lines_task(mesh, refined, guiding_angle, 0.0)
     lines = yield from subtask(task, 0.3, 0.6, STEP_LABEL)
     if lines.degree == 1:
-        return lines
+        return CombedDirections(lines, lines)
     root = refined.tree.leaf_root
     line = power(_unit_root(lines.first.sum(axis=1), 2), 2)
     guide = _guide(mesh, guiding_angle, 1)[root]
     task = _aligned_task(refined, line, 2, guide, 1, AVERAGE_LENGTHS)
-    return (yield from subtask(task, 0.6, 1.0, STEP_LABEL))
+    sense = yield from subtask(task, 0.6, 1.0, STEP_LABEL)
+    return CombedDirections(lines, sense)
 
 
 class _RefinedMesh(NamedTuple):

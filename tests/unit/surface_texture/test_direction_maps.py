@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import mainly
-from shapes import torus
+from shapes import globe, torus
 from uv_maps import patches_uv, torus_uv
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing.tangent_mesh import tangent_mesh_task
+from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.surface_texture.direction_maps import corner_directions_task
 from rosy_addon.surface_texture.draw import draw_texture
 
 #: Largest mean error of a direction in radians, and the largest one of 95 %. With 8 bits a direction is right
@@ -69,6 +72,24 @@ def test_maps_decode_to_the_field(degree, uv):
     assert error.mean() < MEAN_ERROR
     assert np.quantile(error, 0.95) < LARGE_ERROR
     np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=0.01)
+
+
+def test_a_line_goes_on_where_its_directions_turn_over():
+    """On an ellipsoid they do between two umbilics; away from these, one family is followed everywhere."""
+    ball = globe(48, 96)
+    surface = build_surface(ball.vertices * (1, 0.7, 0.5), ball.corner_vertex, ball.face_start)
+    field, line = (generate(surface, GeneratorSettings("curvature"), n) for n in (4, 2))
+    instance = MeshInstance(surface, np.eye(4), field)
+    mesh = run_to_completion(tangent_mesh_task(instance))
+    tangent = run_to_completion(corner_directions_task(mesh, 0.0))[:, 0]
+    a, b, c = 1.0, 0.7, 0.5
+    umbilic = np.sqrt(
+        [a**2 * (a**2 - b**2) / (a**2 - c**2), 0, c**2 * (b**2 - c**2) / (a**2 - c**2)]
+    )
+    away = np.linalg.norm(np.abs(mesh.points[:, 0]) - umbilic, axis=1) > 0.2
+    vectors = line.vectors[surface.triangle_face]
+    along = np.abs((tangent * vectors).sum(axis=1)) > 0.7 * np.linalg.norm(vectors, axis=1)
+    assert along[away].mean() in (0, 1)
 
 
 def test_directions_do_not_turn_over_within_a_chart():

@@ -41,7 +41,8 @@ def main() -> None:
         gray = [picture[..., :3].mean(axis=2)[covered] for picture in (ours, theirs)]
         print(
             f"azimuth, elevation {lamp}: correlation {np.corrcoef(gray)[0, 1]:.4f}, "
-            f"means {gray[0].mean():.3f}, {gray[1].mean():.3f}"
+            f"means {gray[0].mean():.3f}, {gray[1].mean():.3f}",
+            flush=True,
         )
 
 

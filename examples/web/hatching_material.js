@@ -32,7 +32,8 @@ float transmittance(vec3 ink) {
 }
 
 void main() {
-  float lambert = max(dot(normalize(vNormal), lightDirection), 0.0) * lightStrength;
+  vec3 normal = normalize(gl_FrontFacing ? vNormal : -vNormal);
+  float lambert = max(dot(normal, lightDirection), 0.0) * lightStrength;
   float range = abs(white - black) > 1e-3 ? white - black : 1e-3;
   float tone = (mix(1.0, lambert, shading) - black) / range;
   tone = min(pow(max(tone, 0.0), 1.0 / gamma), 1.0);
@@ -95,6 +96,7 @@ export function hatchingMaterial(thresholds, settings) {
   return new THREE.ShaderMaterial({
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
+    side: THREE.DoubleSide,
     uniforms: {
       thresholds: { value: thresholds },
       lightDirection: { value: new THREE.Vector3(0, 1, 0) },
